@@ -1,0 +1,61 @@
+"""What every dataset yields (`Frame`) and what every dataset is (`Sequence`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import PinholeCamera
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One synchronised image and scan.
+
+    Attributes:
+        index: position in its sequence, as the files are numbered.
+        timestamp: seconds since the sequence's first frame.
+        image: ``[H, W, 3]`` uint8, RGB, rectified.
+        points: ``[N, 4]`` float32, finite: x forward, y left, z up in metres, intensity 0..1.
+        camera: intrinsics of ``image``.
+        camera_from_lidar: the dataset's own extrinsic, 4x4 float64; the reference where the
+            dataset is calibrated, a starting guess where the user's sensors are not yet.
+        source: the image's path (or a description), to name in messages.
+    """
+
+    index: int
+    timestamp: float
+    image: NDArray[np.uint8] = field(repr=False)
+    points: NDArray[np.float32] = field(repr=False)
+    camera: PinholeCamera
+    camera_from_lidar: NDArray[np.float64] = field(repr=False)
+    source: str = ""
+
+
+@runtime_checkable
+class Sequence(Protocol):
+    """Frames of one camera and one LiDAR on one mount, read lazily.
+
+    Attributes:
+        name: for titles and file names, for instance ``"kitti-odometry/04"``.
+        rig: the sensors and mount the frames come from, for instance ``"KITTI 2011_09_30, camera 2"``.
+    """
+
+    name: str
+    rig: str
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read one frame; ``DatasetError`` names the file if it cannot be read."""
+        ...
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames in order."""
+        ...

@@ -1,0 +1,27 @@
+"""Errors a user can act on: one sentence that says what is wrong, where, and what to do."""
+
+from __future__ import annotations
+
+
+class CalibnetError(Exception):
+    """Base of every error caused by input or environment rather than by a bug.
+
+    The message is one complete sentence for the user; the command line prints it without a
+    traceback and exits non-zero.
+    """
+
+
+class DatasetError(CalibnetError):
+    """A folder, frame or calibration file is missing, malformed or inconsistent."""
+
+
+class WeightsError(CalibnetError):
+    """A weights file is missing, foreign, truncated or of another preset."""
+
+
+class ConfigError(CalibnetError):
+    """A preset or an option has a value that cannot be used."""
+
+
+class CalibrationError(CalibnetError):
+    """A frame cannot be calibrated, for instance because no LiDAR point falls into the image."""

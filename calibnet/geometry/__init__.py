@@ -1,0 +1,39 @@
+"""SE(3), the pinhole camera, projection with a z-buffer, and miscalibration sampling (NumPy only)."""
+
+from calibnet.geometry.camera import PinholeCamera
+from calibnet.geometry.miscalibration import (
+    RANGES,
+    MiscalibrationRange,
+    miscalibration,
+    sample_miscalibration,
+)
+from calibnet.geometry.projection import Projection, depth_image, project
+from calibnet.geometry.se3 import (
+    PoseError,
+    euler_xyz,
+    invert,
+    pose_error,
+    rotation_angle,
+    rotation_from_euler_xyz,
+    transform,
+    transform_points,
+)
+
+__all__ = [
+    "RANGES",
+    "MiscalibrationRange",
+    "PinholeCamera",
+    "PoseError",
+    "Projection",
+    "depth_image",
+    "euler_xyz",
+    "invert",
+    "miscalibration",
+    "pose_error",
+    "project",
+    "rotation_angle",
+    "rotation_from_euler_xyz",
+    "sample_miscalibration",
+    "transform",
+    "transform_points",
+]

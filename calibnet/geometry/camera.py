@@ -1,0 +1,41 @@
+"""The rectified pinhole camera. Pixel centres lie at integer coordinates, as in OpenCV and KITTI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class PinholeCamera:
+    """Image size in pixels and the 3x3 intrinsic matrix of a rectified camera."""
+
+    width: int
+    height: int
+    matrix: NDArray[np.float64] = field(repr=False)
+
+    @property
+    def focal(self) -> tuple[float, float]:
+        """Focal lengths ``(fx, fy)`` in pixels."""
+        return float(self.matrix[0, 0]), float(self.matrix[1, 1])
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """Principal point ``(cx, cy)`` in pixels."""
+        return float(self.matrix[0, 2]), float(self.matrix[1, 2])
+
+    def resized(self, width: int, height: int) -> PinholeCamera:
+        """The camera of the image resized to ``width`` x ``height``.
+
+        With pixel centres at integers, ``u' + 0.5 = s (u + 0.5)``: the half pixel matters at 1/8.
+        """
+        sx, sy = width / self.width, height / self.height
+        scale = np.array([[sx, 0.0, 0.5 * sx - 0.5], [0.0, sy, 0.5 * sy - 0.5], [0.0, 0.0, 1.0]])
+        return PinholeCamera(width, height, scale @ self.matrix)
+
+    def cropped(self, left: int, top: int, width: int, height: int) -> PinholeCamera:
+        """The camera of the window at ``(left, top)``; negative offsets pad."""
+        shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
+        return PinholeCamera(width, height, shift @ self.matrix)

@@ -1,0 +1,64 @@
+"""Projection of a LiDAR scan into an image, with a z-buffer: the nearest point of a pixel wins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry.camera import PinholeCamera
+from calibnet.geometry.se3 import Matrix, transform_points
+
+MINIMUM_DEPTH = 0.5
+"""Metres in front of the camera below which a point is the car itself or numerically useless."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """The points of a scan that fall into an image.
+
+    Attributes:
+        pixels: ``[M, 2]`` float32, sub-pixel ``(u, v)``.
+        depth: ``[M]`` float32, metres along the optical axis.
+        index: ``[M]`` int64, row of each point in the scan.
+    """
+
+    pixels: NDArray[np.float32]
+    depth: NDArray[np.float32]
+    index: NDArray[np.int64]
+
+
+def project(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> Projection:
+    """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""
+    in_camera = transform_points(camera_from_lidar, points[:, :3])
+    index = np.flatnonzero(in_camera[:, 2] > MINIMUM_DEPTH)
+    x, y, depth = in_camera[index].T
+    matrix = camera.matrix.astype(np.float32)
+    u = (matrix[0, 0] * x + matrix[0, 1] * y) / depth + matrix[0, 2]
+    v = matrix[1, 1] * y / depth + matrix[1, 2]
+    inside = (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
+    pixels = np.stack([u[inside], v[inside]], axis=1)
+    return Projection(pixels.astype(np.float32), depth[inside].astype(np.float32), index[inside])
+
+
+def nearest_per_cell(projection: Projection, camera: PinholeCamera, stride: int = 1) -> NDArray[np.int64]:
+    """Z-buffer at ``stride`` pixels a cell.
+
+    Returns ``[h, w]`` int64: for every cell the row in ``projection`` of its nearest point, or -1.
+    """
+    height, width = -(-camera.height // stride), -(-camera.width // stride)
+    cell = np.floor((projection.pixels + 0.5) / stride).astype(np.int64)
+    flat = np.minimum(cell[:, 1], height - 1) * width + np.minimum(cell[:, 0], width - 1)
+    far_to_near = np.argsort(-projection.depth, kind="stable")
+    winner = np.full(height * width, -1, dtype=np.int64)
+    winner[flat[far_to_near]] = far_to_near  # the last assignment wins: the nearest
+    return winner.reshape(height, width)
+
+
+def depth_image(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> NDArray[np.float32]:
+    """Sparse depth ``[H, W]`` in metres, 0 where no point falls."""
+    projection = project(points, camera_from_lidar, camera)
+    winner = nearest_per_cell(projection, camera)
+    depth = np.append(projection.depth, np.float32(0.0))
+    return depth[winner]

@@ -1,0 +1,101 @@
+"""Rigid transforms as 4x4 matrices named ``target_from_source``; metres, radians, float64."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Matrix = NDArray[np.float64]
+
+
+def transform(rotation: ArrayLike, translation: ArrayLike) -> Matrix:
+    """Build a 4x4 transform from a 3x3 rotation and a translation of 3 metres."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def invert(matrix: Matrix) -> Matrix:
+    """Invert a rigid 4x4 transform: ``source_from_target``."""
+    rotation = matrix[:3, :3]
+    return transform(rotation.T, -rotation.T @ matrix[:3, 3])
+
+
+def transform_points(target_from_source: Matrix, points: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Map points ``[N, 3]`` from source to target; the points' own precision is kept."""
+    matrix = target_from_source.astype(points.dtype, copy=False)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def rotation_from_euler_xyz(angles: ArrayLike) -> Matrix:
+    """Rotation ``Rx(a) Ry(b) Rz(c)`` from three angles in radians."""
+    a, b, c = np.asarray(angles, dtype=np.float64)
+    ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
+    return np.array(
+        [
+            [cb * cc, -cb * sc, sb],
+            [ca * sc + sa * sb * cc, ca * cc - sa * sb * sc, -sa * cb],
+            [sa * sc - ca * sb * cc, sa * cc + ca * sb * sc, ca * cb],
+        ]
+    )
+
+
+def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
+    """The three angles, in radians, of ``rotation_from_euler_xyz`` (for |b| < 90 degrees)."""
+    return np.array(
+        [
+            np.arctan2(-rotation[1, 2], rotation[2, 2]),
+            np.arcsin(np.clip(rotation[0, 2], -1.0, 1.0)),
+            np.arctan2(-rotation[0, 1], rotation[0, 0]),
+        ]
+    )
+
+
+def rotation_angle(rotation: NDArray[np.floating]) -> float:
+    """Angle of a rotation in radians; exact near zero, where arccos of the trace is not."""
+    axis = 0.5 * np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    return float(np.arctan2(np.linalg.norm(axis), 0.5 * (np.trace(rotation) - 1.0)))
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """Difference of an estimated extrinsic to the reference, in the camera frame.
+
+    ``roll`` turns about the camera's z (forward), ``pitch`` about x (right), ``yaw`` about y
+    (down); per-axis values are signed.
+    """
+
+    rotation_deg: float
+    translation_cm: float
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+    x_cm: float
+    y_cm: float
+    z_cm: float
+
+
+def pose_error(estimate: Matrix, reference: Matrix) -> PoseError:
+    """Compare two ``camera_from_lidar``: angle of ``R_est R_ref^T`` and ``|t_est - t_ref|``."""
+    rotation = estimate[:3, :3] @ reference[:3, :3].T
+    offset = 100.0 * (estimate[:3, 3] - reference[:3, 3])
+    pitch, yaw, roll = np.degrees(euler_xyz(rotation))
+    return PoseError(
+        rotation_deg=float(np.degrees(rotation_angle(rotation))),
+        translation_cm=float(np.linalg.norm(offset)),
+        roll_deg=float(roll),
+        pitch_deg=float(pitch),
+        yaw_deg=float(yaw),
+        x_cm=float(offset[0]),
+        y_cm=float(offset[1]),
+        z_cm=float(offset[2]),
+    )

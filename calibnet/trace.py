@@ -1,0 +1,101 @@
+"""What the cascade tells about itself: every picture, curve and table is made from these types.
+
+Arrays are NumPy, so that readers need no torch. Pixels are those of the network's input camera
+(`CascadeTrace.camera`), whose image is the frame's, resized.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import MiscalibrationRange, PinholeCamera
+
+
+@dataclass(frozen=True, eq=False)
+class ScaleTrace:
+    """One cost volume of one stage.
+
+    Attributes:
+        stride: input pixels a cell.
+        volume: ``[Dy, Dx, h, w]`` float16, matching score (mean cosine of the groups, -1..1) of the
+            LiDAR cell with the image cell displaced by ``(dy, dx)`` cells, window centre = none.
+        probability: ``[Dy, Dx, h, w]`` float16, the same after aggregation, a softmax over the window.
+        best: ``[h, w, 2]`` int64, displacement ``(dx, dy)`` in cells with the highest probability.
+        before: ``[C, h, w]`` float16, activations entering the hourglass, maximum over the window.
+        after: ``[C', h, w]`` float16, activations leaving it, maximum over the window.
+        occupied: ``[h, w]`` bool, cells that hold a LiDAR point.
+    """
+
+    stride: int
+    volume: NDArray[np.float16] = field(repr=False)
+    probability: NDArray[np.float16] = field(repr=False)
+    best: NDArray[np.int64] = field(repr=False)
+    before: NDArray[np.float16] = field(repr=False)
+    after: NDArray[np.float16] = field(repr=False)
+    occupied: NDArray[np.bool_] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class StageDetail:
+    """The intermediate results of one stage, present only when asked for.
+
+    Attributes:
+        depth: ``[H, W]`` float32 metres, 0 where empty: the LiDAR image the stage saw.
+        scales: its cost volumes, fine to coarse.
+        displacement: ``[h, w, 2]`` float32, ``(dx, dy)`` in input pixels from where a LiDAR cell
+            is projected to where the network finds it in the image, at the finest scale.
+        confidence: ``[h, w]`` float32, 0..1 (1 = a pixel or better), 0 where no LiDAR point is.
+    """
+
+    depth: NDArray[np.float32] = field(repr=False)
+    scales: tuple[ScaleTrace, ...] = field(repr=False)
+    displacement: NDArray[np.float32] = field(repr=False)
+    confidence: NDArray[np.float32] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class StageTrace:
+    """One stage of the cascade on one frame.
+
+    Attributes:
+        number: 1 (coarsest) to 5 (finest).
+        range: the miscalibration the stage was trained for.
+        before: ``camera_from_lidar`` it started from, 4x4.
+        after: ``camera_from_lidar`` it arrived at, ``correction @ before``.
+        correction: 4x4, in the camera frame.
+        milliseconds: wall time by part, for instance ``{"projection": 2.1, "cost_volumes": 3.0}``.
+        detail: intermediate results, or None when they were not asked for.
+    """
+
+    number: int
+    range: MiscalibrationRange
+    before: NDArray[np.float64] = field(repr=False)
+    after: NDArray[np.float64] = field(repr=False)
+    correction: NDArray[np.float64] = field(repr=False)
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    detail: StageDetail | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class CascadeTrace:
+    """A whole run on one frame.
+
+    Attributes:
+        camera: the network's input camera (the frame's, resized).
+        initial: ``camera_from_lidar`` the run started from, 4x4.
+        stages: the stages that ran, coarse to fine.
+        milliseconds: wall time shared by the stages (resizing, image features).
+    """
+
+    camera: PinholeCamera
+    initial: NDArray[np.float64] = field(repr=False)
+    stages: tuple[StageTrace, ...]
+    milliseconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def corrected(self) -> NDArray[np.float64]:
+        """``camera_from_lidar`` after the last stage."""
+        return self.stages[-1].after if self.stages else self.initial
