@@ -4,8 +4,10 @@ from calibnet.geometry.camera import PinholeCamera
 from calibnet.geometry.miscalibration import (
     RANGES,
     MiscalibrationRange,
+    bounds_of,
     miscalibration,
     sample_miscalibration,
+    stages_within,
 )
 from calibnet.geometry.projection import Projection, depth_image, project
 from calibnet.geometry.se3 import (
@@ -25,6 +27,7 @@ __all__ = [
     "PinholeCamera",
     "PoseError",
     "Projection",
+    "bounds_of",
     "depth_image",
     "euler_xyz",
     "invert",
@@ -34,6 +37,7 @@ __all__ = [
     "rotation_angle",
     "rotation_from_euler_xyz",
     "sample_miscalibration",
+    "stages_within",
     "transform",
     "transform_points",
 ]

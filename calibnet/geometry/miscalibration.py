@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from calibnet.errors import ConfigError
-from calibnet.geometry.se3 import Matrix, rotation_from_euler_xyz, transform
+from calibnet.geometry.se3 import Matrix, euler_xyz, rotation_from_euler_xyz, transform
 
 
 @dataclass(frozen=True, order=True)
@@ -39,7 +39,7 @@ RANGES: tuple[MiscalibrationRange, ...] = tuple(
 """The five ranges of the cascade (paper section 3.5), coarse to fine."""
 
 
-def miscalibration(roll_pitch_yaw_deg: Sequence[float], xyz_m: Sequence[float]) -> Matrix:
+def miscalibration(roll_pitch_yaw_deg: ArrayLike, xyz_m: ArrayLike) -> Matrix:
     """The ``delta`` of given angles (degrees, about camera z, x, y) and offsets (metres)."""
     roll, pitch, yaw = np.radians(roll_pitch_yaw_deg)
     return transform(rotation_from_euler_xyz([pitch, yaw, roll]), xyz_m)
@@ -49,3 +49,24 @@ def sample_miscalibration(bounds: MiscalibrationRange, generator: np.random.Gene
     """Draw one ``delta`` uniformly within ``bounds``."""
     angles = generator.uniform(-bounds.rotation_deg, bounds.rotation_deg, 3)
     return miscalibration(angles, generator.uniform(-bounds.translation_m, bounds.translation_m, 3))
+
+
+def bounds_of(delta: Matrix) -> MiscalibrationRange:
+    """The smallest range that contains ``delta``: its largest angle and its largest offset of any axis."""
+    angles = np.degrees(np.abs(euler_xyz(delta[:3, :3])))
+    return MiscalibrationRange(float(angles.max()), float(np.abs(delta[:3, 3]).max()))
+
+
+def stages_within(bounds: MiscalibrationRange) -> tuple[int, ...]:
+    """Numbers (1..5) of the stages that a run starting within ``bounds`` goes through.
+
+    The first is the finest whose range covers ``bounds`` (``5/0.5`` gives ``3, 4, 5``), so a start
+    between two ranges begins with the wider of them; beyond all ranges the run begins with stage 1.
+    """
+    slack = 1e-6
+    covering = [
+        number
+        for number, stage in enumerate(RANGES, start=1)
+        if stage.rotation_deg >= bounds.rotation_deg - slack and stage.translation_m >= bounds.translation_m - slack
+    ]
+    return tuple(range(max(covering, default=1), len(RANGES) + 1))

@@ -1,0 +1,5 @@
+"""Camera-LiDAR extrinsic calibration with a five-range cascade of learned networks.
+
+The package itself imports nothing heavy; take what is needed from its modules, for instance
+``from calibnet.cascade import Cascade``.
+"""

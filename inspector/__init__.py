@@ -1,0 +1,1 @@
+"""Look into a running calibration: recordings, views and the command line."""

@@ -1,0 +1,98 @@
+"""Option types that several commands share: ranges, stages, frames and miscalibrations as text."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from calibnet.geometry import MiscalibrationRange
+    from calibnet.geometry.se3 import Matrix
+
+STAGE_COUNT = 5
+FRAMES_PATTERN = re.compile(r"-?\d+|(-?\d+)?:(-?\d+)?(:-?[1-9]\d*)?")
+
+
+class RangeType(click.ParamType["MiscalibrationRange"]):
+    """``DEGREES/METRES``, for instance ``5/0.5``, to a `MiscalibrationRange`."""
+
+    name = "DEG/M"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> MiscalibrationRange:
+        """Parse the text; a value that is a range already is kept."""
+        from calibnet.errors import ConfigError
+        from calibnet.geometry import MiscalibrationRange
+
+        if isinstance(value, MiscalibrationRange):
+            return value
+        try:
+            return MiscalibrationRange.parse(str(value))
+        except ConfigError as error:
+            self.fail(str(error), param, ctx)
+
+
+class StagesType(click.ParamType[tuple[int, ...]]):
+    """Stage numbers as ``3-5``, ``3,5`` or ``4`` to an ascending tuple."""
+
+    name = "STAGES"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
+        """Parse the text; a value that is a tuple already is kept."""
+        if isinstance(value, tuple):
+            return value
+        stages: set[int] = set()
+        for part in str(value).split(","):
+            match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
+            if match is None:
+                self.fail(f"{value!r} is not a list of stages, for instance 3-5, 3,5 or 4.", param, ctx)
+            first, last = int(match[1]), int(match[2] or match[1])
+            if not 1 <= first <= last <= STAGE_COUNT:
+                self.fail(f"{value!r} names stages outside 1..{STAGE_COUNT} or a range that falls.", param, ctx)
+            stages.update(range(first, last + 1))
+        return tuple(sorted(stages))
+
+
+class FramesType(click.ParamType[str]):
+    """A frame number or a Python slice, ``START:STOP:STEP``; checked, and kept as text."""
+
+    name = "FRAMES"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Check the form; which frames exist is for the dataset to say."""
+        text = str(value)
+        if FRAMES_PATTERN.fullmatch(text) is None:
+            self.fail(f"{text!r} is neither a frame number nor START:STOP:STEP, for instance 0:100:5.", param, ctx)
+        return text
+
+
+class MiscalibrationType(click.ParamType["Matrix"]):
+    """``roll,pitch,yaw,x,y,z`` in degrees and metres to a 4x4 ``delta`` in the camera frame."""
+
+    name = "ROLL,PITCH,YAW,X,Y,Z"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Matrix:
+        """Parse the text; a value that is a matrix already is kept."""
+        import numpy as np
+
+        from calibnet.geometry import miscalibration
+
+        if isinstance(value, np.ndarray):
+            return value
+        try:
+            numbers = [float(part) for part in str(value).split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
+            self.fail(f"{value!r} is not six numbers, roll,pitch,yaw,x,y,z in degrees and metres.", param, ctx)
+        return miscalibration(numbers[:3], numbers[3:])
+
+
+RANGE = RangeType()
+STAGES = StagesType()
+FRAMES = FramesType()
+MISCALIBRATION = MiscalibrationType()
