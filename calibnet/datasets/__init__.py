@@ -1,0 +1,11 @@
+"""Where frames come from: `open_sequence` by name, one module per source, all of them a `Sequence`.
+
+Importing this package is cheap; a source's module (and OpenCV, pykitti, Open3D with it) is
+imported when a sequence of it is opened.
+"""
+
+from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.registry import DATASETS, dataset_names, open_sequence
+from calibnet.datasets.selection import select_frames
+
+__all__ = ["DATASETS", "Frame", "Sequence", "dataset_names", "open_sequence", "select_frames"]

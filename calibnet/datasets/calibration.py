@@ -1,0 +1,63 @@
+"""The calibration of one camera and one LiDAR, and what makes one unusable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.errors import DatasetError
+
+RIGID_TOLERANCE = 2e-3
+"""Largest entry of ``R^T R - I`` that is rounding: matrices written with three decimals pass."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Intrinsics and extrinsic of a rectified camera.
+
+    Attributes:
+        matrix: 3x3 intrinsic matrix, pixels.
+        camera_from_lidar: 4x4, metres.
+    """
+
+    matrix: NDArray[np.float64] = field(repr=False)
+    camera_from_lidar: NDArray[np.float64] = field(repr=False)
+
+
+def checked_intrinsics(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+    """Return the 3x3 ``matrix`` if it is that of a pinhole camera.
+
+    Raises:
+        DatasetError: it is singular or of another form; the message names ``path`` and ``key``.
+    """
+    focal_x, focal_y = matrix[0, 0], matrix[1, 1]
+    if not np.array_equal(matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0.0, 0.0, 0.0, 1.0]):
+        raise DatasetError(f"{path}: {key} is not a camera matrix; write it as [fx 0 cx; 0 fy cy; 0 0 1].")
+    if not (focal_x > 0.0 and focal_y > 0.0):
+        raise DatasetError(
+            f"{path}: {key} is singular (focal lengths {focal_x:g} and {focal_y:g}); give both in pixels, above 0."
+        )
+    return matrix
+
+
+def checked_rigid(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+    """Return the 4x4 ``matrix`` if it is a rigid transform.
+
+    Raises:
+        DatasetError: its last row or its rotation is wrong; the message names ``path`` and ``key``.
+    """
+    rotation = matrix[:3, :3]
+    deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise DatasetError(f"{path}: the last row of {key} is not 0 0 0 1; give a 4x4 rigid transform in metres.")
+    if deviation > RIGID_TOLERANCE:
+        raise DatasetError(
+            f"{path}: the rotation of {key} is not orthonormal (off by {deviation:.3g}); "
+            "give a rotation matrix with at least four decimals."
+        )
+    if np.linalg.det(rotation) < 0.0:
+        raise DatasetError(f"{path}: the rotation of {key} is a reflection (determinant -1); swap or negate one axis.")
+    return matrix

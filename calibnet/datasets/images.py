@@ -1,0 +1,38 @@
+"""Reading camera images: whole, as stored, RGB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.errors import DatasetError
+
+_END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
+"""First bytes of a PNG or JPEG file to the marker that ends a whole one."""
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """Read an image as ``[H, W, 3]`` uint8 RGB; grey images get three equal channels.
+
+    An orientation tag is ignored: a calibration is of the pixels as they are stored.
+
+    Raises:
+        DatasetError: the file is missing, truncated or no image.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DatasetError(f"Image {path} cannot be read ({error.strerror}); restore it.") from None
+    for start, end in _END_OF_FILE.items():
+        # Checked before decoding: what a decoder makes of half a file depends on its version.
+        if data.startswith(start) and data.rfind(end) < 0:
+            raise DatasetError(f"Image {path} is truncated; copy or download it again.")
+    image = None
+    if data:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if image is None:
+        raise DatasetError(f"Image {path} is damaged or not an image; copy or download it again.")
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)

@@ -1,0 +1,128 @@
+"""What the three KITTI layouts share: calibration files, the exact extrinsic, cameras, times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rigid
+from calibnet.errors import DatasetError
+
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+NOMINAL_PERIOD = 0.1
+"""Seconds between two frames of KITTI's 10 Hz, for frames without a recorded time."""
+
+DATE_OF_FOCAL_LENGTH = {721.5377: "2011_09_26", 707.0912: "2011_09_30", 718.856: "2011_10_03"}
+"""Recording date, and so the rig, of a rectified focal length: odometry folders name no date."""
+
+
+def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, NDArray[np.float64]]:
+    """Read the rows ``key: numbers`` of a KITTI calibration file.
+
+    Args:
+        path: the file.
+        sizes: the keys to read and how many numbers each has.
+
+    Raises:
+        DatasetError: the file or a key is missing, or a row has another count or no finite numbers.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise DatasetError(f"Calibration {path} cannot be read ({reason}); get it from KITTI's calib zip.") from None
+    rows = {key.strip(): text.split() for key, colon, text in (line.partition(":") for line in lines) if colon}
+    values = {}
+    for key, size in sizes.items():
+        if key not in rows:
+            raise DatasetError(f"Calibration {path} has no row {key!r}; get the file from KITTI's calib zip.")
+        try:
+            row = np.array(rows[key], dtype=np.float64)
+        except ValueError:
+            row = np.array([np.nan])
+        if not np.isfinite(row).all():
+            raise DatasetError(f"Calibration {path}: row {key!r} holds something other than finite numbers; repair it.")
+        if row.size != size:
+            raise DatasetError(f"Calibration {path}: row {key!r} has {row.size} numbers instead of {size}; repair it.")
+        values[key] = row
+    return values
+
+
+def rectified_calibration(
+    projection: NDArray[np.float64], camera0_from_lidar: NDArray[np.float64], path: Path
+) -> Calibration:
+    """The exact calibration of a rectified camera.
+
+    Args:
+        projection: 3x4, from the rectified reference camera 0 to the pixels of this camera.
+        camera0_from_lidar: 4x4, into the rectified reference camera.
+        path: the calibration file, for messages.
+
+    KITTI's cameras are offset in all three axes: ``K^-1 P[:, 3]``, of which pykitti keeps x only.
+    """
+    matrix = checked_intrinsics(projection[:, :3].copy(), path, "the projection matrix")
+    camera_from_lidar = checked_rigid(camera0_from_lidar, path, "the LiDAR's transform").copy()
+    camera_from_lidar[:3, 3] += np.linalg.solve(matrix, projection[:, 3])
+    return Calibration(matrix, camera_from_lidar)
+
+
+def camera_folder(parent: Path, prefix: str, camera: int) -> Path:
+    """The folder ``prefix`` + number of a camera's images, for instance ``image_2``.
+
+    Raises:
+        DatasetError: KITTI has no such camera, or the folder is missing; the message names those present.
+    """
+    folder = parent / f"{prefix}{camera}"
+    if camera not in range(4) or not folder.is_dir():
+        present = sorted({path.name[-1] for path in parent.glob(f"{prefix}[0-3]") if path.is_dir()})
+        raise DatasetError(
+            f"{folder} does not exist, there is no camera {camera}; cameras there: {', '.join(present) or 'none'}."
+        )
+    return folder
+
+
+def image_type(folder: Path) -> str:
+    """The file ending of a folder's images without its dot, ``png`` before ``jpg``.
+
+    Raises:
+        DatasetError: there are no images.
+    """
+    present = {path.suffix for path in folder.iterdir()}
+    for suffix in IMAGE_SUFFIXES:
+        if suffix in present:
+            return suffix[1:]
+    raise DatasetError(f"{folder} holds no images ({', '.join(IMAGE_SUFFIXES)}); put them there.")
+
+
+def seconds_since_first(times: Sequence[float], numbers: Sequence[int], path: Path) -> list[float]:
+    """Seconds since the first frame for frames of the given file numbers.
+
+    ``times`` holds one entry a frame, or, where only a part of the frames was kept, one for every
+    file number of the whole drive; without any, KITTI's nominal 10 Hz count.
+
+    Raises:
+        DatasetError: there are fewer times than frames.
+    """
+    if not times:
+        selected = [NOMINAL_PERIOD * number for number in numbers]
+    elif len(times) == len(numbers):
+        selected = list(times)
+    elif len(times) > max(numbers):
+        selected = [times[number] for number in numbers]
+    else:
+        raise DatasetError(f"{path} has {len(times)} times for {len(numbers)} frames; get the whole file from KITTI.")
+    return [time - selected[0] for time in selected]
+
+
+def frame_number(path: Path) -> int:
+    """The number that a KITTI file is named by.
+
+    Raises:
+        DatasetError: its name is no number.
+    """
+    if not path.stem.isdecimal():
+        raise DatasetError(f"{path} is not named by a number, as KITTI's 000000.png is; rename or remove it.")
+    return int(path.stem)

@@ -1,0 +1,115 @@
+"""KITTI raw, synced and rectified drives, read through pykitti: ``DATE/DATE_drive_NNNN_sync``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pykitti
+
+from calibnet.datasets.calibration import Calibration
+from calibnet.datasets.kitti import (
+    camera_folder,
+    frame_number,
+    image_type,
+    read_calibration_file,
+    rectified_calibration,
+    seconds_since_first,
+)
+from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, require_folder
+from calibnet.errors import DatasetError
+
+CALIBRATION_ROWS = {
+    "calib_cam_to_cam.txt": {f"P_rect_0{n}": 12 for n in range(4)} | {f"R_rect_0{n}": 9 for n in range(4)},
+    "calib_velo_to_cam.txt": {"R": 9, "T": 3},
+    "calib_imu_to_velo.txt": {"R": 9, "T": 3},
+}
+
+KNOWN_GAPS = {"2011_09_26_drive_0009_sync": {f"{number:010d}" for number in range(177, 181)}}
+"""Images whose scans KITTI itself never published, by drive; they are left out."""
+
+
+class KittiRaw(PairedSequence):
+    """One drive of KITTI raw."""
+
+    def __init__(self, root: Path | str, date: str, drive: str | int, camera: int = 2) -> None:
+        """Open a drive.
+
+        Args:
+            root: the folder that holds the dates.
+            date: for instance ``"2011_09_26"``.
+            drive: its number, ``"0005"`` or 5.
+            camera: 0 to 3, as far as the drive has them.
+
+        Raises:
+            DatasetError: a folder or file is missing, malformed or does not pair.
+        """
+        root, drive = Path(root), str(drive).zfill(4)
+        folder = _drive_folder(root, date, drive)
+        images = _data_folder(camera_folder(folder, "image_0", camera))
+        scans = _data_folder(folder / "velodyne_points")
+        for name, rows in CALIBRATION_ROWS.items():
+            read_calibration_file(root / date / name, rows)
+        kitti = _open(root, date, drive, image_type(images))
+        image_files = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
+        scan_files = {Path(path).stem: Path(path) for path in kitti.velo_files}
+        if not scan_files:
+            raise DatasetError(f"{scans} holds no scans (.bin); unpack the drive's zip again.")
+        for stem in KNOWN_GAPS.get(folder.name, set()) - scan_files.keys():
+            image_files.pop(stem, None)
+        check_paired(image_files, scan_files)
+
+        self._fixed = rectified_calibration(
+            getattr(kitti.calib, f"P_rect_{camera}0"),
+            kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect,
+            root / date / "calib_cam_to_cam.txt",
+        )
+        numbers = [frame_number(path) for path in image_files.values()]
+        seconds = [(time - kitti.timestamps[0]).total_seconds() for time in kitti.timestamps]
+        times = seconds_since_first(seconds, numbers, kitti.timestamp_file)
+        files = [
+            FrameFiles(number, time, image_files[stem], scan_files[stem])
+            for number, time, stem in zip(numbers, times, image_files, strict=True)
+        ]
+        super().__init__(f"kitti-raw/{date}_drive_{drive}", f"KITTI {date}, camera {camera}", files)
+
+    def _calibration(self, files: FrameFiles) -> Calibration:
+        return self._fixed
+
+
+class _Reader(pykitti.raw):  # type: ignore[misc]  # pykitti has no types
+    """pykitti's reader without the GPS/IMU packets, and content with a drive that has no times."""
+
+    @property
+    def timestamp_file(self) -> Path:
+        return Path(self.data_path) / "oxts" / "timestamps.txt"
+
+    def _load_timestamps(self) -> None:
+        self.timestamps: list[Any] = []
+        if self.timestamp_file.exists():
+            super()._load_timestamps()
+
+    def _load_oxts(self) -> None:
+        self.oxts: list[Any] = []
+
+
+def _open(root: Path, date: str, drive: str, imtype: str) -> _Reader:
+    try:
+        return _Reader(str(root), date, drive, imtype=imtype)
+    except ValueError as error:
+        folder = root / date / f"{date}_drive_{drive}_sync" / "oxts"
+        raise DatasetError(
+            f"{folder / 'timestamps.txt'} or a calib_*.txt of {date} is malformed ({error}); get them from KITTI."
+        ) from None
+
+
+def _drive_folder(root: Path, date: str, drive: str) -> Path:
+    layout = "a KITTI raw root holds DATE/calib_*.txt and DATE/DATE_drive_NNNN_sync"
+    dates = [path.name for path in sorted(require_folder(root, layout).iterdir()) if path.is_dir()]
+    require_folder(root / date, f"{layout}; folders there: {', '.join(dates) or 'none'}")
+    drives = [path.name.split("_")[4] for path in sorted((root / date).glob("*_drive_*_sync"))]
+    return require_folder(root / date / f"{date}_drive_{drive}_sync", f"drives there: {', '.join(drives) or 'none'}")
+
+
+def _data_folder(folder: Path) -> Path:
+    return require_folder(folder / "data", "unpack the drive's synced+rectified zip there")

@@ -1,0 +1,126 @@
+"""What every folder of images and scans shares: pairing files by stem and reading them as frames."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.calibration import Calibration
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import read_image
+from calibnet.datasets.scans import read_scan
+from calibnet.errors import DatasetError
+from calibnet.geometry import PinholeCamera
+
+
+@dataclass(frozen=True)
+class FrameFiles:
+    """The files of one frame, its number and its time in seconds since the first."""
+
+    index: int
+    timestamp: float
+    image: Path
+    scan: Path
+
+
+class PairedSequence(ABC):
+    """A `calibnet.datasets.frame.Sequence` of image and scan files.
+
+    A subclass lists the files and says how each frame is calibrated.
+    """
+
+    def __init__(self, name: str, rig: str, files: Sequence[FrameFiles]) -> None:
+        self.name = name
+        self.rig = rig
+        self.files = tuple(files)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.files)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames in order."""
+        return (self[position] for position in range(len(self)))
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read one frame.
+
+        Raises:
+            DatasetError: a file of it is missing, damaged, empty or malformed.
+            IndexError: there is no such position.
+        """
+        files = self.files[position]
+        calibration = self._calibration(files)
+        image = self._image(files)
+        return Frame(
+            index=files.index,
+            timestamp=files.timestamp,
+            image=image,
+            points=read_scan(files.scan),
+            camera=PinholeCamera(image.shape[1], image.shape[0], calibration.matrix),
+            camera_from_lidar=calibration.camera_from_lidar,
+            source=str(files.image),
+        )
+
+    @abstractmethod
+    def _calibration(self, files: FrameFiles) -> Calibration:
+        """The calibration of one frame."""
+
+    def _image(self, files: FrameFiles) -> NDArray[np.uint8]:
+        """The rectified image of one frame, ``[H, W, 3]`` RGB."""
+        return read_image(files.image)
+
+
+def require_folder(folder: Path, remedy: str) -> Path:
+    """Return ``folder`` if it is one.
+
+    Raises:
+        DatasetError: it is not; the message ends with ``remedy``.
+    """
+    if not folder.is_dir():
+        problem = "is not a folder" if folder.exists() else "does not exist"
+        raise DatasetError(f"{folder} {problem}; {remedy}.")
+    return folder
+
+
+def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str, Path]:
+    """The files of ``folder`` with one of the endings, sorted, by their name without it.
+
+    Raises:
+        DatasetError: there is none, or two share a stem.
+    """
+    files: dict[str, Path] = {}
+    for path in sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes):
+        if path.name.startswith("."):
+            continue
+        if path.stem in files:
+            raise DatasetError(f"{folder} holds both {files[path.stem].name} and {path.name}; keep one of them.")
+        files[path.stem] = path
+    if not files:
+        raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}); put them there.")
+    return files
+
+
+def check_paired(images: dict[str, Path], scans: dict[str, Path]) -> None:
+    """Check that every image has a scan of the same stem and the other way round.
+
+    Raises:
+        DatasetError: they differ; the message says how many and names the first stems.
+    """
+    unpaired = [("scan", sorted(images.keys() - scans.keys())), ("image", sorted(scans.keys() - images.keys()))]
+    problems = [
+        f"no {what} for {', '.join(stems[:3])}{f' and {len(stems) - 3} more' if len(stems) > 3 else ''}"
+        for what, stems in unpaired
+        if stems
+    ]
+    if problems:
+        image_folder, scan_folder = (next(iter(files.values())).parent for files in (images, scans))
+        raise DatasetError(
+            f"{image_folder} holds {len(images)} images and {scan_folder} {len(scans)} scans, which do not pair: "
+            f"{'; '.join(problems)}; add the missing files or remove the others."
+        )

@@ -1,0 +1,40 @@
+"""Choosing frames of a sequence by text, as the command line does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sized
+
+from calibnet.errors import ConfigError, DatasetError
+
+_NUMBER = r"([+-]?\d+)"
+_PATTERN = re.compile(rf"\s*(?:{_NUMBER}|{_NUMBER}?:{_NUMBER}?(?::{_NUMBER}?)?)\s*")
+
+
+def select_frames(sequence: Sized, text: str = ":") -> list[int]:
+    """Positions in ``sequence`` that ``text`` selects.
+
+    Args:
+        sequence: anything with a length.
+        text: one position, ``"7"``, or a Python slice of positions, ``"0:100:5"``; negative ones
+            count from the end.
+
+    Raises:
+        ConfigError: ``text`` is neither a position nor a slice.
+        DatasetError: it selects no frame of this sequence.
+    """
+    match = _PATTERN.fullmatch(text)
+    if match is None:
+        raise ConfigError(f"Frames {text!r} are neither a position nor START:STOP:STEP, for instance 0:100:5.")
+    position, *bounds = (None if number is None else int(number) for number in match.groups())
+    if bounds[2] == 0:
+        raise ConfigError(f"Frames {text!r} step by 0; a step is at least 1, for instance 0:100:5.")
+    count = len(sequence)
+    if position is None:
+        selected = list(range(count)[slice(*bounds)])
+    else:
+        selected = [position % count] if -count <= position < count else []
+    if not selected:
+        name = getattr(sequence, "name", "the sequence")
+        raise DatasetError(f"Frames {text!r} select nothing of {name}, which has {count} frames (0 to {count - 1}).")
+    return selected
