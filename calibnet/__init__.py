@@ -3,3 +3,5 @@
 The package itself imports nothing heavy; take what is needed from its modules, for instance
 ``from calibnet.cascade import Cascade``.
 """
+
+__version__ = "0.1.0"

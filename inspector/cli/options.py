@@ -21,9 +21,7 @@ class RangeType(click.ParamType["MiscalibrationRange"]):
 
     name = "DEG/M"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> MiscalibrationRange:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> MiscalibrationRange:
         """Parse the text; a value that is a range already is kept."""
         from calibnet.errors import ConfigError
         from calibnet.geometry import MiscalibrationRange

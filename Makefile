@@ -1,0 +1,45 @@
+# make demo   install what is missing, run the main job on the synthetic world
+# make test   install what is missing, run the tests (PYTEST_ARGS=... to choose some)
+# make lint   ruff and mypy
+# make clean  remove what these made
+#
+# Needs Python 3.11 or newer (PYTHON=... to choose one). Installs into .venv, nothing into the system,
+# except as root the Debian packages that .ci/system-libraries finds missing.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+DEMO_ARGS ?=
+PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile
+
+.PHONY: demo test lint clean
+
+demo: $(VENV)/installed
+	@.ci/system-libraries
+	$(BIN)/calib-inspect demo $(DEMO_ARGS)
+
+test: $(VENV)/installed-dev
+	@.ci/system-libraries viewer
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: $(VENV)/installed-dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+
+# The stamps say what was finished: a second run does nothing until a requirement changes.
+$(VENV)/created:
+	@.ci/create-venv $(PYTHON) $(VENV)
+	@touch $@
+
+$(VENV)/installed: $(VENV)/created pyproject.toml constraints.txt
+	$(PIP) install --quiet -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/installed-dev: $(VENV)/created pyproject.toml constraints.txt
+	$(PIP) install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@ $(VENV)/installed

@@ -1,0 +1,162 @@
+"""Measure a cascade: calibrate every frame from seeded miscalibrations and summarise the errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from calibnet.datasets import frame as frames
+from calibnet.errors import CalibrationError, DatasetError
+from calibnet.evaluation.metrics import Metrics
+from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
+from calibnet.geometry.se3 import Matrix
+from calibnet.trace import CascadeTrace
+
+
+class Calibrator(Protocol):
+    """What is measured; `calibnet.cascade.Cascade` is one."""
+
+    def calibrate(self, frame: frames.Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
+        """Correct ``initial``; see `Cascade.calibrate`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Run:
+    """One frame, calibrated from one miscalibration.
+
+    Attributes:
+        sequence: name of the frame's sequence.
+        frame: index of the frame in it.
+        repeat: which of the frame's miscalibrations, from 0.
+        initial: error before the first stage.
+        stages: error after each stage that ran, by stage number; empty when the frame could not
+            be calibrated.
+    """
+
+    sequence: str
+    frame: int
+    repeat: int
+    initial: PoseError
+    stages: dict[int, PoseError]
+
+
+Observer = Callable[[Run], None]
+"""Called after every run, for progress."""
+
+
+@dataclass(frozen=True)
+class StageMetrics:
+    """Errors after one stage."""
+
+    number: int
+    range: MiscalibrationRange
+    metrics: Metrics
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The measured errors, before the cascade and after each stage.
+
+    Attributes:
+        sequences: names of what was measured on.
+        rig: its sensors; several are joined by a semicolon.
+        bounds: range the miscalibrations were drawn from.
+        repeats: miscalibrations a frame.
+        seed: of the miscalibrations.
+        frames: number of frames.
+        failed: runs in which a frame could not be calibrated; they count with their initial error.
+        initial: errors before the first stage.
+        stages: errors after each stage that ran, coarse to fine.
+        runs: every single result.
+    """
+
+    sequences: tuple[str, ...]
+    rig: str
+    bounds: MiscalibrationRange
+    repeats: int
+    seed: int
+    frames: int
+    failed: int
+    initial: Metrics
+    stages: tuple[StageMetrics, ...]
+    runs: tuple[Run, ...] = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that JSON files hold, without the single runs."""
+        return {
+            "sequences": list(self.sequences),
+            "rig": self.rig,
+            "range": str(self.bounds),
+            "repeats": self.repeats,
+            "seed": self.seed,
+            "frames": self.frames,
+            "failed": self.failed,
+            "initial": self.initial.as_dict(),
+            "stages": [
+                {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
+            ],
+        }
+
+
+def draw_miscalibration(bounds: MiscalibrationRange, seed: int, frame: int, repeat: int) -> Matrix:
+    """The ``delta`` of one run: whatever else is measured, and in which order, it stays the same."""
+    return sample_miscalibration(bounds, np.random.default_rng([seed, frame, repeat]))
+
+
+def evaluate(
+    cascade: Calibrator,
+    sequences: Sequence[frames.Sequence],
+    bounds: MiscalibrationRange,
+    repeats: int,
+    seed: int,
+    observer: Observer | None = None,
+) -> Evaluation:
+    """Calibrate every frame of ``sequences`` from ``repeats`` miscalibrations each.
+
+    The datasets' own extrinsics are the reference.
+
+    Raises:
+        DatasetError: when there is no frame to measure on.
+        CalibrationError: when not a single frame could be calibrated.
+    """
+    runs: list[Run] = []
+    ranges: dict[int, MiscalibrationRange] = {}
+    failure: CalibrationError | None = None
+    for sequence in sequences:
+        for frame in sequence:
+            reference = frame.camera_from_lidar
+            for repeat in range(repeats):
+                initial = draw_miscalibration(bounds, seed, frame.index, repeat) @ reference
+                errors: dict[int, PoseError] = {}
+                try:
+                    for stage in cascade.calibrate(frame, initial).stages:
+                        ranges[stage.number] = stage.range
+                        errors[stage.number] = pose_error(stage.after, reference)
+                except CalibrationError as error:
+                    failure = error
+                runs.append(Run(sequence.name, frame.index, repeat, pose_error(initial, reference), errors))
+                if observer is not None:
+                    observer(runs[-1])
+    if not runs:
+        raise DatasetError("There is no frame to evaluate; check the sequences and the frame selection.")
+    if not ranges:
+        raise failure or CalibrationError("No stage of the cascade ran, so there is nothing to measure.")
+    return Evaluation(
+        sequences=tuple(sequence.name for sequence in sequences),
+        rig="; ".join(dict.fromkeys(sequence.rig for sequence in sequences)),
+        bounds=bounds,
+        repeats=repeats,
+        seed=seed,
+        frames=len(runs) // repeats,
+        failed=sum(not run.stages for run in runs),
+        initial=Metrics.of([run.initial for run in runs]),
+        stages=tuple(
+            StageMetrics(number, ranges[number], Metrics.of([run.stages.get(number, run.initial) for run in runs]))
+            for number in sorted(ranges)
+        ),
+        runs=tuple(runs),
+    )

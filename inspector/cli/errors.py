@@ -1,0 +1,106 @@
+"""The one place where an error becomes a sentence on stderr and an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import sys
+from enum import IntEnum
+
+import click
+
+from calibnet.errors import CalibnetError
+
+SYSTEM_PACKAGES = {
+    "libusb-1.0.so.0": "libusb-1.0-0",
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
+    "libX11.so.6": "libx11-6",
+    "libgomp.so.1": "libgomp1",
+}
+"""Debian packages of the shared libraries that wheels load from the system."""
+
+
+class ExitCode(IntEnum):
+    """What the process tells its caller; a command whose check failed exits through ``ctx.exit(1)``."""
+
+    OK = 0
+    CHECK_FAILED = 1
+    USAGE = 2
+    BAD_INPUT = 3
+    INTERRUPTED = 130
+    BROKEN_PIPE = 141
+
+
+def run(command: click.Command, arguments: list[str] | None = None) -> int:
+    """Run ``command``; every error a user can act on is one sentence on stderr.
+
+    Args:
+        command: the root group.
+        arguments: what follows the program's name, by default of this process.
+
+    Returns:
+        The exit code. Errors that are bugs pass through with their traceback.
+    """
+    try:
+        result = command.main(args=arguments, prog_name="calib-inspect", standalone_mode=False)
+        sys.stdout.flush()  # a full disk or a closed pipe shows up here rather than at the interpreter's end
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        return fail("Interrupted.", ExitCode.INTERRUPTED)
+    except CalibnetError as error:
+        return fail(str(error))
+    except BrokenPipeError:
+        discard_stdout()
+        return ExitCode.BROKEN_PIPE
+    except SystemExit as leaving:  # click and rich leave with 1 when the reader of a pipe is gone
+        discard_stdout()
+        return ExitCode.BROKEN_PIPE if leaving.code == 1 else int(leaving.code or 0)
+    except (OSError, ImportError) as error:
+        sentence = environment_sentence(error)
+        if sentence is None:
+            raise
+        discard_stdout()
+        return fail(sentence)
+    return result if isinstance(result, int) else ExitCode.OK
+
+
+def fail(sentence: str, code: ExitCode = ExitCode.BAD_INPUT) -> int:
+    """Print one sentence on stderr and hand back the exit code."""
+    with contextlib.suppress(OSError):
+        click.echo(f"calib-inspect: {sentence}", err=True)
+    return code
+
+
+def environment_sentence(error: OSError | ImportError) -> str | None:
+    """Say what is wrong with the machine and what to do, or None when ``error`` is not of that kind."""
+    library = re.search(r"(lib\S+\.so[.\d]*): cannot open shared object file", str(error))
+    if library:
+        name = library[1]
+        package = SYSTEM_PACKAGES.get(name)
+        how = f"; on Debian: apt-get install -y {package}" if package else " with your system's package manager"
+        return f"The system library {name} is missing, install it{how}."
+    if not isinstance(error, OSError) or error.errno is None:
+        return None
+    where = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, str | bytes) else ""
+    what = os.strerror(error.errno)
+    remedy = {
+        errno.ENOSPC: "free some space or write elsewhere",
+        errno.EDQUOT: "free some space or write elsewhere",
+        errno.EACCES: "check the permissions or use another path",
+        errno.EPERM: "check the permissions or use another path",
+        errno.EROFS: "choose a path that can be written",
+        errno.ENOENT: "check the path",
+        errno.EADDRINUSE: "stop the other program or use another port",
+    }.get(error.errno)
+    return f"{where}{what}{f'; {remedy}' if remedy else ''}."
+
+
+def discard_stdout() -> None:
+    """Point stdout at nothing, so that the interpreter's last flush cannot fail a second time."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,74 @@
+"""``calib-inspect``: the root group, which imports a command's module only when that command runs."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass
+
+import click
+
+from calibnet import __version__
+from inspector.cli.errors import run
+
+
+@dataclass(frozen=True)
+class LazyCommand:
+    """Where a command lives and what the list of commands says about it."""
+
+    target: str
+    help: str
+
+    def load(self) -> click.Command:
+        """Import the command's module and return the command."""
+        module, _, name = self.target.partition(":")
+        command = getattr(importlib.import_module(module), name)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"{self.target} is not a click command")
+        return command
+
+
+COMMANDS = {
+    "seq": LazyCommand("inspector.cli.inspect:seq", "Calibrate a KITTI odometry sequence and record every stage."),
+    "raw": LazyCommand("inspector.cli.inspect:raw", "The same for a KITTI raw drive."),
+    "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
+    "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
+    "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
+    "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
+    "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
+    "info": LazyCommand("inspector.cli.model:info", "Parameters and multiply-adds of a network, by module."),
+}
+"""Every command, in the order in which ``--help`` lists them."""
+
+
+class LazyGroup(click.Group):
+    """A group whose help needs no command's module."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in the order of `COMMANDS`."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import one command, or None for a name that does not exist."""
+        lazy = COMMANDS.get(cmd_name)
+        return lazy.load() if lazy else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands from the texts in `COMMANDS`."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, lazy.help) for name, lazy in COMMANDS.items()])
+
+
+@click.group("calib-inspect", cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="calib-inspect")
+def cli() -> None:
+    """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
+
+    Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 a check failed, 2 wrong
+    usage, 3 bad input or environment, 130 interrupted.
+    """
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    sys.exit(run(cli))

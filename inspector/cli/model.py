@@ -1,0 +1,67 @@
+"""``calib-inspect info``: what a network costs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+HEIGHT, WIDTH = 256, 512
+"""Input at which multiply-adds are counted: the paper's."""
+
+
+@click.command()
+@click.option("--preset", default="compact", show_default=True, help="Network: compact, paper or another preset.")
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout, no table.")
+def info(preset: str, json_file: str | None) -> None:
+    """Print the parameters and multiply-adds of a network, by module and in total.
+
+    Multiply-adds are those of one forward pass, one stage, at 256 x 512 pixels.
+    """
+    import torch
+
+    from calibnet.network import CalibrationNetwork, load_preset
+    from calibnet.network.counting import count
+
+    prepare_json(json_file)
+    config = load_preset(preset)
+    with torch.no_grad():
+        costs = count(CalibrationNetwork(config).eval(), HEIGHT, WIDTH)
+    modules = [
+        {"name": cost.name, "parameters": cost.parameters, "multiply_adds": cost.multiply_adds} for cost in costs
+    ]
+    content: dict[str, Any] = {
+        "preset": preset,
+        "input": [HEIGHT, WIDTH],
+        "parameters": sum(cost.parameters for cost in costs),
+        "multiply_adds": sum(cost.multiply_adds for cost in costs),
+        "modules": modules,
+    }
+    if json_file != "-":
+        console_beside(json_file).print(cost_table(content))
+    write_json(json_file, content)
+
+
+def cost_table(content: dict[str, Any]) -> Table:
+    """One row a module and one for the total."""
+    from rich.table import Table
+
+    table = Table(title=f"{content['preset']}, one stage at {HEIGHT} x {WIDTH}")
+    table.add_column("module")
+    table.add_column("parameters", justify="right")
+    table.add_column("multiply-adds", justify="right")
+    for module in content["modules"]:
+        table.add_row(module["name"], *amounts(module))
+    table.add_section()
+    table.add_row("total", *amounts(content))
+    return table
+
+
+def amounts(entry: dict[str, Any]) -> tuple[str, str]:
+    """Parameters in millions and multiply-adds in billions."""
+    return f"{entry['parameters'] / 1e6:.3f} M", f"{entry['multiply_adds'] / 1e9:.3f} G"
