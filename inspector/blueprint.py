@@ -1,0 +1,168 @@
+"""The layout of the viewer: one function a tab; only views that have data are made.
+
+A new view is a line in its tab's function; a new stage appears by itself, since every tab walks
+through `Layout.stages`.
+"""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from inspector import entities
+from inspector.observation import Detail, Layout, StageLayout
+
+View = rrb.View | rrb.Container
+
+
+def make_blueprint(layout: Layout) -> rrb.Blueprint:
+    """All tabs that the recording has data for."""
+    tabs: list[View] = [overview_tab(layout), cascade_tab(layout)]
+    inside = [stage for stage in layout.stages if stage.strides]
+    if inside:
+        tabs += [
+            rrb.Tabs(*(cost_volume_page(stage, layout) for stage in inside), name="Cost volumes"),
+            rrb.Tabs(*(hourglass_page(stage) for stage in inside), name="Hourglass"),
+        ]
+    tabs.append(scene_tab(layout))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def overview_tab(layout: Layout) -> View:
+    """The result at one look: three overlays, the depth colours, the error curves, the table."""
+    overlays = [
+        overlay_view("Miscalibrated" if layout.has_reference else "Start: calibration as given", entities.OVERLAY_MISCALIBRATED),
+        overlay_view("Corrected", entities.OVERLAY_CORRECTED),
+    ]
+    if layout.has_reference:
+        overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE))
+    table = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
+    below: View = table
+    if layout.has_reference:
+        curves = [
+            rrb.TimeSeriesView(
+                origin=f"error/{kind}",
+                contents=["$origin/**", f"- /{entities.error_corrected(kind)}"],
+                name=f"{kind.capitalize()} error [{unit}]",
+                plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+            )
+            for kind, unit in entities.ERROR_KINDS.items()
+        ]
+        below = rrb.Horizontal(rrb.Vertical(*curves), table, column_shares=[1.0, 1.0])
+    return rrb.Vertical(
+        rrb.Horizontal(*overlays),
+        legend("Depth of the points", entities.LEGEND_DEPTH),
+        below,
+        row_shares=[4.0, 1.0, 8.0],
+        name="Overview",
+    )
+
+
+def cascade_tab(layout: Layout) -> View:
+    """The overlay after every stage, beside the displacement and confidence that led to it."""
+    rows: list[View] = [
+        rrb.Horizontal(
+            overlay_view("Before stage 1: miscalibrated" if layout.has_reference else "Start", entities.OVERLAY_MISCALIBRATED),
+            overlay_view("Current: play the timeline “step” to see it corrected", entities.OVERLAY_CURRENT),
+            legend("Colours of displacement (direction; white = none)", entities.LEGEND_DISPLACEMENT),
+        )
+    ]
+    for stage in layout.stages:
+        views: list[View] = [overlay_view(f"After {_lower(stage.title)}", entities.overlay_stage(stage.number))]
+        if stage.strides:
+            stride = stage.strides[0]
+            views += [
+                image_view(f"{stage.title}: displacement found, arrows in cells of {stride} px", entities.displacement(stage.number)),
+                image_view(f"{stage.title}: confidence, bright = sure", entities.confidence(stage.number)),
+            ]
+        rows.append(rrb.Horizontal(*views))
+    return rrb.Vertical(*rows, name="Cascade")
+
+
+def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
+    """One row a scale: score where points are now, best match, the chosen cell's window, the tensor."""
+    rows: list[View] = []
+    for stride in stage.strides:
+        score, best = entities.score(stage.number, stride), entities.best_match(stage.number, stride)
+        views: list[View] = [
+            image_view(f"1/{stride}: score where points are now, bright = match", score),
+            image_view(f"1/{stride}: best match, colour = direction", best),
+            image_view(f"1/{stride}: search window of the framed cell", entities.window(stage.number, stride)),
+        ]
+        if layout.detail is Detail.FULL:
+            views.append(tensor_view(f"1/{stride}: whole cost volume, sliders dy dx", entities.cost_volume(stage.number, stride)))
+        rows.append(rrb.Horizontal(*views, column_shares=[3.0, 3.0, 1.5, 3.0][: len(views)]))
+    return rrb.Vertical(*rows, name=stage.title)
+
+
+def hourglass_page(stage: StageLayout) -> View:
+    """One row a scale: the strongest channels before and after aggregation."""
+    rows = [
+        rrb.Horizontal(
+            image_view(f"1/{stride}: before the hourglass, 16 liveliest channels", entities.hourglass_before(stage.number, stride)),
+            image_view(f"1/{stride}: after the hourglass, 16 liveliest channels", entities.hourglass_after(stage.number, stride)),
+        )
+        for stride in stage.strides
+    ]
+    return rrb.Vertical(*rows, name=stage.title)
+
+
+def scene_tab(layout: Layout) -> View:
+    """The cloud coloured through both extrinsics, and where each stage believes the camera to be."""
+    start = "miscalibrated" if layout.has_reference else "given"
+    clouds = rrb.Horizontal(
+        scene_view(f"Cloud coloured through the {start} extrinsic", entities.CLOUD_CORRECTED),
+        scene_view("Cloud coloured through the corrected extrinsic", entities.CLOUD_INITIAL),
+    )
+    return rrb.Vertical(
+        clouds, legend("Camera frustums", entities.LEGEND_STAGES), row_shares=[12.0, 1.0], name="3D"
+    )
+
+
+def overlay_view(name: str, points: str) -> rrb.Spatial2DView:
+    """Points over the frame's image."""
+    return rrb.Spatial2DView(origin="/", contents=[f"/{entities.IMAGE}", f"/{points}"], name=name)
+
+
+def image_view(name: str, path: str) -> rrb.Spatial2DView:
+    """A map and the marks drawn on it."""
+    return rrb.Spatial2DView(origin=f"/{path}", name=name)
+
+
+def legend(name: str, path: str) -> rrb.Spatial2DView:
+    """A static legend."""
+    return rrb.Spatial2DView(origin=f"/{path}", name=name)
+
+
+def tensor_view(name: str, path: str) -> rrb.TensorView:
+    """A cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
+    return rrb.TensorView(
+        origin=f"/{path}",
+        name=name,
+        slice_selection=rrb.TensorSliceSelection(
+            width=3, height=2, slider=[0, 1]
+        ),
+        scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="nearest"),
+        view_fit="FillKeepAspectRatio",
+    )
+
+
+def scene_view(name: str, without: str) -> rrb.Spatial3DView:
+    """The scene seen from behind and above the LiDAR, without one of the clouds."""
+    return rrb.Spatial3DView(
+        origin=f"/{entities.WORLD}",
+        contents=["$origin/**", f"- /{without}"],
+        name=name,
+        eye_controls=rrb.EyeControls3D(position=(-6.0, 2.5, 4.0), look_target=(8.0, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0)),
+        line_grid=rrb.LineGrid3D(visible=False),
+    )
+
+
+def _lower(title: str) -> str:
+    return title[0].lower() + title[1:]

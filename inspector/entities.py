@@ -1,0 +1,122 @@
+"""Every entity path and timeline of a recording, in one place.
+
+`stage_logging`, `frame_logging` and `scene_logging` write them, `blueprint` shows them, tests and
+scripts read them back. A new view starts with a path here.
+"""
+
+from __future__ import annotations
+
+FRAME = "frame"
+"""Timeline: the frame's number in its sequence."""
+TIME = "time"
+"""Timeline: seconds since the sequence's first frame."""
+STEP = "step"
+"""Timeline: ``frame * 6 + stage``; stage 0 is the miscalibrated frame, 5 the last stage."""
+STEPS_PER_FRAME = 6
+
+IMAGE = "image"
+TABLE = "table"
+
+OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
+OVERLAY_CORRECTED = "overlay/corrected"
+OVERLAY_REFERENCE = "overlay/reference"
+OVERLAY_CURRENT = "overlay/current"
+
+WORLD = "world"
+CLOUD_INITIAL = "world/cloud/initial"
+CLOUD_CORRECTED = "world/cloud/corrected"
+LIDAR = "world/lidar"
+CAMERA_INITIAL = "world/camera/initial"
+CAMERA_REFERENCE = "world/camera/reference"
+
+LEGEND_DEPTH = "legend/depth"
+LEGEND_DISPLACEMENT = "legend/displacement"
+LEGEND_STAGES = "legend/stages"
+
+ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
+"""The error curves and their units."""
+
+
+def overlay_stage(number: int) -> str:
+    """Points over the image after a stage."""
+    return f"overlay/stage_{number}"
+
+
+def camera_stage(number: int) -> str:
+    """The camera's frustum in the LiDAR frame after a stage."""
+    return f"world/camera/stage_{number}"
+
+
+def error_initial(kind: str) -> str:
+    """Error curve of the miscalibrated frame, ``kind`` as in `ERROR_KINDS`."""
+    return f"error/{kind}/initial"
+
+
+def error_stage(kind: str, number: int) -> str:
+    """Error curve after a stage."""
+    return f"error/{kind}/stage_{number}"
+
+
+def error_corrected(kind: str) -> str:
+    """Error curve of the final result: the last stage's, whichever it is."""
+    return f"error/{kind}/corrected"
+
+
+def displacement(stage: int) -> str:
+    """Where the network moves the LiDAR cells, as a map of flow colours."""
+    return f"stage_{stage}/displacement"
+
+
+def displacement_arrows(stage: int) -> str:
+    """The same, as arrows in cells."""
+    return f"stage_{stage}/displacement/arrows"
+
+
+def confidence(stage: int) -> str:
+    """How sure the network is of each displacement."""
+    return f"stage_{stage}/confidence"
+
+
+def cost_volume(stage: int, stride: int) -> str:
+    """The matching scores as a tensor ``dy, dx, y, x``."""
+    return f"stage_{stage}/scale_{stride}/cost_volume"
+
+
+def probability(stage: int, stride: int) -> str:
+    """The aggregated volume, a softmax over the window, as a tensor ``dy, dx, y, x``."""
+    return f"stage_{stage}/scale_{stride}/probability"
+
+
+def score(stage: int, stride: int) -> str:
+    """Slice of the cost volume at the window's centre: how well points match where they are now."""
+    return f"stage_{stage}/scale_{stride}/score_at_centre"
+
+
+def best_match(stage: int, stride: int) -> str:
+    """Displacement of the most probable cell, as flow colours."""
+    return f"stage_{stage}/scale_{stride}/best_match"
+
+
+def window(stage: int, stride: int) -> str:
+    """The search window of the chosen cell."""
+    return f"stage_{stage}/scale_{stride}/window"
+
+
+def window_marks(stage: int, stride: int) -> str:
+    """The true and the found displacement in that window."""
+    return f"stage_{stage}/scale_{stride}/window/marks"
+
+
+def chosen_cell(parent: str) -> str:
+    """A frame around the chosen cell, drawn on the slice ``parent``."""
+    return f"{parent}/chosen_cell"
+
+
+def hourglass_before(stage: int, stride: int) -> str:
+    """Activations entering the hourglass, channels side by side."""
+    return f"stage_{stage}/scale_{stride}/hourglass_before"
+
+
+def hourglass_after(stage: int, stride: int) -> str:
+    """Activations leaving the hourglass, channels side by side."""
+    return f"stage_{stage}/scale_{stride}/hourglass_after"

@@ -1,0 +1,77 @@
+"""What is logged once a frame: the image, the overlays, the error curves and the table."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from inspector import colors, entities
+from inspector.observation import Detail, Layout, Observation
+from inspector.overlay import Overlay, Thinning, make_overlay
+from inspector.table import stage_table
+
+JPEG_QUALITY = 85
+THINNING = {Detail.OVERVIEW: Thinning(cells_across=160, pixel=1.0), Detail.FULL: Thinning(cells_across=400, pixel=0.25)}
+"""Overview keeps about 3,000 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
+
+
+def log_frame(rec: rr.RecordingStream, observation: Observation, detail: Detail) -> None:
+    """Log the image, all overlays, the errors and the table of one frame.
+
+    The timelines ``frame`` and ``time`` must be set; ``step`` is set here: everything belongs to
+    the frame's step 0, except `entities.OVERLAY_CURRENT`, which has one row a stage.
+    """
+    frame, trace = observation.frame, observation.trace
+    first_step = frame.index * entities.STEPS_PER_FRAME
+    rec.set_time(entities.STEP, sequence=first_step)
+    rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
+    rec.log(entities.TABLE, rr.TextDocument(stage_table(observation), media_type=rr.MediaType.MARKDOWN))
+    _log_errors(rec, observation)
+
+    def overlay(camera_from_lidar: NDArray[np.float64]) -> Overlay:
+        return make_overlay(frame, camera_from_lidar, THINNING[detail])
+
+    miscalibrated = overlay(trace.initial)
+    after_stage = {stage.number: overlay(stage.after) for stage in trace.stages}
+    corrected = after_stage[trace.stages[-1].number] if trace.stages else miscalibrated
+    rec.log(entities.OVERLAY_MISCALIBRATED, miscalibrated.archetype())
+    rec.log(entities.OVERLAY_CORRECTED, corrected.archetype())
+    if observation.reference is not None:
+        rec.log(entities.OVERLAY_REFERENCE, overlay(observation.reference).archetype())
+    rec.log(entities.OVERLAY_CURRENT, miscalibrated.archetype())
+    for number, points in after_stage.items():
+        rec.log(entities.overlay_stage(number), points.archetype())
+        rec.set_time(entities.STEP, sequence=first_step + number)
+        rec.log(entities.OVERLAY_CURRENT, points.archetype())
+        rec.set_time(entities.STEP, sequence=first_step)
+
+
+def _log_errors(rec: rr.RecordingStream, observation: Observation) -> None:
+    """Rotation in degrees and translation in centimetres, initial and after every stage."""
+    trace = observation.trace
+    for kind in entities.ERROR_KINDS:
+        paths = {entities.error_initial(kind): trace.initial, entities.error_corrected(kind): trace.corrected}
+        paths |= {entities.error_stage(kind, stage.number): stage.after for stage in trace.stages}
+        for path, camera_from_lidar in paths.items():
+            error = observation.error(camera_from_lidar)
+            if error is not None:
+                rec.log(path, rr.Scalars(error.rotation_deg if kind == "rotation" else error.translation_cm))
+
+
+def log_curve_styles(rec: rr.RecordingStream, layout: Layout) -> None:
+    """Name and colour the error curves, once for the recording."""
+    if not layout.has_reference:
+        return
+    for kind, unit in entities.ERROR_KINDS.items():
+        curves = {entities.error_initial(kind): ("miscalibrated", colors.INITIAL)}
+        for stage in layout.stages:
+            name = f"after stage {stage.number} (±{stage.range.replace('/', '°/')} m)"
+            curves[entities.error_stage(kind, stage.number)] = (name, colors.STAGES[stage.number])
+        for path, (name, color) in curves.items():
+            rec.log(
+                path,
+                rr.SeriesLines(names=f"{name} [{unit}]", colors=color, widths=2.0),
+                rr.SeriesPoints(names=f"{name} [{unit}]", colors=color, marker_sizes=3.0),
+                static=True,
+            )

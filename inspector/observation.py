@@ -1,0 +1,81 @@
+"""One calibrated frame as the inspector sees it, and what a whole recording contains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import PoseError, pose_error
+from calibnet.trace import CascadeTrace
+
+Skipped = tuple[int, str]
+"""A stage that did not run, and why."""
+
+
+class Detail(StrEnum):
+    """How much of each frame is logged."""
+
+    OVERVIEW = "overview"
+    FULL = "full"
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """A frame, what the cascade did to it and, where known, the truth.
+
+    Attributes:
+        frame: what was calibrated.
+        trace: the run of the cascade on it.
+        reference: the true ``camera_from_lidar``, or None where nobody knows it.
+        skipped: stages that were asked for and have no weights.
+    """
+
+    frame: Frame
+    trace: CascadeTrace
+    reference: NDArray[np.float64] | None = field(default=None, repr=False)
+    skipped: tuple[Skipped, ...] = ()
+
+    def error(self, camera_from_lidar: NDArray[np.float64]) -> PoseError | None:
+        """Error of an extrinsic against the reference; None without one."""
+        return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
+
+
+@dataclass(frozen=True)
+class StageLayout:
+    """A stage that appears in the recording: its number, range as text, and cost-volume strides."""
+
+    number: int
+    range: str
+    strides: tuple[int, ...]
+
+    @property
+    def title(self) -> str:
+        """For view names, for instance ``"Stage 3 (±5°/0.5 m)"``."""
+        degrees, metres = self.range.split("/")
+        return f"Stage {self.number} (±{degrees}°/{metres} m)"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a recording contains, known after its first frame; the blueprint shows exactly this."""
+
+    stages: tuple[StageLayout, ...]
+    has_reference: bool
+    detail: Detail
+
+    @classmethod
+    def of(cls, observation: Observation, detail: Detail) -> Layout:
+        """The layout of a recording that starts with this observation."""
+        stages = tuple(
+            StageLayout(
+                stage.number,
+                str(stage.range),
+                tuple(scale.stride for scale in stage.detail.scales) if stage.detail else (),
+            )
+            for stage in observation.trace.stages
+        )
+        return cls(stages, observation.reference is not None, detail)

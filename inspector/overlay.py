@@ -1,0 +1,63 @@
+"""LiDAR points over the image: projected, thinned by a z-buffer and coloured by depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import project
+from calibnet.geometry.projection import nearest_per_cell
+from inspector.colors import depth_colors
+
+POINT_SIZE = 1.6
+"""Radius in points of the screen, so that zooming separates the points instead of growing them."""
+
+@dataclass(frozen=True)
+class Thinning:
+    """How many points of an overlay are kept, and how exactly.
+
+    Attributes:
+        cells_across: z-buffer cells over the image's width; one point of each cell stays.
+        pixel: grid that positions are rounded to, in pixels; coarser numbers compress better.
+    """
+
+    cells_across: int
+    pixel: float
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Points to draw over an image, far to near so that near ones end on top.
+
+    Attributes:
+        pixels: ``[M, 2]`` float32, ``(u, v)``.
+        colors: ``[M, 3]`` uint8.
+    """
+
+    pixels: NDArray[np.float32] = field(repr=False)
+    colors: NDArray[np.uint8] = field(repr=False)
+
+    def archetype(self) -> rr.Points2D:
+        """The points as Rerun draws them: half a pixel on, since its pixel centres are at x.5."""
+        return rr.Points2D(self.pixels + 0.5, colors=self.colors, radii=rr.Radius.ui_points(POINT_SIZE))
+
+
+def make_overlay(frame: Frame, camera_from_lidar: NDArray[np.float64], thinning: Thinning) -> Overlay:
+    """Project a frame's scan with an extrinsic; the nearest point of each cell stays.
+
+    Args:
+        frame: image, scan and camera.
+        camera_from_lidar: the extrinsic to show.
+        thinning: how many points to keep.
+    """
+    projection = project(frame.points, camera_from_lidar, frame.camera)
+    stride = max(1, round(frame.camera.width / thinning.cells_across))
+    winner = nearest_per_cell(projection, frame.camera, stride)
+    kept = winner[winner >= 0]
+    far_to_near = kept[np.argsort(-projection.depth[kept], kind="stable")]
+    pixels = np.round(projection.pixels[far_to_near] / thinning.pixel) * thinning.pixel
+    return Overlay(pixels.astype(np.float32), depth_colors(projection.depth[far_to_near]))

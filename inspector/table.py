@@ -1,0 +1,83 @@
+"""The text panel: what every stage did to this frame, as Markdown.
+
+Timings are left out on purpose: they differ from run to run, and two recordings of one seed must be
+equal. The command line prints them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import RANGES, PoseError, pose_error
+from inspector.observation import Observation
+
+NOTHING = "–"
+READING_AID = (
+    "Points are coloured by depth, red near to blue far: where the calibration is right, their jumps "
+    "in colour lie on the edges of the picture. Play the timeline `step` to watch the correction "
+    "stage by stage in the tab *Cascade*."
+)
+
+
+def stage_table(observation: Observation) -> str:
+    """The table of one frame, with the stages that did not run and why."""
+    frame = observation.frame
+    lines = [f"### Frame {frame.index}", "", *_stages(observation), "", *_axes(observation), ""]
+    lines += [f"*Stage {number} did not run: {reason.rstrip('.')}.*\n" for number, reason in observation.skipped]
+    if observation.reference is None:
+        lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
+    return "\n".join([*lines, *_extrinsic(observation.trace.corrected), "", READING_AID, ""])
+
+
+def _stages(observation: Observation) -> list[str]:
+    trace = observation.trace
+    with_errors = observation.reference is not None
+    skipped = {number for number, _ in observation.skipped}
+    ran = {stage.number: stage for stage in trace.stages}
+    header = ["", "trained for", *(["rotation error", "translation error"] if with_errors else []), "corrected by"]
+    rows = [["miscalibrated" if with_errors else "start", NOTHING, *_error(observation.error(trace.initial)), NOTHING]]
+    for number, bounds in enumerate(RANGES, start=1):
+        trained_for = f"±{bounds.rotation_deg:g}° / {bounds.translation_m:g} m"
+        if number in ran:
+            stage = ran[number]
+            motion = pose_error(stage.after, stage.before)
+            change = f"{motion.rotation_deg:.2f}° / {motion.translation_cm:.1f} cm"
+            rows.append([f"**stage {number}**", trained_for, *_error(observation.error(stage.after)), change])
+        elif number in skipped:
+            empty = [NOTHING, NOTHING] if with_errors else []
+            rows.append([f"stage {number}", trained_for, *empty, "skipped"])
+    return _markdown(header, rows)
+
+
+def _axes(observation: Observation) -> list[str]:
+    """What is left on each axis or, without a reference, what was changed on it."""
+    trace = observation.trace
+    known = observation.reference is not None
+    rows = {
+        "miscalibrated by": observation.error(trace.initial),
+        "left over": observation.error(trace.corrected),
+        "corrected by": None if known else pose_error(trace.corrected, trace.initial),
+    }
+    header = ["", "roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)"]
+    return _markdown(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
+
+
+def _per_axis(error: PoseError) -> list[str]:
+    angles = (error.roll_deg, error.pitch_deg, error.yaw_deg)
+    offsets = (error.x_cm, error.y_cm, error.z_cm)
+    return [f"{angle:+.2f}°" for angle in angles] + [f"{offset:+.1f} cm" for offset in offsets]
+
+
+def _extrinsic(camera_from_lidar: NDArray[np.float64]) -> list[str]:
+    rows = (" ".join(f"{value:9.5f}" for value in row) for row in camera_from_lidar[:3])
+    return ["Corrected `camera_from_lidar` (metres)", "```", *rows, "```"]
+
+
+def _error(error: PoseError | None) -> list[str]:
+    return [] if error is None else [f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"]
+
+
+def _markdown(header: list[str], rows: list[list[str]]) -> list[str]:
+    ruler = ["---"] * len(header)
+    return ["| " + " | ".join(cells) + " |" for cells in (header, ruler, *rows)]
