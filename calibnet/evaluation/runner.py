@@ -8,7 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from calibnet.datasets import frame as frames
+from calibnet.datasets import Frame, select_frames
+from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
@@ -19,7 +20,7 @@ from calibnet.trace import CascadeTrace
 class Calibrator(Protocol):
     """What is measured; `calibnet.cascade.Cascade` is one."""
 
-    def calibrate(self, frame: frames.Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
+    def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
         """Correct ``initial``; see `Cascade.calibrate`."""
         ...
 
@@ -109,25 +110,34 @@ def draw_miscalibration(bounds: MiscalibrationRange, seed: int, frame: int, repe
 
 def evaluate(
     cascade: Calibrator,
-    sequences: Sequence[frames.Sequence],
+    sequences: Sequence[FrameSequence],
     bounds: MiscalibrationRange,
     repeats: int,
     seed: int,
     observer: Observer | None = None,
+    frames: str = ":",
 ) -> Evaluation:
     """Calibrate every frame of ``sequences`` from ``repeats`` miscalibrations each.
 
-    The datasets' own extrinsics are the reference.
+    Args:
+        cascade: what to measure.
+        sequences: where the frames come from; their own extrinsics are the reference.
+        bounds: range of the miscalibrations.
+        repeats: miscalibrations a frame, at least 1.
+        seed: of the miscalibrations.
+        observer: called after every run.
+        frames: positions in every sequence, as `select_frames` reads them.
 
     Raises:
-        DatasetError: when there is no frame to measure on.
+        DatasetError: when there is no frame to measure on, or one cannot be read.
         CalibrationError: when not a single frame could be calibrated.
     """
     runs: list[Run] = []
     ranges: dict[int, MiscalibrationRange] = {}
     failure: CalibrationError | None = None
     for sequence in sequences:
-        for frame in sequence:
+        for position in select_frames(sequence, frames):
+            frame = sequence[position]
             reference = frame.camera_from_lidar
             for repeat in range(repeats):
                 initial = draw_miscalibration(bounds, seed, frame.index, repeat) @ reference

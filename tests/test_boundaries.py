@@ -1,0 +1,97 @@
+"""What may import what. The design depends on it, so a test keeps it."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+HEAVY = ("torch", "open3d", "rerun", "cv2", "pykitti", "lightning_fabric", "rich", "pandas", "matplotlib")
+
+
+def imported_modules(source: str, package: str = "") -> Iterator[str]:
+    """Full names of everything ``source`` imports, anywhere in it; ``package`` resolves relative imports."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            module = ".".join([*above, *([node.module] if node.module else [])])
+            yield module
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2] in (
+            "import_module",
+            "__import__",
+        ):
+            yield from (arg.value for arg in node.args if isinstance(arg, ast.Constant) and isinstance(arg.value, str))
+
+
+def violations(package: str, forbidden: tuple[str, ...], exempt: tuple[str, ...] = ()) -> list[str]:
+    """``file: module`` for every forbidden import below ``package``, outside the exempt folders."""
+    found = []
+    for path in sorted((ROOT / package).rglob("*.py")):
+        relative = path.relative_to(ROOT)
+        if any(relative.is_relative_to(folder) for folder in exempt):
+            continue
+        for module in imported_modules(path.read_text(encoding="utf-8"), ".".join(relative.parent.parts)):
+            if any(module == name or module.startswith(f"{name}.") for name in forbidden):
+                found.append(f"{relative}: {module}")
+    return found
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        ("import rerun as rr", "rerun"),
+        ("def f():\n    from rerun.blueprint import Tabs", "rerun.blueprint"),
+        ("from calibnet import cascade", "calibnet.cascade"),
+        ("from ..network import features", "calibnet.network"),
+        ("import importlib\nimportlib.import_module('torch.nn')", "torch.nn"),
+    ],
+)
+def test_the_scan_sees_imports_of_every_form(source: str, expected: str) -> None:
+    assert expected in set(imported_modules(source, "calibnet.training"))
+
+
+def test_calibnet_knows_no_user_interface() -> None:
+    assert violations("calibnet", ("rerun", "rerun_bindings", "rerun_sdk", "click", "rich", "inspector")) == []
+
+
+def test_inspector_computes_no_calibration() -> None:
+    """It reads traces; only the commands put a cascade and a recording together."""
+    computing = ("torch", "lightning_fabric", "calibnet.network", "calibnet.cascade", "calibnet.training")
+    assert violations("inspector", computing, exempt=("inspector/cli",)) == []
+
+
+def loaded_by(statement: str) -> set[str]:
+    """The heavy modules in ``sys.modules`` of a fresh interpreter after ``statement``."""
+    code = f"import sys\n{statement}\nprint('LOADED', *[name for name in {HEAVY!r} if name in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
+    )
+    return set(done.stdout.rpartition("LOADED")[2].split())
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import calibnet",
+        "import calibnet.datasets, calibnet.geometry, calibnet.trace, calibnet.evaluation.runner",
+        "import inspector",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['--help'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['--version'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['evaluate', '--help'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['info', '--help'])",
+    ],
+)
+def test_what_must_stay_quick_imports_nothing_heavy(statement: str) -> None:
+    assert loaded_by(statement) == set()
+
+
+def test_the_check_of_heavy_imports_can_fail() -> None:
+    assert loaded_by("import rich") == {"rich"}
