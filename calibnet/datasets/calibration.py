@@ -43,16 +43,13 @@ def checked_intrinsics(matrix: NDArray[np.float64], path: Path, key: str) -> NDA
     return matrix
 
 
-def checked_rigid(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
-    """Return the 4x4 ``matrix`` if it is a rigid transform.
+def checked_rotation(rotation: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+    """Return the 3x3 ``rotation`` if it is one.
 
     Raises:
-        DatasetError: its last row or its rotation is wrong; the message names ``path`` and ``key``.
+        DatasetError: it stretches or mirrors; the message names ``path`` and ``key``.
     """
-    rotation = matrix[:3, :3]
     deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-        raise DatasetError(f"{path}: the last row of {key} is not 0 0 0 1; give a 4x4 rigid transform in metres.")
     if deviation > RIGID_TOLERANCE:
         raise DatasetError(
             f"{path}: the rotation of {key} is not orthonormal (off by {deviation:.3g}); "
@@ -60,4 +57,16 @@ def checked_rigid(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[
         )
     if np.linalg.det(rotation) < 0.0:
         raise DatasetError(f"{path}: the rotation of {key} is a reflection (determinant -1); swap or negate one axis.")
+    return rotation
+
+
+def checked_rigid(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+    """Return the 4x4 ``matrix`` if it is a rigid transform.
+
+    Raises:
+        DatasetError: its last row or its rotation is wrong; the message names ``path`` and ``key``.
+    """
+    if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise DatasetError(f"{path}: the last row of {key} is not 0 0 0 1; give a 4x4 rigid transform in metres.")
+    checked_rotation(matrix[:3, :3], path, key)
     return matrix

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rigid
+from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rotation
+from calibnet.datasets.paired import FrameFiles
 from calibnet.errors import DatasetError
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -24,10 +25,12 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, NDA
 
     Args:
         path: the file.
-        sizes: the keys to read and how many numbers each has.
+        sizes: the keys to read and how many numbers each has: 12 for a projection matrix (``P...``)
+            or a rigid transform, 9 for a rotation, 3 for a translation.
 
     Raises:
-        DatasetError: the file or a key is missing, or a row has another count or no finite numbers.
+        DatasetError: the file or a key is missing, a row has another count or no finite numbers, or
+            its matrix is singular or no rotation.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -47,24 +50,24 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, NDA
             raise DatasetError(f"Calibration {path}: row {key!r} holds something other than finite numbers; repair it.")
         if row.size != size:
             raise DatasetError(f"Calibration {path}: row {key!r} has {row.size} numbers instead of {size}; repair it.")
+        if size in (9, 12):
+            check = checked_intrinsics if key.startswith("P") else checked_rotation
+            check(row.reshape(3, -1)[:, :3], path, key)
         values[key] = row
     return values
 
 
-def rectified_calibration(
-    projection: NDArray[np.float64], camera0_from_lidar: NDArray[np.float64], path: Path
-) -> Calibration:
+def rectified_calibration(projection: NDArray[np.float64], camera0_from_lidar: NDArray[np.float64]) -> Calibration:
     """The exact calibration of a rectified camera.
 
     Args:
         projection: 3x4, from the rectified reference camera 0 to the pixels of this camera.
         camera0_from_lidar: 4x4, into the rectified reference camera.
-        path: the calibration file, for messages.
 
-    KITTI's cameras are offset in all three axes: ``K^-1 P[:, 3]``, of which pykitti keeps x only.
+    KITTI's cameras are offset in all three axes, by ``K^-1 P[:, 3]``; pykitti keeps x only.
     """
-    matrix = checked_intrinsics(projection[:, :3].copy(), path, "the projection matrix")
-    camera_from_lidar = checked_rigid(camera0_from_lidar, path, "the LiDAR's transform").copy()
+    matrix = projection[:, :3].copy()
+    camera_from_lidar = camera0_from_lidar.copy()
     camera_from_lidar[:3, 3] += np.linalg.solve(matrix, projection[:, 3])
     return Calibration(matrix, camera_from_lidar)
 
@@ -97,24 +100,31 @@ def image_type(folder: Path) -> str:
     raise DatasetError(f"{folder} holds no images ({', '.join(IMAGE_SUFFIXES)}); put them there.")
 
 
-def seconds_since_first(times: Sequence[float], numbers: Sequence[int], path: Path) -> list[float]:
-    """Seconds since the first frame for frames of the given file numbers.
+def times_of(files: Mapping[str, Path], times: Sequence[float], path: Path) -> dict[str, float]:
+    """Seconds of every file, by stem.
 
-    ``times`` holds one entry a frame, or, where only a part of the frames was kept, one for every
-    file number of the whole drive; without any, KITTI's nominal 10 Hz count.
+    ``times`` holds one entry a file, or, where only a part of the frames was kept, one for every
+    file number of the whole drive; where it is neither, KITTI's nominal 10 Hz count.
 
     Raises:
-        DatasetError: there are fewer times than frames.
+        DatasetError: there are fewer times than files; the message names ``path``, the times' file.
     """
-    if not times:
-        selected = [NOMINAL_PERIOD * number for number in numbers]
-    elif len(times) == len(numbers):
-        selected = list(times)
-    elif len(times) > max(numbers):
-        selected = [times[number] for number in numbers]
-    else:
+    numbers = [frame_number(file) for file in files.values()]
+    if 0 < len(times) < len(numbers):
         raise DatasetError(f"{path} has {len(times)} times for {len(numbers)} frames; get the whole file from KITTI.")
-    return [time - selected[0] for time in selected]
+    if len(times) == len(numbers):
+        seconds = list(times)
+    elif len(times) > max(numbers):
+        seconds = [times[number] for number in numbers]
+    else:
+        seconds = [NOMINAL_PERIOD * number for number in numbers]
+    return dict(zip(files, seconds, strict=True))
+
+
+def frame_files(images: Mapping[str, Path], scans: Mapping[str, Path], times: Mapping[str, float]) -> list[FrameFiles]:
+    """The frames of paired images and scans, by stem, in the order of ``images``."""
+    start = times[next(iter(images))]
+    return [FrameFiles(frame_number(image), times[stem] - start, image, scans[stem]) for stem, image in images.items()]
 
 
 def frame_number(path: Path) -> int:

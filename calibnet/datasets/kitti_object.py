@@ -9,7 +9,7 @@ from calibnet.datasets.kitti import (
     IMAGE_SUFFIXES,
     NOMINAL_PERIOD,
     camera_folder,
-    frame_number,
+    frame_files,
     read_calibration_file,
     rectified_calibration,
 )
@@ -53,10 +53,8 @@ class KittiObject(PairedSequence):
                         "get the frame or take it off the list."
                     )
         check_paired(images, scans)
-        files = [
-            FrameFiles(frame_number(image), NOMINAL_PERIOD * position, image, scans[stem])
-            for position, (stem, image) in enumerate(images.items())
-        ]
+        times = {stem: NOMINAL_PERIOD * position for position, stem in enumerate(images)}
+        files = frame_files(images, scans, times)
         super().__init__(f"kitti-object/{split}", f"KITTI object detection, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
@@ -66,7 +64,7 @@ class KittiObject(PairedSequence):
         velodyne = rows["Tr_velo_to_cam"].reshape(3, 4)
         rectifying = transform(rows["R0_rect"].reshape(3, 3), [0.0, 0.0, 0.0])
         camera0_from_lidar = rectifying @ transform(velodyne[:, :3], velodyne[:, 3])
-        return rectified_calibration(rows[projection].reshape(3, 4), camera0_from_lidar, path)
+        return rectified_calibration(rows[projection].reshape(3, 4), camera0_from_lidar)
 
 
 def _listed(folder: Path, split: str) -> list[str]:

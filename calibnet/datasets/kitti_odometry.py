@@ -11,11 +11,11 @@ from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
     DATE_OF_FOCAL_LENGTH,
     camera_folder,
-    frame_number,
+    frame_files,
     image_type,
     read_calibration_file,
     rectified_calibration,
-    seconds_since_first,
+    times_of,
 )
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
 from calibnet.errors import DatasetError
@@ -41,23 +41,16 @@ class KittiOdometry(PairedSequence):
         folder = _sequence_folder(Path(root), sequence)
         images = camera_folder(folder, "image_", camera)
         scans = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
-        calibration_file = folder / "calib.txt"
-        read_calibration_file(calibration_file, CALIBRATION_ROWS)
+        read_calibration_file(folder / "calib.txt", CALIBRATION_ROWS)
         kitti = _open(Path(root), sequence, image_type(images))
         image_files = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
         scan_files = files_by_stem(scans, (".bin",), "scans")
         check_paired(image_files, scan_files)
 
-        self._fixed = rectified_calibration(
-            getattr(kitti.calib, f"P_rect_{camera}0"), kitti.calib.T_cam0_velo, calibration_file
-        )
-        numbers = [frame_number(path) for path in image_files.values()]
+        projection = getattr(kitti.calib, f"P_rect_{camera}0")
+        self._fixed = rectified_calibration(projection, kitti.calib.T_cam0_velo)
         seconds = [time.total_seconds() for time in kitti.timestamps]
-        times = seconds_since_first(seconds, numbers, folder / "times.txt")
-        files = [
-            FrameFiles(number, time, image_files[stem], scan_files[stem])
-            for number, time, stem in zip(numbers, times, image_files, strict=True)
-        ]
+        files = frame_files(image_files, scan_files, times_of(image_files, seconds, folder / "times.txt"))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"
         super().__init__(f"kitti-odometry/{sequence}", f"{rig}, camera {camera}", files)

@@ -10,11 +10,11 @@ import pykitti
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
     camera_folder,
-    frame_number,
+    frame_files,
     image_type,
     read_calibration_file,
     rectified_calibration,
-    seconds_since_first,
+    times_of,
 )
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, require_folder
 from calibnet.errors import DatasetError
@@ -51,26 +51,18 @@ class KittiRaw(PairedSequence):
         for name, rows in CALIBRATION_ROWS.items():
             read_calibration_file(root / date / name, rows)
         kitti = _open(root, date, drive, image_type(images))
-        image_files = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
+        all_images = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
         scan_files = {Path(path).stem: Path(path) for path in kitti.velo_files}
         if not scan_files:
             raise DatasetError(f"{scans} holds no scans (.bin); unpack the drive's zip again.")
-        for stem in KNOWN_GAPS.get(folder.name, set()) - scan_files.keys():
-            image_files.pop(stem, None)
+        without_scan = KNOWN_GAPS.get(folder.name, set()) - scan_files.keys()
+        image_files = {stem: image for stem, image in all_images.items() if stem not in without_scan}
         check_paired(image_files, scan_files)
-
         self._fixed = rectified_calibration(
-            getattr(kitti.calib, f"P_rect_{camera}0"),
-            kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect,
-            root / date / "calib_cam_to_cam.txt",
+            getattr(kitti.calib, f"P_rect_{camera}0"), kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect
         )
-        numbers = [frame_number(path) for path in image_files.values()]
         seconds = [(time - kitti.timestamps[0]).total_seconds() for time in kitti.timestamps]
-        times = seconds_since_first(seconds, numbers, kitti.timestamp_file)
-        files = [
-            FrameFiles(number, time, image_files[stem], scan_files[stem])
-            for number, time, stem in zip(numbers, times, image_files, strict=True)
-        ]
+        files = frame_files(image_files, scan_files, times_of(all_images, seconds, kitti.timestamp_file))
         super().__init__(f"kitti-raw/{date}_drive_{drive}", f"KITTI {date}, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
