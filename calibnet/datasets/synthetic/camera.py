@@ -1,0 +1,110 @@
+"""The camera: pixels to rays to radiance, then exposure, noise, blur and gamma as a real one has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.synthetic.mesh import Mesh
+from calibnet.datasets.synthetic.shading import cast, radiance
+from calibnet.datasets.synthetic.weather import Weather
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.se3 import Matrix
+
+Generator = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """How the camera turns radiance into bytes.
+
+    Attributes:
+        level: mean brightness it aims at, 0..1 linear.
+        white: RGB factors of the white balance.
+        gamma: of the tone curve.
+        contrast: 1 keeps.
+        saturation: 1 keeps, 0 is grey.
+        vignetting: loss in the corners.
+        noise: deviation in 0..1.
+        blur: deviation of the lens blur in pixels.
+        quality: JPEG quality, 0 for none.
+    """
+
+    level: float
+    white: tuple[float, float, float]
+    gamma: float
+    contrast: float
+    saturation: float
+    vignetting: float
+    noise: float
+    blur: float
+    quality: int
+
+
+def sample_exposure(generator: Generator) -> Exposure:
+    """Draw a camera's habits."""
+    red, blue = np.exp(generator.normal(0.0, 0.06, 2))
+    return Exposure(
+        level=float(generator.uniform(0.13, 0.32)),
+        white=(float(red), 1.0, float(blue)),
+        gamma=float(generator.uniform(1.8, 2.5)),
+        contrast=float(generator.uniform(0.85, 1.25)),
+        saturation=float(generator.uniform(0.5, 1.15)),
+        vignetting=float(generator.uniform(0.0, 0.3)),
+        noise=float(generator.uniform(0.0, 0.025)),
+        blur=float(generator.uniform(0.3, 0.9)),
+        quality=int(generator.integers(50, 96)) if generator.random() < 0.5 else 0,
+    )
+
+
+def pixel_rays(camera: PinholeCamera) -> NDArray[np.float32]:
+    """Unit directions ``[H * W, 3]`` through the pixel centres, in the camera frame."""
+    (fx, fy), (cx, cy) = camera.focal, camera.center
+    x = ((np.arange(camera.width) - cx) / fx).astype(np.float32)
+    y = ((np.arange(camera.height) - cy) / fy).astype(np.float32)
+    rays = np.empty((camera.height, camera.width, 3), dtype=np.float32)
+    rays[..., 0], rays[..., 1], rays[..., 2] = x, y[:, None], 1.0
+    rays /= np.sqrt(x**2 + y[:, None] ** 2 + 1.0)[..., None]
+    return rays.reshape(-1, 3)
+
+
+def photograph(
+    caster: Any, mesh: Mesh, weather: Weather, camera: PinholeCamera, world_from_camera: Matrix, exposure: Exposure,
+    generator: Generator,
+) -> NDArray[np.uint8]:
+    """The image ``[H, W, 3]`` uint8 that a camera takes of a mesh."""
+    rays = pixel_rays(camera) @ world_from_camera[:3, :3].T.astype(np.float32)
+    origin = world_from_camera[:3, 3].astype(np.float32)
+    hits = cast(caster, origin, rays)
+    linear = np.empty((len(rays), 3), dtype=np.float32)
+    missed = np.ones(len(rays), dtype=bool)
+    missed[hits.rays] = False
+    linear[missed] = weather.sky(rays[missed])
+    linear[hits.rays] = radiance(caster, mesh, weather, hits, origin, rays[hits.rays], 1.0 / camera.focal[0])
+    return develop(linear.reshape(camera.height, camera.width, 3), exposure, generator)
+
+
+def develop(linear: NDArray[np.float32], exposure: Exposure, generator: Generator) -> NDArray[np.uint8]:
+    """Radiance ``[H, W, 3]`` to an 8-bit image."""
+    import cv2
+
+    height, width = linear.shape[:2]
+    image = np.minimum(linear, 8.0)
+    image = cv2.GaussianBlur(image, (0, 0), exposure.blur)
+    metered = float(np.minimum(image[height // 4 :], 2.0).mean())  # as cars do, less by the sky
+    image *= np.float32(exposure.level / max(metered, 1e-3)) * np.asarray(exposure.white, dtype=np.float32)
+    y, x = np.linspace(-1, 1, height, dtype=np.float32), np.linspace(-1, 1, width, dtype=np.float32)
+    image *= (1.0 - exposure.vignetting * 0.5 * (y[:, None] ** 2 + x**2))[..., None]
+    image = np.clip(image, 0.0, 1.0)
+    image = cv2.pow(image, 1.0 / exposure.gamma)
+    grey = image.mean(axis=2, keepdims=True)
+    image = grey + exposure.saturation * (image - grey)
+    image = 0.5 + exposure.contrast * (image - 0.5)
+    image += exposure.noise * generator.standard_normal(image.shape, dtype=np.float32)
+    pixels = (255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8)
+    if exposure.quality:
+        pixels = cv2.imdecode(cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, exposure.quality])[1], 1)
+    return np.ascontiguousarray(pixels)

@@ -1,0 +1,226 @@
+"""Fills a chunk of road with ground, buildings, parked cars, furniture, plants and people."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibnet.datasets.synthetic import buildings, library, road
+from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate
+from calibnet.datasets.synthetic.textures import atlas
+
+if TYPE_CHECKING:
+    from calibnet.datasets.synthetic.world import Scene
+
+Generator = np.random.Generator
+CHUNK = 20.0
+"""Metres of road that are populated together."""
+_BUILDERS = {
+    "town_house": buildings.town_house,
+    "detached_house": buildings.detached_house,
+    "block": buildings.block,
+}
+_CAR_COLOURS = np.array(
+    [[0.75, 0.75, 0.76], [0.5, 0.52, 0.54], [0.2, 0.21, 0.23], [0.02, 0.02, 0.025], [0.02, 0.05, 0.2],
+     [0.35, 0.02, 0.02], [0.9, 0.9, 0.9], [0.05, 0.15, 0.08], [0.4, 0.3, 0.2], [0.7, 0.5, 0.02], [0.1, 0.3, 0.6]]
+)
+
+
+def car_colour(generator: Generator) -> np.ndarray:
+    """Linear RGB of a car's paint, as frequent as on the road."""
+    return np.asarray(_CAR_COLOURS[int(generator.integers(len(_CAR_COLOURS)))] * generator.uniform(0.7, 1.2))
+
+
+def vehicle(kind: str, generator: Generator) -> tuple[Mesh, np.ndarray]:
+    """A vehicle's prototype and colour."""
+    return library.pick(kind, generator), car_colour(generator)
+
+
+def populate(scene: Scene, index: int) -> Mesh:
+    """Everything that stands still between two stations; the same for the same scene and index."""
+    generator = np.random.default_rng([scene.seed, index + 10_000])
+    start, stop = index * CHUNK, (index + 1) * CHUNK
+    parts = [*ground(scene, start, stop), *_markings(scene, generator, start, stop)]
+    for side in (-1.0, 1.0):
+        parts += _plots(scene, generator, start, stop, side)
+        parts += _roadside(scene, generator, start, stop, side)
+        parts += _nature(scene, generator, start, stop, side)
+    if scene.style.kind == "highway":
+        parts += _motorway(scene, generator, start, stop)
+    return concatenate(parts)
+
+
+def ground(scene: Scene, start: float, stop: float) -> list[Mesh]:
+    """The swept cross-section."""
+    style, strips = scene.style, []
+    kerb = Material(scene.kerb_texture, (0.9, 0.9, 0.9))
+    for side in (-1.0, 1.0):
+        a, b, c = side * style.edge, side * (style.edge + style.pavement), side * (style.front + 1.0)
+        far, lift = side * (style.front + 75.0), style.kerb
+        rough = style.rough if style.kind in ("off-road", "park") else 0.0
+        strips.append(road.Strip(0.0, a, 0.0, -0.04, style.road, 0.1 * rough))
+        if style.kerb:
+            strips.append(road.Strip(a, a + 0.02 * side, -0.04, lift, kerb))
+            strips.append(road.Strip(a + 0.02 * side, a + 0.16 * side, lift, lift, kerb))
+        if style.pavement:
+            strips.append(road.Strip(a + 0.16 * side if style.kerb else a, b, lift, lift + 0.03, style.walk))
+        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -0.04), lift + 0.05, style.verge, rough))
+        bank = scene.banks[0 if side < 0 else 1]
+        strips.append(road.Strip(c, far, lift + 0.05, lift + 0.05 + bank, style.field, style.rough))
+    step = 2.5 if style.rough > 0.1 else 5.0
+    return road.sweep(scene.line, tuple(strips), start, stop, step)
+
+
+def _markings(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
+    style, line = scene.style, scene.line
+    if style.kind in ("off-road", "park"):
+        return []
+    areas, paint = [], scene.paint
+    lanes_edge = style.median + style.lanes * style.lane
+    for side in (-1.0, 1.0):
+        if scene.edge_lines:
+            areas.append(road.solid(start, stop, side * (lanes_edge - 0.15), 0.13))
+        for lane in range(1, style.lanes):
+            areas.append(road.dashes(start, stop, side * (style.median + lane * style.lane), 0.14, *scene.dash))
+        if style.median:
+            areas.append(road.solid(start, stop, side * (style.median + 0.2), 0.15))
+    if not style.median and scene.center_line == "dashed":
+        areas.append(road.dashes(start, stop, 0.0, 0.13, *scene.dash))
+    elif not style.median and scene.center_line == "double":
+        areas += [road.solid(start, stop, lateral, 0.11) for lateral in (-0.12, 0.12)]
+    parts = []
+    if style.kind != "highway" and generator.random() < 0.10:  # a zebra crossing
+        stripes = np.arange(-lanes_edge + 0.3, lanes_edge - 0.5, 1.0)
+        at = generator.uniform(start + 2.0, stop - 5.0)
+        areas.append(np.stack([np.full_like(stripes, at), np.full_like(stripes, at + 3.0), stripes, stripes + 0.5], 1))
+    if style.kind != "highway" and generator.random() < 0.12:  # a stop line and an arrow
+        at, own = generator.uniform(start, stop), style.lane_center(0, True)
+        areas.append(np.array([[at, at + 0.4, own - 0.45 * style.lane, own + 0.45 * style.lane]]))
+        areas.append(np.array([[at - 5.0, at - 2.0, own - 0.08, own + 0.08], [at - 2.4, at - 2.0, own - 0.4, own + 0.4]]))
+    if areas:
+        parts.append(road.decals(line, np.concatenate(areas), paint))
+    patches = int(generator.integers(0, 4))
+    if patches:  # repairs, manholes, oil
+        s, y = generator.uniform(start, stop, patches), generator.uniform(-style.edge, style.edge - 1.0, patches)
+        long, wide = generator.choice([0.6, 0.6, 2.0, 8.0], patches), generator.uniform(0.5, 1.5, patches)
+        tone = float(generator.choice([0.45, 0.7, 1.3]))
+        material = Material(style.road.texture, (tone, tone, tone))
+        parts.append(road.decals(line, np.stack([s, s + long, y, y + wide], 1), material, 0.006))
+    return parts
+
+
+def _stand(
+    scene: Scene, mesh: Mesh, station: float, lateral: float, turn: float = 0.0, lift: float = 0.0,
+    scale: object = 1.0, colour: object = None,
+) -> Mesh:
+    """Place a prototype on the ground at a station; ``turn`` is relative to the road's direction."""
+    heading = float(scene.line.heading(station)) + turn
+    position = scene.line.place(station, lateral, lift + scene.lift(lateral))
+    return mesh.placed(position, heading, scale, colour)  # type: ignore[arg-type]
+
+
+def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
+    style, parts = scene.style, []
+    if generator.random() < 0.06 and style.kind in ("street", "suburb", "industrial"):
+        return parts  # a side street
+    pieces = 1 if style.building == "block" or generator.random() < 0.45 else 2
+    width = (stop - start) / pieces
+    for piece in range(pieces):
+        station = start + (piece + 0.5) * width
+        fence = generator.random() < style.fences and style.setback > 2.0
+        if fence:
+            shape = library.pick(scene.fence_kind, generator) if scene.fence_kind != "fence" else scene.fence(side)
+            lateral = side * (style.edge + style.pavement + 0.4)
+            parts += [_stand(scene, shape, s, lateral, colour=scene.leaf_colour)
+                      for s in np.arange(station - 0.5 * width + 2.0, station + 0.5 * width, 4.0)]
+        if generator.random() >= style.buildings:
+            continue
+        gap = 0.0 if style.building == "town_house" and generator.random() < 0.8 else generator.uniform(1.0, 5.0)
+        if style.building == "detached_house":
+            gap = generator.uniform(0.15, 0.4) * width
+        builder = _BUILDERS[style.building]
+        house = builder(atlas(), generator, max(width - gap, 5.0), int(generator.integers(*style.storeys)))
+        lateral = side * (style.front + generator.uniform(0.0, 0.6 if style.kind == "street" else 4.0))
+        turn = 0.0 if side > 0 else np.pi
+        turn += generator.normal(0.0, 0.0 if style.kind == "street" else 0.05)
+        parts.append(_stand(scene, house, station, lateral, turn, -0.3))
+    return parts
+
+
+def _roadside(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
+    style, parts = scene.style, []
+    if style.parked:
+        lateral = side * (style.edge - 0.5 * max(style.parking, 2.0) + (0.0 if style.parking > 1.0 else 0.9))
+        if style.parking > 1.0 or scene.park_on_pavement:
+            for slot in np.arange(start + 3.0, stop - 2.0, 6.2):
+                if generator.random() < style.parked:
+                    mesh, colour = vehicle("van" if generator.random() < 0.12 else "car", generator)
+                    turn = (0.0 if generator.random() < 0.8 else np.pi) + (0.0 if side == style.side else np.pi)
+                    spot = lateral + generator.normal(0.0, 0.08)
+                    parts.append(_stand(scene, mesh, slot + generator.uniform(-0.4, 0.4), spot,
+                                        turn + generator.normal(0.0, 0.02), -scene.lift(spot) - 0.03, colour=colour))
+    walk = style.edge + (0.5 if style.pavement else 1.5)
+    facing = 0.0 if side == style.side else np.pi
+    for name, share, distance in (
+        ("lamp_post", 0.5, 0.0), ("sign", 0.55, 0.1), ("pole", 0.15, 0.3), ("bollard", 0.25, 0.0),
+        ("bin", 0.3, 1.0), ("traffic_light", 0.12, 0.1), ("billboard", 0.08, 2.0), ("bench", 0.08, 1.2), ("bicycle", 0.2, 1.0),
+    ):
+        if generator.random() < share * style.furniture:
+            turn = facing + generator.normal(0.0, 0.15)
+            if name == "lamp_post":
+                turn = -side * np.pi / 2
+            if name in ("bin", "bicycle", "bench"):
+                turn = generator.uniform(0.0, 2.0 * np.pi)
+            count = int(generator.integers(2, 7)) if name == "bollard" else 1
+            station, shape = generator.uniform(start, stop), library.pick(name, generator)
+            colour = generator.uniform(0.05, 0.8, 3)
+            lateral = side * (walk + distance * generator.uniform(0.5, 1.2))
+            parts += [_stand(scene, shape, station + 1.6 * i, lateral, turn, colour=colour) for i in range(count)]
+    for _ in range(int(generator.poisson(2.0 * style.people))):
+        lateral = side * (style.edge + generator.uniform(0.4, max(style.pavement, 1.5)))
+        if generator.random() < 0.12:
+            lateral = side * generator.uniform(0.6, 1.0) * style.edge
+        figure, shirt = library.pick("person", generator), generator.uniform(0.02, 0.8, 3)
+        parts.append(_stand(scene, figure, generator.uniform(start, stop), lateral, generator.uniform(0, 6.3), colour=shirt))
+    return parts
+
+
+def _nature(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
+    style, parts = scene.style, []
+    near = style.edge + style.pavement if style.kind != "street" else style.edge + 0.8
+    wild = style.kind in ("off-road", "park")
+
+    def scatter(name: str, count: float, low: float, high: float, sizes: tuple[float, float]) -> None:
+        for _ in range(int(generator.poisson(count))):
+            lateral = side * (low + (high - low) * generator.random() ** 1.5)
+            size = generator.uniform(*sizes) * np.array([1.0, 1.0, generator.uniform(0.85, 1.2)])
+            colour = scene.leaf_colour * generator.uniform(0.7, 1.3) * generator.uniform(0.85, 1.15, 3)
+            shape = library.pick(name, generator)
+            turn = generator.uniform(0.0, 2.0 * np.pi)
+            parts.append(_stand(scene, shape, generator.uniform(start, stop), lateral, turn, -0.05, size, colour))
+
+    trees = style.trees_set
+    spread = 0.3 if style.kind == "street" else max(style.setback - 1.0, 1.0)
+    scatter(trees[int(generator.integers(len(trees)))], style.trees, near + 0.8, near + 0.8 + spread, (0.6, 1.1))
+    if style.kind != "street":
+        far = style.front + (18.0 if style.buildings > 0.4 else 2.0)
+        scatter(trees[int(generator.integers(len(trees)))], 1.5 * style.trees, far, far + 35.0, (0.8, 1.5))
+    scatter("bush", (4.0 if wild else 1.5) * style.bushes, near + 1.0, near + (14.0 if wild else 5.0), (0.5, 1.4))
+    if wild or style.verge.texture in atlas().groups["grass"]:
+        scatter("tuft", (10.0 if wild else 3.0) * style.bushes, near + 0.3, near + 9.0, (0.5, 1.6))
+    if style.kind == "off-road":
+        scatter("rock", 1.0, near + 0.3, near + 14.0, (0.5, 1.6))
+    return parts
+
+
+def _motorway(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
+    style, parts = scene.style, []
+    rail = scene.rail
+    for station in np.arange(start + 2.0, stop, 4.0):
+        parts.append(_stand(scene, rail, station, 0.0))
+        if scene.outer_rails:
+            parts += [_stand(scene, rail, station, side * (style.edge + 1.0)) for side in (-1.0, 1.0)]
+    if generator.random() < 0.08:
+        parts.append(_stand(scene, library.pick("gantry", generator), 0.5 * (start + stop), 0.0))
+    return parts

@@ -1,0 +1,137 @@
+"""The road's centre line and the ground swept along it: lanes, kerbs, pavements, verges, markings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from calibnet.datasets.synthetic.mesh import Material, Mesh, quads
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CentreLine:
+    """A curve that never crosses itself: heading and height are bounded sums of sines of the station.
+
+    Attributes:
+        bends: ``[B, 3]`` amplitude (radians), wavelength (metres), phase of the heading.
+        hills: ``[H, 3]`` amplitude (metres), wavelength (metres), phase of the height.
+        length: metres that are tabulated.
+    """
+
+    bends: Vector
+    hills: Vector
+    length: float
+
+    def heading(self, station: ArrayLike) -> Vector:
+        """Direction of travel at a station, radians from x."""
+        amplitude, wave, phase = self.bends.T
+        s = np.asarray(station, dtype=np.float64)[..., None]
+        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+
+    def height(self, station: ArrayLike) -> Vector:
+        """Height of the centre line, metres."""
+        amplitude, wave, phase = self.hills.T
+        s = np.asarray(station, dtype=np.float64)[..., None]
+        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+
+    @cached_property
+    def _table(self) -> tuple[Vector, Vector]:
+        stations = np.arange(-300.0, self.length + 600.0, 1.0)
+        heading = self.heading(stations + 0.5)
+        steps = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        return stations, np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)[:-1]])
+
+    def place(self, station: ArrayLike, lateral: ArrayLike, lift: ArrayLike = 0.0) -> Vector:
+        """World positions ``[..., 3]`` of points ``lateral`` metres left of the centre line."""
+        station, lateral, lift = np.broadcast_arrays(
+            np.asarray(station, dtype=np.float64), np.asarray(lateral, dtype=np.float64), lift
+        )
+        stations, table = self._table
+        heading = self.heading(station)
+        x = np.interp(station, stations, table[:, 0]) - np.sin(heading) * lateral
+        y = np.interp(station, stations, table[:, 1]) + np.cos(heading) * lateral
+        return np.stack([x, y, self.height(station) + lift], axis=-1)
+
+    def nearest_station(self, position: ArrayLike) -> float:
+        """Station of the tabulated point closest to a world position."""
+        stations, table = self._table
+        gap = table - np.asarray(position, dtype=np.float64)[:2]
+        return float(stations[int(np.argmin((gap**2).sum(axis=1)))])
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One strip of the ground's cross-section, from ``inner`` to ``outer`` (metres from the centre).
+
+    ``inner_lift`` and ``outer_lift`` are heights above the centre line; ``rough`` is the amplitude
+    of its bumps in metres.
+    """
+
+    inner: float
+    outer: float
+    inner_lift: float
+    outer_lift: float
+    material: Material
+    rough: float = 0.0
+
+
+def bumps(position: Vector) -> Vector:
+    """Smooth pseudo-random height field, about -1..1, of world positions ``[..., >=2]``."""
+    x, y = position[..., 0], position[..., 1]
+    wide = np.sin(0.31 * x + 0.7 * np.sin(0.23 * y)) * np.cos(0.27 * y + 0.5 * np.sin(0.19 * x))
+    fine = np.sin(1.3 * x + 1.1 * np.sin(0.9 * y)) * np.cos(1.1 * y + 0.8 * np.sin(1.4 * x))
+    return np.asarray(0.7 * wide + 0.3 * fine)
+
+
+def sweep(line: CentreLine, strips: tuple[Strip, ...], start: float, stop: float, step: float) -> list[Mesh]:
+    """Extrude strips along the centre line between two stations."""
+    stations = np.linspace(start, stop, max(int(round((stop - start) / step)), 1) + 1)
+    meshes = []
+    for strip in strips:
+        width = abs(strip.outer - strip.inner)
+        pieces = int(np.clip(width / 2.5, 1, 10)) if strip.rough else 1
+        share = np.linspace(0.0, 1.0, pieces + 1)
+        lateral = strip.inner + share * (strip.outer - strip.inner)
+        lift = strip.inner_lift + share * (strip.outer_lift - strip.inner_lift)
+        grid = line.place(stations[:, None], lateral[None], lift[None])
+        if strip.rough:
+            fade = np.minimum(np.abs(lateral - strip.inner) / 4.0, 1.0)  # join the neighbour without a gap
+            grid[..., 2] += strip.rough * fade * bumps(grid)
+        side = np.hypot(lateral - lateral[0], lift - lift[0])
+        uv = np.stack(np.broadcast_arrays(stations[:, None], side[None] + strip.inner), axis=-1)
+        meshes.append(quads(_patches(grid), _patches(uv), strip.material))
+    return meshes
+
+
+def _patches(grid: Vector) -> Vector:
+    cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
+    return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
+
+
+def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float = 0.012) -> Mesh:
+    """Markings on the road: ``[N, 4]`` start and stop station, right and left lateral bound."""
+    start, stop, right, left = np.asarray(areas, dtype=np.float64).reshape(-1, 4).T
+    station = np.stack([start, stop, stop, start], axis=1)
+    lateral = np.stack([right, right, left, left], axis=1)
+    corners = line.place(station, lateral, lift)
+    return quads(corners, np.stack([station, lateral], axis=-1), material)
+
+
+def dashes(start: float, stop: float, lateral: float, width: float, length: float, gap: float) -> Vector:
+    """Areas of a dashed line, on a grid fixed to the station so that neighbouring chunks agree."""
+    period = length + gap
+    first = np.arange(np.ceil(start / period) * period, stop, period)
+    half = np.full(len(first), 0.5 * width)
+    return np.stack([first, first + length, lateral - half, lateral + half], axis=1)
+
+
+def solid(start: float, stop: float, lateral: float, width: float, step: float = 2.5) -> Vector:
+    """Areas of a solid line, in pieces short enough to follow bends."""
+    edges = np.linspace(start, stop, max(int(round((stop - start) / step)), 1) + 1)
+    half = np.full(len(edges) - 1, 0.5 * width)
+    return np.stack([edges[:-1], edges[1:], lateral - half, lateral + half], axis=1)

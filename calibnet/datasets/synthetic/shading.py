@@ -1,0 +1,140 @@
+"""Ray hits to surface points to colours: shared by the camera and the LiDAR."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from calibnet.datasets.synthetic.mesh import Mesh
+from calibnet.datasets.synthetic.textures import atlas
+from calibnet.datasets.synthetic.weather import Weather
+
+Array = NDArray[np.float32]
+_THREADS = 1
+"""Frames are rendered side by side by the trainer's workers; within a frame one core is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Rays that met the scene.
+
+    Attributes:
+        rays: ``[N]`` int64, which rays.
+        distance: ``[N]`` metres in units of the ray's direction.
+        triangle: ``[N]`` int64.
+        barycentric: ``[N, 2]``.
+    """
+
+    rays: NDArray[np.int64]
+    distance: Array
+    triangle: NDArray[np.int64]
+    barycentric: Array
+
+    def select(self, mask: NDArray[np.bool_]) -> Hits:
+        """The hits of a mask ``[N]``."""
+        return Hits(self.rays[mask], self.distance[mask], self.triangle[mask], self.barycentric[mask])
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What was hit: unit normals ``[N, 3]`` (either side) and texels ``[N, 4]`` uint8."""
+
+    normal: Array
+    texel: NDArray[np.uint8]
+
+
+def caster(mesh: Mesh) -> Any:
+    """The ``RaycastingScene`` of a mesh."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene(nthreads=_THREADS)
+    vertices = np.ascontiguousarray(mesh.corners.reshape(-1, 3))
+    faces = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+    scene.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(faces))
+    return scene
+
+
+def _rays(origin: ArrayLike, directions: Array) -> Any:
+    import open3d as o3d
+
+    rays = np.empty((len(directions), 6), dtype=np.float32)
+    rays[:, :3] = origin
+    rays[:, 3:] = directions
+    return o3d.core.Tensor(rays)
+
+
+def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
+    """First hits of rays ``[N, 3]`` from one origin (or one each)."""
+    answer = scene.cast_rays(_rays(origin, directions), nthreads=_THREADS)
+    distance = answer["t_hit"].numpy()
+    rays = np.flatnonzero(np.isfinite(distance))
+    triangle = answer["primitive_ids"].numpy()[rays].astype(np.int64)
+    return Hits(rays, distance[rays], triangle, answer["primitive_uvs"].numpy()[rays])
+
+
+def occluded(scene: Any, origins: Array, direction: Array) -> NDArray[np.bool_]:
+    """Whether points ``[N, 3]`` see something in one direction."""
+    rays = _rays(origins, np.broadcast_to(direction, origins.shape))
+    return np.asarray(scene.test_occlusions(rays, nthreads=_THREADS).numpy())
+
+
+def surface(mesh: Mesh, hits: Hits, footprint: Array) -> Surface:
+    """Normals and texels at hits; ``footprint`` ``[N]`` is the size of a pixel there, metres."""
+    normals = np.cross(mesh.corners[:, 1] - mesh.corners[:, 0], mesh.corners[:, 2] - mesh.corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    corner = mesh.uv[hits.triangle]
+    a, b = hits.barycentric[:, :1], hits.barycentric[:, 1:]
+    uv = corner[:, 0] * (1.0 - a - b) + corner[:, 1] * a + corner[:, 2] * b
+    texel = atlas().sample(mesh.texture[hits.triangle], uv, footprint)
+    return Surface(normals[hits.triangle].astype(np.float32), texel)
+
+
+def radiance(
+    scene: Any, mesh: Mesh, weather: Weather, hits: Hits, origin: Array, rays: Array, pixel_angle: float
+) -> Array:
+    """Linear colours ``[N, 3]`` of camera hits: texture, sun with shadows, sky, reflections, haze.
+
+    ``rays`` are the unit directions ``[N, 3]`` of the hits, ``pixel_angle`` radians a pixel.
+    """
+    point = origin + rays * hits.distance[:, None]
+    spot = surface(mesh, hits, pixel_angle * hits.distance)
+    facing = (spot.normal * rays).sum(axis=1)
+    normal = spot.normal * -np.sign(facing)[:, None]
+    cosine = np.abs(facing)
+
+    albedo = spot.texel[:, :3].astype(np.float32)
+    albedo *= albedo * np.float32(1.0 / 255.0**2)  # the tiles are sRGB-like, gamma 2
+    albedo *= mesh.tint[hits.triangle]
+    albedo *= _stains(point)[:, None]
+
+    up = 0.5 + 0.5 * normal[:, 2:]
+    light = up * (0.5 * weather.zenith + 0.5 * weather.horizon) + (1.0 - up) * weather.bounce
+    if weather.sun.any():
+        slant = np.maximum(normal @ weather.sun_direction, 0.0)
+        lit = np.flatnonzero(slant > 0.0)
+        shadow = occluded(scene, point[lit] + 0.02 * normal[lit], weather.sun_direction)
+        slant[lit[shadow]] = 0.0
+        light = light + slant[:, None] * weather.sun
+    colour = albedo * light
+
+    gloss = mesh.gloss[hits.triangle]
+    shiny = np.flatnonzero(gloss > 0.0)
+    if len(shiny):
+        mirror = rays[shiny] - 2.0 * (rays[shiny] * normal[shiny]).sum(axis=1, keepdims=True) * normal[shiny]
+        fresnel = gloss[shiny] * (0.08 + 0.92 * (1.0 - cosine[shiny]) ** 4)
+        seen = np.where(mirror[:, 2:] > 0.05, weather.sky(mirror), 0.15 * weather.horizon)
+        colour[shiny] += fresnel[:, None] * (seen - colour[shiny])
+    haze = 1.0 - np.exp(-hits.distance / weather.visibility)
+    colour += haze[:, None] * (weather.horizon - colour)
+    return colour
+
+
+def _stains(point: Array) -> Array:
+    """A slow change of brightness over the world, so that repeated tiles do not show."""
+    from calibnet.datasets.synthetic.weather import _clouds
+
+    cell = (point * np.float32(9.0)).astype(np.int32) & 255
+    return np.float32(0.75) + np.float32(0.5) * _clouds()[(cell[:, 1] + cell[:, 2]) & 255, cell[:, 0]]

@@ -1,0 +1,129 @@
+"""Trees, bushes and hedges: lumpy hulls wrapped in a shell of loose leaves that rays pass between."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.synthetic.mesh import Material, Mesh, blob, box, concatenate, cylinder, triangles
+from calibnet.datasets.synthetic.textures import Atlas
+
+Generator = np.random.Generator
+
+
+def leaf_cloud(
+    centers: NDArray[np.float64], radii: NDArray[np.float64], count: int, size: float, material: Material,
+    generator: Generator,
+) -> Mesh:
+    """``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``."""
+    which = generator.integers(len(centers), size=count)
+    direction = generator.normal(size=(count, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    distance = generator.uniform(0.75, 1.15, (count, 1))
+    middle = centers[which] + direction * distance * radii[which]
+    corners = middle[:, None] + size * generator.normal(0.0, 0.6, (count, 3, 3))
+    uv = generator.uniform(0.0, 2.0, (count, 1, 2)) + size * generator.uniform(-1.0, 1.0, (count, 3, 2))
+    return triangles(corners, uv, material)
+
+
+def broadleaf(atlas: Atlas, generator: Generator) -> Mesh:
+    """A deciduous tree of 5 to 12 m."""
+    height = generator.uniform(5.0, 12.0)
+    stem = generator.uniform(0.25, 0.42) * height
+    bark = Material(atlas.pick("bark", generator))
+    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    thick = 0.018 * height + generator.uniform(0.04, 0.12)
+    lean = generator.normal(0.0, 0.25, 2)
+    fork = np.array([lean[0], lean[1], stem])
+    count = int(generator.integers(5, 9))
+    spread = 0.22 * height * generator.uniform(0.8, 1.2)
+    centers = fork + np.stack(
+        [
+            generator.normal(0.0, 0.6 * spread, count),
+            generator.normal(0.0, 0.6 * spread, count),
+            generator.uniform(0.1, 0.85, count) * (height - stem),
+        ],
+        axis=1,
+    )
+    radii = generator.uniform(0.45, 0.8, (count, 1)) * spread * np.array([1.0, 1.0, 0.8])
+    parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
+    parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
+    parts += [
+        blob(center, 0.8 * radius, leaves, generator, 0.25, 5, 8) for center, radius in zip(centers, radii, strict=True)
+    ]
+    parts.append(leaf_cloud(centers, radii, 420, generator.uniform(0.16, 0.3), leaves, generator))
+    return concatenate(parts)
+
+
+def conifer(atlas: Atlas, generator: Generator) -> Mesh:
+    """A spruce or cypress: stacked cones with ragged edges."""
+    height, radius = generator.uniform(4.0, 13.0), generator.uniform(0.9, 2.2)
+    leaves = Material(atlas.pick("leaves", generator), (0.7, 0.85, 0.8), paint=True)
+    parts = [cylinder((0, 0, -0.2), (0, 0, 0.9 * height), (0.16, 0.04), Material(atlas.pick("bark", generator)), 6)]
+    layers = int(generator.integers(4, 8))
+    base = generator.uniform(0.05, 0.2) * height
+    step = (height - base) / layers
+    for layer in range(layers):
+        z = base + layer * step
+        wide = radius * (1.0 - 0.85 * layer / layers)
+        parts.append(cylinder((0, 0, z), (0, 0, z + 1.5 * step), (wide, 0.1 * wide), leaves, 9))
+    z = generator.uniform(0.0, 1.0, 260)
+    angle = generator.uniform(0.0, 2.0 * np.pi, 260)
+    reach = radius * (1.0 - 0.9 * z) * generator.uniform(0.8, 1.15, 260)
+    centers = np.stack([reach * np.cos(angle), reach * np.sin(angle), base + z * (height - base)], axis=1)
+    parts.append(leaf_cloud(centers, np.full((260, 3), 0.15), 260, 0.24, leaves, generator))
+    return concatenate(parts)
+
+
+def bare_tree(atlas: Atlas, generator: Generator) -> Mesh:
+    """A tree without leaves: branches of branches."""
+    bark = Material(atlas.pick("bark", generator))
+    height = generator.uniform(5.0, 9.0)
+    parts: list[Mesh] = []
+
+    def grow(start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int) -> None:
+        end = start + length * direction
+        parts.append(cylinder(start, end, (radius, 0.6 * radius), bark, 5 if depth < 2 else 3))
+        if depth == 3:
+            return
+        for _ in range(3):
+            bent = direction + generator.normal(0.0, 0.45, 3)
+            grow(end, bent / np.linalg.norm(bent), generator.uniform(0.55, 0.8) * length, 0.55 * radius, depth + 1)
+
+    grow(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.36 * height, generator.uniform(0.1, 0.2), 0)
+    return concatenate(parts)
+
+
+def bush(atlas: Atlas, generator: Generator) -> Mesh:
+    """A shrub of about one metre."""
+    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    count = int(generator.integers(2, 5))
+    centers = np.column_stack([generator.normal(0.0, 0.5, (count, 2)), generator.uniform(0.3, 0.6, count)])
+    radii = generator.uniform(0.4, 0.8, (count, 3))
+    hulls = [blob(c, 0.85 * r, leaves, generator, 0.25, 5, 7) for c, r in zip(centers, radii, strict=True)]
+    return concatenate([*hulls, leaf_cloud(centers, radii, 130, 0.11, leaves, generator)])
+
+
+def grass_tuft(atlas: Atlas, generator: Generator) -> Mesh:
+    """Tall grass: a fan of thin upright triangles."""
+    count = 46
+    foot = np.column_stack([generator.normal(0.0, 0.35, (count, 2)), np.full(count, -0.05)])
+    tip = foot + np.column_stack([generator.normal(0.0, 0.15, (count, 2)), generator.uniform(0.2, 0.65, count)])
+    width = 0.04 * generator.normal(size=(count, 3)) * (1.0, 1.0, 0.0)
+    material = Material(atlas.pick("grass", generator), (1.2, 1.2, 1.0), paint=True)
+    return triangles(np.stack([foot - width, foot + width, tip], axis=1), generator.uniform(0, 3, (count, 3, 2)), material)
+
+
+def hedge(atlas: Atlas, generator: Generator) -> Mesh:
+    """A clipped hedge, 4 m long along x."""
+    height, depth = generator.uniform(0.8, 2.0), generator.uniform(0.5, 0.9)
+    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    hull = box((0, 0, 0), (4.0, depth, height), leaves)
+    count = 320
+    spot = np.column_stack(
+        [generator.uniform(-2, 2, count), generator.choice([-0.5, 0.5], count) * depth, generator.uniform(0, height, count)]
+    )
+    top = generator.random(count) < 0.3
+    spot[top, 1], spot[top, 2] = generator.uniform(-0.5, 0.5, top.sum()) * depth, height
+    corners = spot[:, None] + generator.normal(0.0, 0.09, (count, 3, 3))
+    return concatenate([hull, triangles(corners, generator.uniform(0.0, 2.0, (count, 3, 2)), leaves)])

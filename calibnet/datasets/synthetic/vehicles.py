@@ -1,0 +1,214 @@
+"""Cars, vans, lorries and buses; x forward, standing on z = 0, painted triangles take the instance's colour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, loft, quads, rectangle
+from calibnet.datasets.synthetic.textures import Atlas
+
+Generator = np.random.Generator
+
+
+def _ring(x: float, half_width: float, bottom: float, top: float, taper: float) -> list[tuple[float, float, float]]:
+    """An octagonal cross-section of a body at ``x``; ``taper`` narrows its top."""
+    height, upper = top - bottom, half_width * taper
+    right = [
+        (x, 0.90 * half_width, bottom),
+        (x, half_width, bottom + 0.3 * height),
+        (x, 0.5 * (half_width + upper), bottom + 0.75 * height),
+        (x, 0.88 * upper, top),
+    ]
+    return right + [(x, -y, z) for _, y, z in reversed(right)]
+
+
+def _wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: float, generator: Generator) -> Mesh:
+    rubber = Material(atlas.pick("black", generator), reflectance=0.6)
+    face = Material(atlas.pick("wheel", generator))
+    parts = []
+    for x in axles:
+        for side in (-1.0, 1.0):
+            outer = side * (half_width + 0.02)
+            parts.append(cylinder((x, outer - side * 0.22, radius), (x, outer, radius), radius, rubber, 14))
+            angle = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
+            rim = np.stack([x + radius * np.cos(angle), np.full(14, outer + side * 0.004), radius * (1 + np.sin(angle))], 1)
+            disc = 0.5 + 0.5 * np.stack([np.cos(angle), np.sin(angle)], 1)
+            hub = np.tile([[x, outer + side * 0.004, radius]], (14, 1))
+            fan = np.stack([hub, rim, np.roll(rim, -1, axis=0), hub], axis=1)
+            fan_uv = np.stack([np.full((14, 2), 0.5), disc, np.roll(disc, -1, axis=0), np.full((14, 2), 0.5)], axis=1)
+            parts.append(quads(fan, fan_uv, face))
+            arch = [(x + 1.22 * radius * c, radius * (1 + 1.22 * s)) for c, s in zip(np.cos(angle[:8]), np.sin(angle[:8]), strict=True)]
+            flank = side * (half_width + 0.006)
+            arch_fan = [
+                [(x, flank, radius), (a, flank, b), (c, flank, d), (x, flank, radius)]
+                for (a, b), (c, d) in zip(arch[:-1], arch[1:], strict=True)
+            ]
+            parts.append(quads(arch_fan, np.zeros((len(arch_fan), 4, 2)), rubber))
+    return concatenate(parts)
+
+
+def _lamps_and_plates(atlas: Atlas, length: float, half_width: float, height: float, generator: Generator) -> Mesh:
+    lamp, paint = atlas.pick("lamp", generator), atlas.pick("paint", generator)
+    parts = []
+    for front in (True, False):
+        x = (0.5 * length + 0.012) * (1 if front else -1)
+        tint = (1.0, 1.0, 0.95) if front else (0.75, 0.05, 0.04)
+        w, h = generator.uniform(0.25, 0.42), generator.uniform(0.12, 0.22) if front else generator.uniform(0.15, 0.35)
+        for side in (-1.0, 1.0):
+            y = side * (0.85 * half_width - 0.5 * w) - 0.5 * w
+            retro = 1.0 if front else 2.5
+            parts.append(rectangle((x, y, height), (0, w, 0), (0, 0, h), Material(lamp, tint, 0.3, retro)))
+        plate = Material(paint, (1.0, 0.95, 0.85) if front else (1.0, 0.9, 0.6), 0.0, 3.0)
+        parts.append(rectangle((x, -0.26, height - 0.22), (0, 0.52, 0), (0, 0, 0.12), plate))
+        if front:
+            grille = Material(atlas.pick("black", generator))
+            parts.append(rectangle((x - 0.005, -0.45, height - 0.05), (0, 0.9, 0), (0, 0, 0.16), grille))
+            parts.append(rectangle((x - 0.005, -0.6, height - 0.32), (0, 1.2, 0), (0, 0, 0.14), grille))
+    return concatenate(parts)
+
+
+def car(atlas: Atlas, generator: Generator) -> Mesh:
+    """A saloon, hatchback, estate or off-roader."""
+    style = int(generator.integers(4))
+    length = generator.uniform(3.7, 4.9) - (0.3 if style == 1 else 0.0)
+    half, height = generator.uniform(0.82, 0.95), generator.uniform(1.40, 1.58) + (0.22 if style == 3 else 0.0)
+    clearance, belt = (0.32 if style == 3 else 0.2), 0.60 * height
+    front, rear = 0.5 * length, -0.5 * length
+    bonnet = generator.uniform(0.20, 0.27) * length
+    boot = (0.16 if style == 0 else 0.03) * length
+    paint = Material(atlas.pick("metal", generator), gloss=0.55, reflectance=0.9, paint=True)
+    glass = Material(atlas.pick("glass", generator), gloss=0.9, reflectance=1.0)
+    trim = Material(atlas.pick("black", generator))
+    nose, tail = belt - generator.uniform(0.12, 0.25), belt - (0.06 if style else 0.02)
+    body = loft(
+        [
+            _ring(front, 0.86 * half, clearance + 0.14, nose - 0.12, 0.95),
+            _ring(front - 0.10, 0.94 * half, clearance + 0.02, nose, 0.93),
+            _ring(front - bonnet, half, clearance, belt, 0.93),
+            _ring(rear + boot + 0.15, half, clearance, belt + 0.02, 0.93),
+            _ring(rear + 0.08, 0.95 * half, clearance + 0.05, tail, 0.93),
+            _ring(rear, 0.88 * half, clearance + 0.2, tail - 0.15, 0.95),
+        ],
+        paint,
+    )
+    foot, roof = 0.88 * half, generator.uniform(0.66, 0.76) * half
+    x0, x1 = front - bonnet + 0.05, front - bonnet - generator.uniform(0.55, 0.85)
+    x3 = rear + boot + 0.08
+    x2 = x3 + (generator.uniform(0.5, 0.7) if style == 0 else generator.uniform(0.15, 0.35))
+    low = [(x0, foot, belt - 0.01), (x3, foot, belt), (x3, -foot, belt), (x0, -foot, belt - 0.01)]
+    high = [(x1, roof, height), (x2, roof, height - 0.02), (x2, -roof, height - 0.02), (x1, -roof, height)]
+    sides = [[low[i], low[(i + 1) % 4], high[(i + 1) % 4], high[i]] for i in range(4)]
+    cabin = quads(sides, [[(0, 0), (2, 0), (2, 0.5), (0, 0.5)]] * 4, glass)
+    top = quads([high], [[(0, 0), (2, 0), (2, 1), (0, 1)]], paint)
+    pillars = []
+    for side in (1.0, -1.0):
+        for a, b, w in ((x0, x1, 0.07), (0.45 * x0 + 0.55 * x3, 0.45 * x1 + 0.55 * x2, 0.1), (x3, x2, 0.16)):
+            y0, y1 = side * (foot + 0.008), side * (roof + 0.008)
+            inward = 1.0 if a < 0 else -1.0
+            post = [(a, y0, belt), (a + inward * w, y0, belt), (b + inward * w, y1, height), (b, y1, height)]
+            pillars.append(post)
+        pillars.append([(x1, side * (roof + 0.01), height - 0.07), (x2, side * (roof + 0.01), height - 0.09),
+                        (x2, side * roof, height), (x1, side * roof, height)])
+    posts = quads(pillars, np.zeros((len(pillars), 4, 2)), paint)
+    parts = [
+        body, cabin, top, posts,
+        _wheels(atlas, (front - 0.19 * length, rear + 0.19 * length), half, generator.uniform(0.30, 0.36), generator),
+        _lamps_and_plates(atlas, length, half, clearance + 0.38, generator),
+        box((0, 0, 0.10), (0.8 * length, 1.5 * half, clearance), trim),
+    ]
+    for side in (-1.0, 1.0):
+        parts.append(box((x0 - 0.15, side * (half + 0.08), belt), (0.12, 0.18, 0.14), paint))
+        seam = Material(trim.texture, (0.6, 0.6, 0.6))
+        for x in (x0 - 0.1, 0.5 * (x0 + x3), x3 + 0.25):
+            parts.append(rectangle((x, side * (half + 0.004), clearance + 0.2), (0.015, 0, 0), (0, 0, belt - clearance - 0.3), seam))
+    return concatenate(parts)
+
+
+def van(atlas: Atlas, generator: Generator) -> Mesh:
+    """A panel van, often with lettering."""
+    length, half, height = generator.uniform(4.6, 6.2), generator.uniform(0.92, 1.05), generator.uniform(1.9, 2.6)
+    front, rear = 0.5 * length, -0.5 * length
+    paint = Material(atlas.pick("metal", generator), gloss=0.4, reflectance=0.9, paint=True)
+    glass = Material(atlas.pick("glass", generator), gloss=0.9)
+    body = loft(
+        [
+            _ring(front, 0.9 * half, 0.3, 0.95, 0.95),
+            _ring(front - 0.55, half, 0.22, 1.15, 0.92),
+            _ring(front - 1.25, half, 0.22, height - 0.05, 0.9),
+            _ring(front - 1.6, half, 0.22, height, 0.92),
+            _ring(rear, half, 0.25, height, 0.92),
+        ],
+        paint,
+    )
+    shield = [(front - 0.5, 0.85 * half, 1.13), (front - 0.5, -0.85 * half, 1.13),
+              (front - 1.25, -0.78 * half, height - 0.18), (front - 1.25, 0.78 * half, height - 0.18)]
+    shield = [(x + 0.06, y, z + 0.05) for x, y, z in shield]
+    parts = [body, quads([shield], np.zeros((1, 4, 2)), glass)]
+    for side in (-1.0, 1.0):
+        y = side * (half + 0.01)
+        parts.append(rectangle((front - 2.0, y, 1.15), (0.8, 0, 0), (0, 0, 0.55), glass))
+        if generator.random() < 0.6:
+            art = Material(atlas.pick("art", generator))
+            parts.append(rectangle((rear + 0.3, y, 0.8), (length - 2.6, 0, 0), (0, 0, height - 1.4), art, unit_uv=True))
+    parts.append(rectangle((rear - 0.01, -0.7 * half, 1.2), (0, 1.4 * half, 0), (0, 0, 0.5), glass))
+    parts.append(_wheels(atlas, (front - 0.9, rear + 0.95), half, 0.34, generator))
+    parts.append(_lamps_and_plates(atlas, length, half, 0.75, generator))
+    return concatenate(parts)
+
+
+def lorry(atlas: Atlas, generator: Generator) -> Mesh:
+    """A lorry with a box body or container, or a bus."""
+    bus = generator.random() < 0.3
+    length = generator.uniform(10.0, 12.0) if bus else generator.uniform(7.0, 14.0)
+    half, height = 1.25, generator.uniform(2.9, 3.3) if bus else generator.uniform(3.2, 3.9)
+    front, rear = 0.5 * length, -0.5 * length
+    cab = Material(atlas.pick("metal", generator), gloss=0.35, reflectance=0.9, paint=True)
+    glass = Material(atlas.pick("glass", generator), gloss=0.9)
+    dark = Material(atlas.pick("black", generator))
+    parts = [_wheels(atlas, (front - 1.3, rear + 1.4, rear + 2.5), half - 0.02, 0.48, generator)]
+    if bus:
+        parts.append(loft([_ring(front, 1.15, 0.4, height - 0.1, 0.95), _ring(front - 0.3, half, 0.35, height, 0.96),
+                           _ring(rear, half, 0.35, height, 0.96)], cab))
+        panes = int(length // 1.4)
+        for side in (-1.0, 1.0):
+            for pane in range(panes):
+                start = (rear + 0.4 + 1.4 * pane, side * (half + 0.01), 1.3)
+                parts.append(rectangle(start, (1.28, 0, 0), (0, 0, 0.95), glass))
+        parts.append(rectangle((front + 0.01, -1.0, 1.2), (0, 2.0, 0), (0, 0, 1.4), glass))
+        parts.append(rectangle((rear - 0.01, -0.9, 1.6), (0, 1.8, 0), (0, 0, 0.8), glass))
+    else:
+        cabin_height = generator.uniform(2.5, 3.4)
+        parts.append(box((front - 0.95, 0, 0.5), (1.9, 2.3, cabin_height - 0.5), cab))
+        parts.append(rectangle((front + 0.01, -1.05, 1.5), (0, 2.1, 0), (0, 0, 0.85), glass))
+        parts.append(rectangle((front + 0.01, -0.9, 0.7), (0, 1.8, 0), (0, 0, 0.6), dark))
+        for side in (-1.0, 1.0):
+            parts.append(rectangle((front - 1.3, side * 1.16, 1.5), (0.9, 0, 0), (0, 0, 0.75), glass))
+        load = Material(atlas.pick(str(generator.choice(["plain", "metal", "planks"])), generator), paint=True)
+        body = length - 2.3
+        parts.append(box((rear + 0.5 * body, 0, 0.95), (body, 2 * half, height - 0.95), load))
+        parts.append(box((rear + 0.5 * body, 0, 0.6), (body, 1.0, 0.4), dark))
+        if generator.random() < 0.7:
+            art = Material(atlas.pick("art", generator))
+            for side in (-1.0, 1.0):
+                start = (rear + 0.3, side * (half + 0.01), 1.1)
+                parts.append(rectangle(start, (body - 0.6, 0, 0), (0, 0, height - 1.3), art, unit_uv=True))
+        for y in (-0.65, 0.65):
+            parts.append(rectangle((rear - 0.015, y - 0.012, 1.0), (0, 0.024, 0), (0, 0, height - 1.1), dark))
+        warning = Material(atlas.pick("paint", generator), (0.9, 0.3, 0.1), 0.0, 3.0)
+        parts.append(rectangle((rear - 0.02, -1.1, 0.75), (0, 2.2, 0), (0, 0, 0.14), warning))
+    parts.append(_lamps_and_plates(atlas, length + 0.02, 1.2, 0.85, generator))
+    return concatenate(parts)
+
+
+def bicycle(atlas: Atlas, generator: Generator) -> Mesh:
+    """A bicycle or scooter."""
+    dark, frame = Material(atlas.pick("black", generator)), Material(atlas.pick("metal", generator), paint=True)
+    parts = []
+    for x in (-0.52, 0.52):
+        angle = np.linspace(0.0, 2.0 * np.pi, 11)
+        rim = np.stack([x + 0.33 * np.cos(angle), np.zeros(11), 0.34 + 0.33 * np.sin(angle)], 1)
+        parts += [cylinder(a, b, 0.025, dark, 4) for a, b in zip(rim[:-1], rim[1:], strict=True)]
+    for a, b in (((-0.52, 0, 0.34), (-0.15, 0, 0.85)), ((-0.15, 0, 0.4), (0.4, 0, 0.8)), ((-0.15, 0, 0.4), (-0.52, 0, 0.34)),
+                 ((0.52, 0, 0.34), (0.4, 0, 0.95)), ((0.4, -0.28, 1.0), (0.4, 0.28, 1.0))):
+        parts.append(cylinder(a, b, 0.03, frame, 4))
+    return concatenate([*parts, box((-0.17, 0, 0.85), (0.25, 0.14, 0.07), dark)])
