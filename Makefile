@@ -13,14 +13,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 DEMO_ARGS ?=
 PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint clean libraries viewer-libraries
 
-demo: $(VENV)/installed
-	@.ci/system-libraries
+demo: libraries $(VENV)/installed
 	$(BIN)/calib-inspect demo $(DEMO_ARGS)
 
-test: $(VENV)/installed-dev
-	@.ci/system-libraries viewer
+test: viewer-libraries $(VENV)/installed-dev
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 lint: $(VENV)/installed-dev
@@ -30,6 +28,12 @@ lint: $(VENV)/installed-dev
 
 clean:
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+
+libraries:
+	@.ci/system-libraries
+
+viewer-libraries:
+	@.ci/system-libraries viewer
 
 # The stamps say what was finished: a second run does nothing until a requirement changes.
 $(VENV)/created:
