@@ -18,9 +18,10 @@ SYSTEM_PACKAGES = {
     "libGL.so.1": "libgl1",
     "libEGL.so.1": "libegl1",
     "libX11.so.6": "libx11-6",
-    "libgomp.so.1": "libgomp1",
+    "libidn2.so.0": "libidn2-0",
+    "libudev.so.1": "libudev1",
 }
-"""Debian packages of the shared libraries that wheels load from the system."""
+"""Debian packages of the shared libraries that wheels load from the system, as in `.ci/system-libraries`."""
 
 
 class ExitCode(IntEnum):
