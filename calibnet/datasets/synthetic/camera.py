@@ -48,11 +48,11 @@ def sample_exposure(generator: Generator) -> Exposure:
     """Draw a camera's habits."""
     red, blue = np.exp(generator.normal(0.0, 0.06, 2))
     return Exposure(
-        level=float(generator.uniform(0.13, 0.32)),
+        level=float(generator.uniform(0.11, 0.30)),
         white=(float(red), 1.0, float(blue)),
         gamma=float(generator.uniform(1.8, 2.5)),
-        contrast=float(generator.uniform(0.85, 1.25)),
-        saturation=float(generator.uniform(0.5, 1.15)),
+        contrast=float(generator.uniform(0.9, 1.3)),
+        saturation=float(generator.uniform(0.4, 1.05)),
         vignetting=float(generator.uniform(0.0, 0.3)),
         noise=float(generator.uniform(0.0, 0.025)),
         blur=float(generator.uniform(0.3, 0.9)),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.rig import Lidar
-from calibnet.datasets.synthetic.shading import cast, surface
+from calibnet.datasets.synthetic.shading import cast, texels
 from calibnet.geometry.se3 import Matrix
 
 Generator = np.random.Generator
@@ -42,11 +42,9 @@ def scan(
     hits = cast(caster, world_from_lidar[:3, 3], rays)
     near = (hits.distance > lidar.minimum_range) & (hits.distance < lidar.maximum_range)
     hits, directions, rays = hits.select(near), directions[hits.rays[near]], rays[hits.rays[near]]
-    spot = surface(mesh, hits, 0.003 * hits.distance)
-
-    cosine = np.abs((spot.normal * rays).sum(axis=1))
+    cosine = np.abs(np.einsum("ij,ij->i", hits.normal, rays))
     retro = mesh.reflectance[hits.triangle] > 1.0
-    echo = spot.texel[:, 3] / 255.0 * mesh.reflectance[hits.triangle]
+    echo = texels(mesh, hits, 0.003 * hits.distance)[:, 3] / np.float32(255.0) * mesh.reflectance[hits.triangle]
     echo = echo * np.where(retro, 1.0, 0.25 + 0.75 * cosine)
     share = hits.distance / lidar.maximum_range
     strength = echo * np.where(retro, 1.0, cosine**0.3) / (share**2 + 1e-3)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 Generator = np.random.Generator
 CHUNK = 20.0
 """Metres of road that are populated together."""
+CAMBER = 0.04
+"""Metres by which the edge of the carriageway lies below its centre."""
 _BUILDERS = {
     "town_house": buildings.town_house,
     "detached_house": buildings.detached_house,
@@ -59,24 +61,23 @@ def ground(scene: Scene, start: float, stop: float) -> list[Mesh]:
         a, b, c = side * style.edge, side * (style.edge + style.pavement), side * (style.front + 1.0)
         far, lift = side * (style.front + 75.0), style.kerb
         rough = style.rough if style.kind in ("off-road", "park") else 0.0
-        strips.append(road.Strip(0.0, a, 0.0, -0.04, style.road, 0.1 * rough))
+        strips.append(road.Strip(0.0, a, 0.0, -CAMBER, style.road, 0.1 * rough))
         if style.kerb:
-            strips.append(road.Strip(a, a + 0.02 * side, -0.04, lift, kerb))
+            strips.append(road.Strip(a, a + 0.02 * side, -CAMBER, lift, kerb))
             strips.append(road.Strip(a + 0.02 * side, a + 0.16 * side, lift, lift, kerb))
         if style.pavement:
             strips.append(road.Strip(a + 0.16 * side if style.kerb else a, b, lift, lift + 0.03, style.walk))
-        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -0.04), lift + 0.05, style.verge, rough))
+        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -CAMBER), lift + 0.05, style.verge, rough))
         bank = scene.banks[0 if side < 0 else 1]
         strips.append(road.Strip(c, far, lift + 0.05, lift + 0.05 + bank, style.field, style.rough))
-    step = 2.5 if style.rough > 0.1 else 5.0
-    return road.sweep(scene.line, tuple(strips), start, stop, step)
+    return road.sweep(scene.line, tuple(strips), start, stop, 2.5)
 
 
 def _markings(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
     style, line = scene.style, scene.line
     if style.kind in ("off-road", "park"):
         return []
-    areas, paint = [], scene.paint
+    areas, paint, camber = [], scene.paint, CAMBER / style.edge
     lanes_edge = style.median + style.lanes * style.lane
     for side in (-1.0, 1.0):
         if scene.edge_lines:
@@ -99,14 +100,14 @@ def _markings(scene: Scene, generator: Generator, start: float, stop: float) -> 
         areas.append(np.array([[at, at + 0.4, own - 0.45 * style.lane, own + 0.45 * style.lane]]))
         areas.append(np.array([[at - 5.0, at - 2.0, own - 0.08, own + 0.08], [at - 2.4, at - 2.0, own - 0.4, own + 0.4]]))
     if areas:
-        parts.append(road.decals(line, np.concatenate(areas), paint))
+        parts.append(road.decals(line, np.concatenate(areas), paint, 0.012, camber))
     patches = int(generator.integers(0, 4))
     if patches:  # repairs, manholes, oil
         s, y = generator.uniform(start, stop, patches), generator.uniform(-style.edge, style.edge - 1.0, patches)
-        long, wide = generator.choice([0.6, 0.6, 2.0, 8.0], patches), generator.uniform(0.5, 1.5, patches)
+        long, wide = generator.choice([0.6, 0.6, 1.2, 2.5], patches), generator.uniform(0.5, 1.5, patches)
         tone = float(generator.choice([0.45, 0.7, 1.3]))
         material = Material(style.road.texture, (tone, tone, tone))
-        parts.append(road.decals(line, np.stack([s, s + long, y, y + wide], 1), material, 0.006))
+        parts.append(road.decals(line, np.stack([s, s + long, y, y + wide], 1), material, 0.006, camber))
     return parts
 
 

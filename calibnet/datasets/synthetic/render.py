@@ -42,9 +42,9 @@ def render_frame(
     axis = rig.camera_from_lidar[2, :3]  # the camera's optical axis in the LiDAR frame
     facing = float(np.arctan2(axis[1], axis[0]))
     backwards = abs(facing) > 0.5 * np.pi
-    reach = (150.0, 70.0) if backwards else (70.0, 150.0)
-    if sector > 3.0:
-        reach = (130.0, 150.0)
+    reach = (120.0, 30.0) if backwards else (30.0, 120.0)
+    if sector > 3.0 or abs(np.sin(facing)) > 0.7:
+        reach = (100.0, 120.0)
     mesh = scene.mesh(vehicle_pose, timestamp, *reach)
     rays = caster(mesh)
     points = scan(rays, mesh, rig.lidar, world_from_lidar, facing, sector, generator)

@@ -134,7 +134,7 @@ def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Matrix)
 
 def sample_camera(generator: Generator, pixels: int, maximum_width: int) -> PinholeCamera:
     """Draw an image shape and a lens, at most ``maximum_width`` wide and about ``pixels`` in all."""
-    aspect = float(generator.choice([3.31, 3.31, 2.6, 2.0, 1.78, 1.78, 1.6, 1.5, 1.333]) * generator.uniform(0.95, 1.05))
+    aspect = float(generator.choice([3.31, 3.31, 3.31, 2.6, 2.6, 2.0, 2.0, 1.78, 1.78, 1.6, 1.333]) * generator.uniform(0.95, 1.05))
     width = int(min(maximum_width, np.sqrt(pixels * aspect)))
     height = round(width / aspect)
     limit = 110.0 if aspect > 1.6 else 95.0
@@ -145,7 +145,7 @@ def sample_camera(generator: Generator, pixels: int, maximum_width: int) -> Pinh
     return PinholeCamera(width, height, matrix)
 
 
-def sample_rig(generator: Generator, pixels: int = 170_000, maximum_width: int = 660) -> Rig:
+def sample_rig(generator: Generator, pixels: int = 145_000, maximum_width: int = 660) -> Rig:
     """Draw a whole rig: scanner, lens, image shape and mount."""
     side = generator.random()
     if side < 0.72:

@@ -13,6 +13,10 @@ from calibnet.datasets.synthetic.mesh import Material, Mesh, quads
 Vector = NDArray[np.float64]
 
 
+_FIRST = -300.0
+"""First tabulated station, metres."""
+
+
 @dataclass(frozen=True, eq=False)
 class CentreLine:
     """A curve that never crosses itself: heading and height are bounded sums of sines of the station.
@@ -40,28 +44,28 @@ class CentreLine:
         return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
 
     @cached_property
-    def _table(self) -> tuple[Vector, Vector]:
-        stations = np.arange(-300.0, self.length + 600.0, 1.0)
-        heading = self.heading(stations + 0.5)
-        steps = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-        return stations, np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)[:-1]])
+    def _table(self) -> Vector:
+        """Rows x, y, height, cos and sin of the heading, one a metre from ``_FIRST``."""
+        stations = np.arange(_FIRST, self.length + 600.0, 1.0)
+        between = self.heading(stations + 0.5)
+        steps = np.stack([np.cos(between), np.sin(between)], axis=1)
+        position = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)[:-1]])
+        heading = self.heading(stations)
+        return np.column_stack([position, self.height(stations), np.cos(heading), np.sin(heading)])
 
     def place(self, station: ArrayLike, lateral: ArrayLike, lift: ArrayLike = 0.0) -> Vector:
         """World positions ``[..., 3]`` of points ``lateral`` metres left of the centre line."""
-        station, lateral, lift = np.broadcast_arrays(
-            np.asarray(station, dtype=np.float64), np.asarray(lateral, dtype=np.float64), lift
-        )
-        stations, table = self._table
-        heading = self.heading(station)
-        x = np.interp(station, stations, table[:, 0]) - np.sin(heading) * lateral
-        y = np.interp(station, stations, table[:, 1]) + np.cos(heading) * lateral
-        return np.stack([x, y, self.height(station) + lift], axis=-1)
+        row = np.asarray(station, dtype=np.float64) - _FIRST
+        floor = np.floor(row).astype(np.int64)
+        share = (row - floor)[..., None]
+        x, y, z, cos, sin = np.moveaxis((1.0 - share) * self._table[floor] + share * self._table[floor + 1], -1, 0)
+        parts = np.broadcast_arrays(x - sin * lateral, y + cos * lateral, z + lift)
+        return np.stack(parts, axis=-1)
 
     def nearest_station(self, position: ArrayLike) -> float:
         """Station of the tabulated point closest to a world position."""
-        stations, table = self._table
-        gap = table - np.asarray(position, dtype=np.float64)[:2]
-        return float(stations[int(np.argmin((gap**2).sum(axis=1)))])
+        gap = self._table[:, :2] - np.asarray(position, dtype=np.float64)[:2]
+        return float(np.argmin((gap**2).sum(axis=1))) + _FIRST
 
 
 @dataclass(frozen=True)
@@ -113,12 +117,15 @@ def _patches(grid: Vector) -> Vector:
     return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
 
 
-def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float = 0.012) -> Mesh:
-    """Markings on the road: ``[N, 4]`` start and stop station, right and left lateral bound."""
+def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float, camber: float) -> Mesh:
+    """Markings on the road: ``[N, 4]`` start and stop station, right and left lateral bound.
+
+    ``lift`` is their height over the road, ``camber`` the road's fall per metre from its centre.
+    """
     start, stop, right, left = np.asarray(areas, dtype=np.float64).reshape(-1, 4).T
     station = np.stack([start, stop, stop, start], axis=1)
     lateral = np.stack([right, right, left, left], axis=1)
-    corners = line.place(station, lateral, lift)
+    corners = line.place(station, lateral, lift - camber * np.abs(lateral))
     return quads(corners, np.stack([station, lateral], axis=-1), material)
 
 

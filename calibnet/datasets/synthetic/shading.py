@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from calibnet.datasets.synthetic.mesh import Mesh
-from calibnet.datasets.synthetic.textures import atlas
+from calibnet.datasets.synthetic.textures import TILE, atlas, turbulence
 from calibnet.datasets.synthetic.weather import Weather
 
 Array = NDArray[np.float32]
@@ -26,24 +26,18 @@ class Hits:
         distance: ``[N]`` metres in units of the ray's direction.
         triangle: ``[N]`` int64.
         barycentric: ``[N, 2]``.
+        normal: ``[N, 3]`` unit normals of the triangles, of either side.
     """
 
     rays: NDArray[np.int64]
     distance: Array
     triangle: NDArray[np.int64]
     barycentric: Array
+    normal: Array
 
     def select(self, mask: NDArray[np.bool_]) -> Hits:
         """The hits of a mask ``[N]``."""
-        return Hits(self.rays[mask], self.distance[mask], self.triangle[mask], self.barycentric[mask])
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """What was hit: unit normals ``[N, 3]`` (either side) and texels ``[N, 4]`` uint8."""
-
-    normal: Array
-    texel: NDArray[np.uint8]
+        return Hits(self.rays[mask], self.distance[mask], self.triangle[mask], self.barycentric[mask], self.normal[mask])
 
 
 def caster(mesh: Mesh) -> Any:
@@ -72,7 +66,8 @@ def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
     distance = answer["t_hit"].numpy()
     rays = np.flatnonzero(np.isfinite(distance))
     triangle = answer["primitive_ids"].numpy()[rays].astype(np.int64)
-    return Hits(rays, distance[rays], triangle, answer["primitive_uvs"].numpy()[rays])
+    corner_weights, normals = answer["primitive_uvs"].numpy()[rays], answer["primitive_normals"].numpy()[rays]
+    return Hits(rays, distance[rays], triangle, corner_weights, normals)
 
 
 def occluded(scene: Any, origins: Array, direction: Array) -> NDArray[np.bool_]:
@@ -81,15 +76,12 @@ def occluded(scene: Any, origins: Array, direction: Array) -> NDArray[np.bool_]:
     return np.asarray(scene.test_occlusions(rays, nthreads=_THREADS).numpy())
 
 
-def surface(mesh: Mesh, hits: Hits, footprint: Array) -> Surface:
-    """Normals and texels at hits; ``footprint`` ``[N]`` is the size of a pixel there, metres."""
-    normals = np.cross(mesh.corners[:, 1] - mesh.corners[:, 0], mesh.corners[:, 2] - mesh.corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+def texels(mesh: Mesh, hits: Hits, footprint: Array) -> NDArray[np.uint8]:
+    """Colour and reflectance ``[N, 4]`` at hits; ``footprint`` ``[N]`` is the size of a pixel there, metres."""
     corner = mesh.uv[hits.triangle]
     a, b = hits.barycentric[:, :1], hits.barycentric[:, 1:]
     uv = corner[:, 0] * (1.0 - a - b) + corner[:, 1] * a + corner[:, 2] * b
-    texel = atlas().sample(mesh.texture[hits.triangle], uv, footprint)
-    return Surface(normals[hits.triangle].astype(np.float32), texel)
+    return atlas().sample(mesh.texture[hits.triangle], uv, footprint)
 
 
 def radiance(
@@ -100,18 +92,18 @@ def radiance(
     ``rays`` are the unit directions ``[N, 3]`` of the hits, ``pixel_angle`` radians a pixel.
     """
     point = origin + rays * hits.distance[:, None]
-    spot = surface(mesh, hits, pixel_angle * hits.distance)
-    facing = (spot.normal * rays).sum(axis=1)
-    normal = spot.normal * -np.sign(facing)[:, None]
+    facing = np.einsum("ij,ij->i", hits.normal, rays)
+    normal = hits.normal * -np.sign(facing)[:, None]
     cosine = np.abs(facing)
 
-    albedo = spot.texel[:, :3].astype(np.float32)
+    footprint = pixel_angle * hits.distance / np.sqrt(np.maximum(cosine, 0.02))
+    albedo = texels(mesh, hits, footprint)[:, :3].astype(np.float32)
     albedo *= albedo * np.float32(1.0 / 255.0**2)  # the tiles are sRGB-like, gamma 2
     albedo *= mesh.tint[hits.triangle]
     albedo *= _stains(point)[:, None]
 
     up = 0.5 + 0.5 * normal[:, 2:]
-    light = up * (0.5 * weather.zenith + 0.5 * weather.horizon) + (1.0 - up) * weather.bounce
+    light = up * weather.ambient + (1.0 - up) * weather.bounce
     if weather.sun.any():
         slant = np.maximum(normal @ weather.sun_direction, 0.0)
         lit = np.flatnonzero(slant > 0.0)
@@ -134,7 +126,5 @@ def radiance(
 
 def _stains(point: Array) -> Array:
     """A slow change of brightness over the world, so that repeated tiles do not show."""
-    from calibnet.datasets.synthetic.weather import _clouds
-
-    cell = (point * np.float32(9.0)).astype(np.int32) & 255
-    return np.float32(0.75) + np.float32(0.5) * _clouds()[(cell[:, 1] + cell[:, 2]) & 255, cell[:, 0]]
+    cell = (point * np.float32(9.0)).astype(np.int32) & (TILE - 1)
+    return np.float32(0.7) + np.float32(0.6) * turbulence()[(cell[:, 1] + cell[:, 2]) & (TILE - 1), cell[:, 0]]

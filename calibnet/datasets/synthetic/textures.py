@@ -74,3 +74,11 @@ def atlas() -> Atlas:
         tile_metres=np.array([tile.metres for tile in drawn], dtype=np.float32),
         groups=groups,
     )
+
+
+@lru_cache(maxsize=1)
+def turbulence() -> NDArray[np.float32]:
+    """Tileable noise ``[TILE, TILE]`` of mean 0.5, for clouds and stains."""
+    from calibnet.datasets.synthetic.tiles import noise
+
+    return 0.5 + 0.35 * noise(np.random.default_rng(3), 4, 6, 0.6)

@@ -40,7 +40,10 @@ def noise(generator: Generator, cells: int = 4, octaves: int = 5, gain: float = 
 def colour(generator: Generator, low: float = 0.2, high: float = 0.8, saturation: float = 0.2) -> Colour:
     """A random colour of a given brightness range around grey."""
     grey = generator.uniform(low, high)
-    rgb = np.clip(grey * (1.0 + saturation * generator.uniform(-1.0, 1.0, 3)), 0.02, 0.98)
+    warm, green = generator.uniform(-1.0, 1.0), generator.uniform(-1.0, 1.0)
+    if saturation < 0.3:  # walls and stone are grey to warm, never purple
+        warm, green = 0.5 + 0.5 * warm, 0.25 * green
+    rgb = np.clip(grey * (1.0 + saturation * np.array([warm, green, -warm])), 0.02, 0.98)
     return float(rgb[0]), float(rgb[1]), float(rgb[2])
 
 
@@ -63,7 +66,7 @@ def rectangle(image: Image, x0: float, y0: float, x1: float, y1: float, rgb: Col
 
 
 def bricks(generator: Generator) -> Image:
-    rows, columns = int(generator.choice([8, 12, 16])), int(generator.choice([4, 6, 8]))
+    rows, columns = (16, 8) if generator.random() < 0.5 else (24, 10)
     base = np.array(colour(generator, 0.25, 0.6, 0.15)) * generator.choice([[1.25, 0.85, 0.7], [1.1, 1.0, 0.85]])
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     row = np.floor(y * rows).astype(int)
@@ -103,21 +106,22 @@ def grass(generator: Generator) -> Image:
     dry = generator.uniform(0.0, 1.0)
     rgb = np.array([0.30, 0.42, 0.18]) * (1 - dry) + np.array([0.55, 0.50, 0.30]) * dry
     image = flat(tuple(rgb * generator.uniform(0.7, 1.1)), 0.45)
-    image *= (1.0 + 0.18 * noise(generator, 4, 6, 0.85))[..., None]
-    image[..., 0] *= 1.0 + 0.12 * noise(generator, 4)
+    image *= (1.0 + 0.10 * noise(generator, 4, 6, 0.85) + 0.14 * noise(generator, 32, 4, 0.9))[..., None]
+    image[..., 0] *= 1.0 + 0.05 * noise(generator, 4)
     return image
 
 
 def soil(generator: Generator) -> Image:
     rgb = np.array([0.52, 0.43, 0.33]) * generator.uniform(0.6, 1.2)
-    image = flat(tuple(rgb), 0.3) * (1.0 + 0.16 * noise(generator, 4, 6, 0.8))[..., None]
+    grain = 0.09 * noise(generator, 4, 6, 0.8) + 0.10 * noise(generator, 32, 4, 0.9)
+    image = flat(tuple(rgb), 0.3) * (1.0 + grain)[..., None]
     return image
 
 
 def leaves(generator: Generator) -> Image:
-    kind = generator.choice([[0.28, 0.40, 0.16], [0.38, 0.45, 0.18], [0.22, 0.33, 0.20], [0.55, 0.40, 0.16]])
+    kind = generator.choice([[0.24, 0.31, 0.16], [0.30, 0.35, 0.18], [0.19, 0.27, 0.17], [0.36, 0.36, 0.24]])
     image = flat(tuple(np.array(kind) * generator.uniform(0.7, 1.2)), 0.5)
-    image *= np.clip(1.0 + 0.40 * noise(generator, 8, 5, 0.95), 0.15, 2.2)[..., None]
+    image *= np.clip(1.0 + 0.30 * noise(generator, 8, 5, 0.95) + 0.2 * noise(generator, 64, 3, 0.9), 0.15, 2.2)[..., None]
     return image
 
 
@@ -174,15 +178,15 @@ def facade(generator: Generator) -> Image:
 
 def ground_floor(generator: Generator) -> Image:
     """Shop fronts, doors and garage gates; one storey high, 4 m a tile."""
-    wall = speckled(generator, colour(generator, 0.25, 0.85, 0.3), 0.4, 0.05)
+    wall = speckled(generator, colour(generator, 0.25, 0.85, 0.2), 0.4, 0.05)
     if generator.random() < 0.6:
-        rectangle(wall, 0.0, 0.05, 1.0, 0.22, colour(generator, 0.15, 0.8, 0.7), 0.4)
+        rectangle(wall, 0.0, 0.05, 1.0, 0.22, colour(generator, 0.15, 0.8, 0.5), 0.4)
         scribble(wall, generator, 0.08, 0.09, 0.9, 0.19)
         rectangle(wall, 0.05, 0.28, 0.62, 0.9, glass_colour(generator), 0.05)
         for _ in range(int(generator.integers(2, 7))):  # goods in the window
             x, y = generator.uniform(0.08, 0.5), generator.uniform(0.4, 0.7)
             rectangle(wall, x, y, x + 0.08, y + 0.15, colour(generator, 0.2, 0.8, 0.6), 0.1)
-        rectangle(wall, 0.68, 0.28, 0.92, 1.0, colour(generator, 0.1, 0.5, 0.4), 0.3)
+        rectangle(wall, 0.68, 0.28, 0.92, 1.0, colour(generator, 0.1, 0.5, 0.25), 0.3)
     else:
         rectangle(wall, 0.1, 0.3, 0.35, 1.0, colour(generator, 0.1, 0.6, 0.5), 0.3)
         rectangle(wall, 0.48, 0.3, 0.9, 0.72, colour(generator, 0.6, 0.9, 0.05), 0.4)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from calibnet.datasets.synthetic.textures import TILE, turbulence
 
 Array = NDArray[np.float32]
 Generator = np.random.Generator
@@ -20,6 +21,7 @@ class Weather:
         sun_direction: ``[3]`` unit vector towards the sun.
         sun: ``[3]`` its irradiance; zero when overcast.
         zenith, horizon: ``[3]`` sky colours.
+        ambient: ``[3]`` light from the whole sky on a level surface.
         bounce: ``[3]`` light from the ground.
         clouds: 0 clear to 1 overcast.
         cloud_shift: ``[2]`` where in the cloud texture the sky is.
@@ -30,6 +32,7 @@ class Weather:
     sun: Array
     zenith: Array
     horizon: Array
+    ambient: Array
     bounce: Array
     clouds: float
     cloud_shift: Array
@@ -40,8 +43,8 @@ class Weather:
         up = np.maximum(direction[:, 2:], 0.0)
         colour = self.horizon + (self.zenith - self.horizon) * np.sqrt(up)
         plane = direction[:, :2] / (up + 0.15) * 60.0 + self.cloud_shift
-        cell = plane.astype(np.int32) & (_CLOUD_SIZE - 1)
-        cover = np.clip(_clouds()[cell[:, 1], cell[:, 0]] + 2.0 * self.clouds - 1.0, 0.0, 1.0)[:, None]
+        cell = plane.astype(np.int32) & (TILE - 1)
+        cover = np.clip(turbulence()[cell[:, 1], cell[:, 0]] + 2.0 * self.clouds - 1.0, 0.0, 1.0)[:, None]
         white = self.horizon.mean() * (1.25 - 0.35 * self.clouds)
         colour = colour + cover * (white - colour)
         if self.sun.any():
@@ -50,37 +53,29 @@ class Weather:
         return colour.astype(np.float32)
 
 
-_CLOUD_SIZE = 256
-
-
-@lru_cache(maxsize=1)
-def _clouds() -> Array:
-    from calibnet.datasets.synthetic.tiles import noise
-
-    return 0.5 + 0.35 * noise(np.random.default_rng(3), 4, 6, 0.6)
-
-
 def sample_weather(generator: Generator) -> Weather:
     """Draw a time of day and a weather: sunny, hazy, cloudy or overcast."""
-    overcast = generator.random() < 0.3
+    overcast = generator.random() < 0.28
     elevation = np.radians(generator.uniform(12.0, 65.0))
     azimuth = generator.uniform(0.0, 2.0 * np.pi)
     direction = np.array(
         [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
     )
     warmth = np.clip(1.0 - elevation / 0.8, 0.0, 1.0) * generator.uniform(0.5, 1.0)
-    sun = generator.uniform(1.2, 3.2) * np.array([1.0, 0.95 - 0.15 * warmth, 0.88 - 0.35 * warmth])
+    sun = generator.uniform(1.3, 4.0) * np.array([1.0, 0.95 - 0.15 * warmth, 0.88 - 0.35 * warmth])
     blue = np.array([0.30, 0.48, 0.85]) * generator.uniform(0.6, 1.0)
     grey = np.array([0.78, 0.82, 0.86]) * generator.uniform(0.7, 1.1)
     clouds = generator.uniform(0.8, 1.0) if overcast else generator.uniform(0.0, 0.65)
     zenith = blue * (1.0 - 0.9 * clouds) + grey * 0.9 * clouds
     horizon = np.array([0.85, 0.90, 0.95]) * generator.uniform(0.75, 1.05) * (1.0, 1.0 - 0.1 * warmth, 1.0 - 0.25 * warmth)
+    shade = 1.0 if overcast else generator.uniform(0.35, 1.0)  # how light shadows are
     return Weather(
         sun_direction=direction.astype(np.float32),
         sun=np.zeros(3, dtype=np.float32) if overcast else sun.astype(np.float32),
         zenith=zenith.astype(np.float32),
         horizon=horizon.astype(np.float32),
-        bounce=np.array([0.22, 0.20, 0.17], dtype=np.float32) * np.float32(0.6 if overcast else 1.3),
+        ambient=(shade * (0.5 * zenith + 0.5 * horizon)).astype(np.float32),
+        bounce=np.array([0.20, 0.19, 0.17], dtype=np.float32) * np.float32(shade),
         clouds=float(clouds),
         cloud_shift=generator.uniform(0, 256, 2).astype(np.float32),
         visibility=float(np.exp(generator.uniform(np.log(150.0), np.log(2500.0)))),

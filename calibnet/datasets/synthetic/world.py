@@ -73,7 +73,7 @@ class Scene:
         turn = rotation_from_euler_xyz([0.0, 0.0, heading]) @ rotation_from_euler_xyz([0.0, -np.arctan(slope), 0.0])
         return transform(turn, self.line.place(station, lateral))
 
-    def mesh(self, world_from_vehicle: Matrix, time: float, behind: float = 70.0, ahead: float = 150.0) -> Mesh:
+    def mesh(self, world_from_vehicle: Matrix, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
         """Everything around a vehicle at a time, as triangles in the world."""
         station = self.line.nearest_station(world_from_vehicle[:3, 3])
         first, last = int((station - behind) // CHUNK), int((station + ahead) // CHUNK)
@@ -101,7 +101,7 @@ def build_scene(generator: Generator, length: float = 400.0) -> Scene:
     )
     hills = np.column_stack([generator.uniform(0.0, 1.8, 2), generator.uniform(160, 400, 2), generator.uniform(0, 6.3, 2)])
     tone = float(generator.uniform(0.6, 1.0))
-    season = np.array([1.0, 1.0, 1.0]) if generator.random() < 0.8 else np.array([1.3, 0.85, 0.5])
+    season = np.array([1.0, 1.0, 1.0]) if generator.random() < 0.85 else np.array([2.2, 1.2, 0.6])
     return Scene(
         seed=int(generator.integers(2**62)),
         style=style,
@@ -142,7 +142,8 @@ def _traffic(scene: Scene, station: float, time: float, behind: float, ahead: fl
                 lateral = style.lane_center(lane, own) + generator.normal(0.0, 0.15)
                 position = scene.line.place(place, lateral)
                 distance = float(np.linalg.norm(position - ego))
-                if distance < (14.0 if own and lane == 0 and kind == "lorry" else 9.0 if own and lane == 0 else 3.5):
+                clear = 9.0 if own and lane == 0 else 4.5
+                if distance < clear + (6.0 if kind == "lorry" else 0.0):
                     continue
                 turn = float(scene.line.heading(place)) + (0.0 if own else np.pi)
                 parts.append(mesh.placed(position - (0, 0, 0.02), turn, 1.0, colour))
@@ -162,9 +163,7 @@ def _horizon(scene: Scene, ego: Matrix) -> Mesh:
         ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count + 1, -12.0)], 1) + ego
         top = ring + np.stack([np.zeros(count + 1), np.zeros(count + 1), 12.0 + np.append(height, height[0])], 1)
         flat = generator.random() < 0.5  # steps, as roofs, or slopes, as trees and hills
-        right = top[:-1] * (1, 1, 0) + ring[1:] * 0 + np.array([0, 0, 1]) * top[:-1, 2:] if flat else top[1:]
-        if flat:
-            right = np.column_stack([top[1:, :2], top[:-1, 2]])
+        right = np.column_stack([top[1:, :2], top[:-1, 2]]) if flat else top[1:]
         corners = np.stack([ring[:-1], ring[1:], right, top[:-1]], axis=1)
         u = np.stack([angle[:-1], angle[1:], angle[1:], angle[:-1]], 1) * radius
         uv = np.stack([u, corners[..., 2] * -1.0], axis=-1) * 0.5
