@@ -87,19 +87,6 @@ def camera_folder(parent: Path, prefix: str, camera: int) -> Path:
     return folder
 
 
-def image_type(folder: Path) -> str:
-    """The file ending of a folder's images without its dot, ``png`` before ``jpg``.
-
-    Raises:
-        DatasetError: there are no images.
-    """
-    present = {path.suffix for path in folder.iterdir()}
-    for suffix in IMAGE_SUFFIXES:
-        if suffix in present:
-            return suffix[1:]
-    raise DatasetError(f"{folder} holds no images ({', '.join(IMAGE_SUFFIXES)}); put them there.")
-
-
 def times_of(files: Mapping[str, Path], times: Sequence[float], path: Path) -> dict[str, float]:
     """Seconds of every file, by stem.
 

@@ -1,4 +1,8 @@
-"""KITTI odometry, read through pykitti: ``sequences/SS/{calib.txt,times.txt,image_N,velodyne}``."""
+"""KITTI odometry: ``sequences/SS/{calib.txt,times.txt,image_N,velodyne}``.
+
+Calibration and times come through pykitti. The files are listed here, because pykitti looks for
+one image type at a time and finds nothing below a path with brackets.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +14,9 @@ import pykitti
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
     DATE_OF_FOCAL_LENGTH,
+    IMAGE_SUFFIXES,
     camera_folder,
     frame_files,
-    image_type,
     read_calibration_file,
     rectified_calibration,
     times_of,
@@ -39,18 +43,16 @@ class KittiOdometry(PairedSequence):
         """
         sequence = str(sequence).zfill(2)
         folder = _sequence_folder(Path(root), sequence)
-        images = camera_folder(folder, "image_", camera)
-        scans = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
+        images = files_by_stem(camera_folder(folder, "image_", camera), IMAGE_SUFFIXES, "images")
+        velodyne = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
+        scans = files_by_stem(velodyne, (".bin",), "scans")
+        check_paired(images, scans)
         read_calibration_file(folder / "calib.txt", CALIBRATION_ROWS)
-        kitti = _open(Path(root), sequence, image_type(images))
-        image_files = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
-        scan_files = files_by_stem(scans, (".bin",), "scans")
-        check_paired(image_files, scan_files)
-
+        kitti = _open(Path(root), sequence)
         projection = getattr(kitti.calib, f"P_rect_{camera}0")
         self._fixed = rectified_calibration(projection, kitti.calib.T_cam0_velo)
         seconds = [time.total_seconds() for time in kitti.timestamps]
-        files = frame_files(image_files, scan_files, times_of(image_files, seconds, folder / "times.txt"))
+        files = frame_files(images, scans, times_of(images, seconds, folder / "times.txt"))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"
         super().__init__(f"kitti-odometry/{sequence}", f"{rig}, camera {camera}", files)
@@ -66,10 +68,10 @@ class _Reader(pykitti.odometry):  # type: ignore[misc]  # pykitti has no types
         self.poses: list[np.ndarray] = []
 
 
-def _open(root: Path, sequence: str, imtype: str) -> _Reader:
+def _open(root: Path, sequence: str) -> _Reader:
     times = root / "sequences" / sequence / "times.txt"
     try:
-        return _Reader(str(root), sequence, imtype=imtype)
+        return _Reader(str(root), sequence)
     except FileNotFoundError as error:
         raise DatasetError(f"{error.filename} does not exist; get it from KITTI's calib zip.") from None
     except ValueError as error:

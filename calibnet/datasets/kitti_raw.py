@@ -1,4 +1,7 @@
-"""KITTI raw, synced and rectified drives, read through pykitti: ``DATE/DATE_drive_NNNN_sync``."""
+"""KITTI raw, synced and rectified drives: ``DATE/DATE_drive_NNNN_sync``.
+
+Calibration and times come through pykitti; the files are listed as in `kitti_odometry`.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ import pykitti
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
+    IMAGE_SUFFIXES,
     camera_folder,
     frame_files,
-    image_type,
     read_calibration_file,
     rectified_calibration,
     times_of,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
 from calibnet.errors import DatasetError
 
 CALIBRATION_ROWS = {
@@ -46,23 +49,19 @@ class KittiRaw(PairedSequence):
         """
         root, drive = Path(root), str(drive).zfill(4)
         folder = _drive_folder(root, date, drive)
-        images = _data_folder(camera_folder(folder, "image_0", camera))
-        scans = _data_folder(folder / "velodyne_points")
+        images = files_by_stem(_data_folder(camera_folder(folder, "image_0", camera)), IMAGE_SUFFIXES, "images")
+        scans = files_by_stem(_data_folder(folder / "velodyne_points"), (".bin",), "scans")
+        without_scan = KNOWN_GAPS.get(folder.name, set()) - scans.keys()
+        paired_images = {stem: image for stem, image in images.items() if stem not in without_scan}
+        check_paired(paired_images, scans)
         for name, rows in CALIBRATION_ROWS.items():
             read_calibration_file(root / date / name, rows)
-        kitti = _open(root, date, drive, image_type(images))
-        all_images = {Path(path).stem: Path(path) for path in getattr(kitti, f"cam{camera}_files")}
-        scan_files = {Path(path).stem: Path(path) for path in kitti.velo_files}
-        if not scan_files:
-            raise DatasetError(f"{scans} holds no scans (.bin); unpack the drive's zip again.")
-        without_scan = KNOWN_GAPS.get(folder.name, set()) - scan_files.keys()
-        image_files = {stem: image for stem, image in all_images.items() if stem not in without_scan}
-        check_paired(image_files, scan_files)
+        kitti = _open(root, date, drive)
         self._fixed = rectified_calibration(
             getattr(kitti.calib, f"P_rect_{camera}0"), kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect
         )
         seconds = [(time - kitti.timestamps[0]).total_seconds() for time in kitti.timestamps]
-        files = frame_files(image_files, scan_files, times_of(all_images, seconds, kitti.timestamp_file))
+        files = frame_files(paired_images, scans, times_of(images, seconds, kitti.timestamp_file))
         super().__init__(f"kitti-raw/{date}_drive_{drive}", f"KITTI {date}, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
@@ -85,9 +84,9 @@ class _Reader(pykitti.raw):  # type: ignore[misc]  # pykitti has no types
         self.oxts: list[Any] = []
 
 
-def _open(root: Path, date: str, drive: str, imtype: str) -> _Reader:
+def _open(root: Path, date: str, drive: str) -> _Reader:
     try:
-        return _Reader(str(root), date, drive, imtype=imtype)
+        return _Reader(str(root), date, drive)
     except ValueError as error:
         folder = root / date / f"{date}_drive_{drive}_sync" / "oxts"
         raise DatasetError(

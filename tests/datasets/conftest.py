@@ -158,8 +158,8 @@ LAYOUTS: dict[str, Callable[[Path], Layout]] = {
 
 @pytest.fixture
 def write_layout(tmp_path: Path) -> Callable[[str], Layout]:
-    """Write the folder of a dataset by name."""
-    return lambda name: LAYOUTS[name](tmp_path / "data")
+    """Write the folder of a dataset by name, below a path of the kind that trips globs and formats."""
+    return lambda name: LAYOUTS[name](tmp_path / "my [data] 100%")
 
 
 @pytest.fixture

@@ -123,13 +123,14 @@ def test_sequence_and_drive_numbers_may_be_short(write_layout):
     assert len(write_layout("kitti-raw").open(drive="7")) == 3
 
 
-def test_missing_sequence_drive_and_split_list_what_is_there(write_layout, tmp_path):
+def test_missing_sequence_drive_and_split_list_what_is_there(write_layout):
     with pytest.raises(DatasetError, match=r"sequences/05 does not exist; sequences there: 04\."):
         write_layout("kitti-odometry").open(sequence="05")
+    raw = write_layout("kitti-raw")
     with pytest.raises(DatasetError, match=r"drive_0008_sync does not exist; drives there: 0007\."):
-        write_layout("kitti-raw").open(drive="0008")
+        raw.open(drive="0008")
     with pytest.raises(DatasetError, match=r"2012_01_01 does not exist.*2011_01_02"):
-        open_sequence("kitti-raw", tmp_path / "data", date="2012_01_01", drive="1")
+        raw.open(date="2012_01_01", drive="1")
     with pytest.raises(DatasetError, match=r"no split 'trian'; splits there: training, testing, val\."):
         write_layout("kitti-object").open(split="trian")
 

@@ -92,7 +92,7 @@ def test_order_of_the_points_does_not_matter():
     assert_array_equal(depth_image(points, CAMERA_FROM_LIDAR, CAMERA), depth_image(shuffled, CAMERA_FROM_LIDAR, CAMERA))
 
 
-@pytest.mark.parametrize("points", [np.zeros((0, 4)), [[-5.0, 0, 0, 0]], [[0.3, 0, 0, 0]], [[5.0, 50, 0, 0]]])
+@pytest.mark.parametrize("points", [np.zeros((0, 4)), [[-5.0, 0, 0, 0]], [[0.7, 0.1, -0.2, 0]], [[5.0, 50, 0, 0]]])
 def test_no_visible_point_is_an_empty_image(points):
     points = np.array(points, np.float32).reshape(-1, 4)
     projection = project(points, CAMERA_FROM_LIDAR, CAMERA)
