@@ -48,7 +48,7 @@ def sample_exposure(generator: Generator) -> Exposure:
     """Draw a camera's habits."""
     red, blue = np.exp(generator.normal(0.0, 0.06, 2))
     return Exposure(
-        level=float(generator.uniform(0.11, 0.30)),
+        level=float(np.exp(generator.uniform(np.log(0.08), np.log(0.30)))),
         white=(float(red), 1.0, float(blue)),
         gamma=float(generator.uniform(1.8, 2.5)),
         contrast=float(generator.uniform(0.9, 1.3)),
@@ -94,7 +94,7 @@ def develop(linear: NDArray[np.float32], exposure: Exposure, generator: Generato
     height, width = linear.shape[:2]
     image = np.minimum(linear, 8.0)
     image = cv2.GaussianBlur(image, (0, 0), exposure.blur)
-    metered = float(np.minimum(image[height // 4 :], 2.0).mean())  # as cars do, less by the sky
+    metered = float(np.minimum(image[height // 2 :], 2.0).mean())  # by the road, as cars do, not by the sky
     image *= np.float32(exposure.level / max(metered, 1e-3)) * np.asarray(exposure.white, dtype=np.float32)
     y, x = np.linspace(-1, 1, height, dtype=np.float32), np.linspace(-1, 1, width, dtype=np.float32)
     image *= (1.0 - exposure.vignetting * 0.5 * (y[:, None] ** 2 + x**2))[..., None]

@@ -39,15 +39,18 @@ def vehicle(kind: str, generator: Generator) -> tuple[Mesh, np.ndarray]:
     return library.pick(kind, generator), car_colour(generator)
 
 
-def populate(scene: Scene, index: int) -> Mesh:
-    """Everything that stands still between two stations; the same for the same scene and index."""
+def populate(scene: Scene, index: int, near: bool) -> Mesh:
+    """Everything that stands still between two stations; the same for the same scene and index.
+
+    Chunks that are not ``near`` have plants of fewer leaves, in the same places.
+    """
     generator = np.random.default_rng([scene.seed, index + 10_000])
     start, stop = index * CHUNK, (index + 1) * CHUNK
     parts = [*ground(scene, start, stop), *_markings(scene, generator, start, stop)]
     for side in (-1.0, 1.0):
-        parts += _plots(scene, generator, start, stop, side)
+        parts += _plots(scene, generator, start, stop, side, near)
         parts += _roadside(scene, generator, start, stop, side)
-        parts += _nature(scene, generator, start, stop, side)
+        parts += _nature(scene, generator, start, stop, side, near)
     if scene.style.kind == "highway":
         parts += _motorway(scene, generator, start, stop)
     return concatenate(parts)
@@ -121,7 +124,9 @@ def _stand(
     return mesh.placed(position, heading, scale, colour)  # type: ignore[arg-type]
 
 
-def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
+def _plots(
+    scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool
+) -> list[Mesh]:
     style, parts = scene.style, []
     if generator.random() < 0.06 and style.kind in ("street", "suburb", "industrial"):
         return parts  # a side street
@@ -131,7 +136,7 @@ def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: 
         station = start + (piece + 0.5) * width
         fence = generator.random() < style.fences and style.setback > 2.0
         if fence:
-            shape = library.pick(scene.fence_kind, generator) if scene.fence_kind != "fence" else scene.fence(side)
+            shape = library.pick(scene.fence_kind, generator, near) if scene.fence_kind != "fence" else scene.fence(side)
             lateral = side * (style.edge + style.pavement + 0.4)
             parts += [_stand(scene, shape, s, lateral, colour=scene.leaf_colour)
                       for s in np.arange(station - 0.5 * width + 2.0, station + 0.5 * width, 4.0)]
@@ -187,31 +192,45 @@ def _roadside(scene: Scene, generator: Generator, start: float, stop: float, sid
     return parts
 
 
-def _nature(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
+def _nature(
+    scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool
+) -> list[Mesh]:
     style, parts = scene.style, []
-    near = style.edge + style.pavement if style.kind != "street" else style.edge + 0.8
+    verge = style.edge + style.pavement if style.kind != "street" else style.edge + 0.8
     wild = style.kind in ("off-road", "park")
+
+    def grow(name: str, station: float, lateral: float, turn: float, size: object = 1.0) -> None:
+        colour = scene.leaf_colour * generator.uniform(0.7, 1.3) * generator.uniform(0.88, 1.12, 3)
+        shape = library.pick(name, generator, near)
+        parts.append(_stand(scene, shape, station, lateral, turn, -0.05, size, colour))
 
     def scatter(name: str, count: float, low: float, high: float, sizes: tuple[float, float]) -> None:
         for _ in range(int(generator.poisson(count))):
             lateral = side * (low + (high - low) * generator.random() ** 1.5)
             size = generator.uniform(*sizes) * np.array([1.0, 1.0, generator.uniform(0.85, 1.2)])
-            colour = scene.leaf_colour * generator.uniform(0.7, 1.3) * generator.uniform(0.85, 1.15, 3)
-            shape = library.pick(name, generator)
-            turn = generator.uniform(0.0, 2.0 * np.pi)
-            parts.append(_stand(scene, shape, generator.uniform(start, stop), lateral, turn, -0.05, size, colour))
+            grow(name, generator.uniform(start, stop), lateral, generator.uniform(0.0, 2.0 * np.pi), size)
 
-    trees = style.trees_set
+    def tree() -> str:
+        return style.trees_set[int(generator.integers(len(style.trees_set)))]
+
     spread = 0.3 if style.kind == "street" else max(style.setback - 1.0, 1.0)
-    scatter(trees[int(generator.integers(len(trees)))], style.trees, near + 0.8, near + 0.8 + spread, (0.6, 1.1))
+    scatter(tree(), 1.6 * style.trees, verge + 0.8, verge + 0.8 + spread, (0.6, 1.2))
     if style.kind != "street":
         far = style.front + (18.0 if style.buildings > 0.4 else 2.0)
-        scatter(trees[int(generator.integers(len(trees)))], 1.5 * style.trees, far, far + 35.0, (0.8, 1.5))
-    scatter("bush", (4.0 if wild else 1.5) * style.bushes, near + 1.0, near + (14.0 if wild else 5.0), (0.5, 1.4))
+        for _ in range(2):
+            scatter(tree(), 1.5 * style.trees, far, far + 25.0, (0.9, 1.7))
+    elif generator.random() < 0.3 * style.trees:
+        scatter(tree(), 1.0, style.front + 2.0, style.front + 12.0, (0.8, 1.4))
+    scatter("bush", (4.0 if wild else 1.5) * style.bushes, verge + 1.0, verge + (14.0 if wild else 5.0), (0.5, 1.4))
+    room = style.setback if style.buildings > 0.4 else 12.0
+    if room > 4.0 and generator.random() < style.thickets:
+        lateral = side * (verge + generator.uniform(2.0, min(room, 7.0)))
+        for station in (start + 5.0, stop - 5.0):
+            grow("thicket", station, lateral, generator.normal(0.0, 0.1), generator.uniform(0.7, 1.2))
     if wild or style.verge.texture in atlas().groups["grass"]:
-        scatter("tuft", (10.0 if wild else 3.0) * style.bushes, near + 0.3, near + 9.0, (0.5, 1.6))
+        scatter("tuft", (10.0 if wild else 3.0) * style.bushes, verge + 0.3, verge + 9.0, (0.5, 1.6))
     if style.kind == "off-road":
-        scatter("rock", 1.0, near + 0.3, near + 14.0, (0.5, 1.6))
+        scatter("rock", 1.0, verge + 0.3, verge + 14.0, (0.5, 1.6))
     return parts
 
 
@@ -222,6 +241,7 @@ def _motorway(scene: Scene, generator: Generator, start: float, stop: float) -> 
         parts.append(_stand(scene, rail, station, 0.0))
         if scene.outer_rails:
             parts += [_stand(scene, rail, station, side * (style.edge + 1.0)) for side in (-1.0, 1.0)]
-    if generator.random() < 0.08:
-        parts.append(_stand(scene, library.pick("gantry", generator), 0.5 * (start + stop), 0.0))
+    if generator.random() < 0.12:
+        name = "gantry" if generator.random() < 0.6 else "bridge"
+        parts.append(_stand(scene, library.pick(name, generator), 0.5 * (start + stop), 0.0))
     return parts

@@ -6,18 +6,20 @@ import numpy as np
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, blob, box, concatenate, cylinder, quads, rectangle
 from calibnet.datasets.synthetic.textures import Atlas
+from calibnet.datasets.synthetic.vehicles import bicycle
 
 Generator = np.random.Generator
 
 
-def _metal(atlas: Atlas, generator: Generator) -> Material:
+def metalwork(atlas: Atlas, generator: Generator) -> Material:
+    """Painted or galvanised steel."""
     tone = generator.uniform(0.08, 0.5)
     return Material(atlas.pick("metal", generator), (tone, tone, tone), 0.1, 0.8)
 
 
 def lamp_post(atlas: Atlas, generator: Generator) -> Mesh:
     """A street lamp with an arm towards +x, or a lantern."""
-    metal = _metal(atlas, generator)
+    metal = metalwork(atlas, generator)
     height = generator.uniform(3.5, 9.0)
     parts = [cylinder((0, 0, 0), (0, 0, height), (0.09, 0.05), metal), cylinder((0, 0, 0), (0, 0, 0.8), 0.12, metal)]
     lamp = Material(atlas.pick("lamp", generator), (0.9, 0.9, 0.85))
@@ -38,7 +40,7 @@ def pole(atlas: Atlas, generator: Generator) -> Mesh:
         parts = [cylinder((0, 0, 0), (0, 0, height), (0.15, 0.11), wood)]
         parts.append(box((0, 0, height - 0.6), (0.12, 1.8, 0.12), wood))
         return concatenate(parts)
-    return cylinder((0, 0, 0), (0, 0, generator.uniform(2.0, 4.0)), 0.05, _metal(atlas, generator))
+    return cylinder((0, 0, 0), (0, 0, generator.uniform(2.0, 4.0)), 0.05, metalwork(atlas, generator))
 
 
 def bollard(atlas: Atlas, generator: Generator) -> Mesh:
@@ -53,7 +55,7 @@ def bollard(atlas: Atlas, generator: Generator) -> Mesh:
 
 def sign(atlas: Atlas, generator: Generator) -> Mesh:
     """A traffic sign: round, triangular or rectangular, facing -x (oncoming drivers)."""
-    metal = _metal(atlas, generator)
+    metal = metalwork(atlas, generator)
     height, size = generator.uniform(1.9, 2.8), generator.uniform(0.3, 0.45)
     sides = int(generator.choice([3, 4, 12, 12, 8]))
     face = Material(atlas.pick("sign", generator), reflectance=4.0)
@@ -69,7 +71,7 @@ def sign(atlas: Atlas, generator: Generator) -> Mesh:
 
 def traffic_light(atlas: Atlas, generator: Generator) -> Mesh:
     """A signal head on a post, sometimes also on an arm towards +y."""
-    metal, dark = _metal(atlas, generator), Material(atlas.pick("black", generator))
+    metal, dark = metalwork(atlas, generator), Material(atlas.pick("black", generator))
     lamp = atlas.pick("lamp", generator)
     lit = int(generator.integers(3))
 
@@ -104,7 +106,7 @@ def bin_or_box(atlas: Atlas, generator: Generator) -> Mesh:
 
 def bench(atlas: Atlas, generator: Generator) -> Mesh:
     """A park bench, along x."""
-    wood, metal = Material(atlas.pick("planks", generator)), _metal(atlas, generator)
+    wood, metal = Material(atlas.pick("planks", generator)), metalwork(atlas, generator)
     parts = [box((0, 0, 0.42), (1.7, 0.45, 0.05), wood), box((0, -0.22, 0.5), (1.7, 0.05, 0.4), wood)]
     return concatenate(parts + [box((x, 0, 0), (0.06, 0.4, 0.42), metal) for x in (-0.7, 0.7)])
 
@@ -134,60 +136,6 @@ def person(atlas: Atlas, generator: Generator) -> Mesh:
     return concatenate(parts)
 
 
-def fence(atlas: Atlas, generator: Generator) -> Mesh:
-    """A fence, railing or wall segment, 4 m long along x."""
-    kind = int(generator.integers(4))
-    height = generator.uniform(0.8, 2.0)
-    if kind == 0:
-        return box((0, 0, 0), (4.0, 0.04, height), Material(atlas.pick("planks", generator)))
-    if kind == 1:
-        texture = atlas.pick(str(generator.choice(["brick", "concrete", "plaster"])), generator)
-        cap = Material(atlas.pick("concrete", generator))
-        wall = box((0, 0, 0), (4.0, 0.25, height), Material(texture))
-        return concatenate([wall, box((0, 0, height), (4.0, 0.33, 0.06), cap)])
-    metal = _metal(atlas, generator)
-    gap = 0.14 if kind == 2 else 1.0
-    parts = [box((x, 0, 0), (0.03, 0.03, height), metal) for x in np.arange(-2.0, 2.0, gap)]
-    for z in (0.12, 0.5 * height, height) if kind == 3 else (0.12, height):
-        parts.append(box((0, 0, z), (4.0, 0.04, 0.04 if kind == 2 else 0.12), metal))
-    return concatenate(parts)
-
-
-def guard_rail(atlas: Atlas, generator: Generator) -> Mesh:
-    """A motorway barrier, 4 m long along x: steel rail on posts, or concrete."""
-    if generator.random() < 0.35:
-        concrete = Material(atlas.pick("concrete", generator))
-        low, high = box((0, 0, 0), (4.0, 0.6, 0.3), concrete), box((0, 0, 0.3), (4.0, 0.25, 0.6), concrete)
-        return concatenate([low, high])
-    steel = Material(atlas.pick("metal", generator), (0.5, 0.52, 0.54), 0.2)
-    parts = [box((0, 0, z), (4.0, 0.06, 0.13), steel) for z in (0.45, 0.64)]
-    parts.append(box((0, 0.02, 0.55), (4.0, 0.02, 0.12), steel))
-    return concatenate(parts + [box((x, 0.08, 0), (0.1, 0.08, 0.75), steel) for x in (-1.5, 0.5)])
-
-
-def gantry(atlas: Atlas, generator: Generator) -> Mesh:
-    """A sign bridge across y, 24 m wide, faces towards -x."""
-    metal = _metal(atlas, generator)
-    parts = [box((0, y, 0), (0.4, 0.4, 7.0), metal) for y in (-12.0, 12.0)]
-    parts += [box((0, 0, z), (0.25, 24.0, 0.2), metal) for z in (5.9, 6.9)]
-    for y in np.arange(-12.0, 12.0, 1.5):
-        parts.append(cylinder((0, y, 6.0), (0, y + 1.5, 6.95), 0.05, metal, 4))
-    for y in generator.choice([-9.0, -4.5, 0.5, 5.0], 2, replace=False):
-        face = Material(atlas.pick("sign", generator), reflectance=3.0)
-        size = generator.uniform(2.0, 3.0)
-        parts.append(rectangle((-0.3, y, 5.4), (0, 1.4 * size, 0), (0, 0, size), face, unit_uv=True))
-    return concatenate(parts)
-
-
-def billboard(atlas: Atlas, generator: Generator) -> Mesh:
-    """An advertising panel facing -x."""
-    metal, art = _metal(atlas, generator), Material(atlas.pick("art", generator))
-    width, height, lift = generator.uniform(1.2, 4.0), generator.uniform(1.4, 2.6), generator.uniform(0.4, 2.5)
-    panel = box((0, 0, lift), (0.15, width, height), metal)
-    face = rectangle((-0.09, -0.48 * width, lift + 0.05), (0, 0.96 * width, 0), (0, 0, height - 0.1), art, unit_uv=True)
-    return concatenate([panel, face, box((0, 0, 0), (0.12, 0.12, lift), metal)])
-
-
 def rock(atlas: Atlas, generator: Generator) -> Mesh:
     """A boulder, or a log."""
     if generator.random() < 0.3:
@@ -195,3 +143,9 @@ def rock(atlas: Atlas, generator: Generator) -> Mesh:
     radii = generator.uniform(0.25, 0.8, 3) * (1.2, 1.0, 0.7)
     stone = Material(atlas.pick(str(generator.choice(["concrete", "soil"])), generator))
     return blob((0, 0, 0.3 * radii[2]), radii, stone, generator, 0.3, 5, 8)
+
+
+def cyclist(atlas: Atlas, generator: Generator) -> Mesh:
+    """Somebody riding a bicycle along x."""
+    rider = person(atlas, generator).placed((-0.1, 0.0, 0.35), scale=(1.0, 1.0, 0.85))
+    return concatenate([bicycle(atlas, generator), rider])

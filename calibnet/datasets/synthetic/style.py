@@ -28,7 +28,7 @@ class Style:
         kerb: its height.
         setback: between pavement and building fronts.
         buildings: share of plots built on; ``storeys`` their range; ``building`` their type.
-        parked, trees, bushes, furniture, people, fences: densities.
+        parked, trees, bushes, thickets, furniture, people, fences: densities.
         trees_set: prototypes that grow here.
         traffic: mean gap between moving vehicles in a lane, 0 for none.
         speed: of the other lanes' traffic, metres a second.
@@ -52,6 +52,7 @@ class Style:
     parked: float
     trees: float
     bushes: float
+    thickets: float
     furniture: float
     people: float
     fences: float
@@ -112,6 +113,7 @@ def sample_style(atlas: Atlas, generator: Generator) -> Style:
         trees={"street": uniform(0.0, 0.6), "suburb": uniform(0.2, 1.0), "highway": uniform(0.1, 1.0),
                "industrial": uniform(0.0, 0.5)}.get(kind, uniform(0.4, 1.0)),
         bushes=float(uniform(0.3, 1.0)) if wild else float(uniform(0.0, 0.5)),
+        thickets={"street": 0.0, "suburb": 0.3, "industrial": 0.3}.get(kind, uniform(0.2, 1.0)),
         furniture={"street": uniform(0.4, 1.0), "off-road": 0.03}.get(kind, uniform(0.2, 0.7)),
         people={"street": uniform(0.1, 0.9), "suburb": uniform(0.0, 0.4), "park": uniform(0.1, 0.8)}.get(kind, 0.05),
         fences={"suburb": uniform(0.2, 0.9), "industrial": uniform(0.3, 0.9), "park": 0.2}.get(kind, 0.08),

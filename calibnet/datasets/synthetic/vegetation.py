@@ -13,9 +13,13 @@ Generator = np.random.Generator
 
 def leaf_cloud(
     centers: NDArray[np.float64], radii: NDArray[np.float64], count: int, size: float, material: Material,
-    generator: Generator,
+    generator: Generator, detail: float = 1.0,
 ) -> Mesh:
-    """``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``."""
+    """``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``.
+
+    A ``detail`` below 1 takes fewer and larger leaves, for trees that are seen from afar.
+    """
+    count, size = int(count * detail), size / np.sqrt(detail)
     which = generator.integers(len(centers), size=count)
     direction = generator.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -26,7 +30,7 @@ def leaf_cloud(
     return triangles(corners, uv, material)
 
 
-def broadleaf(atlas: Atlas, generator: Generator) -> Mesh:
+def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A deciduous tree of 5 to 12 m."""
     height = generator.uniform(5.0, 12.0)
     stem = generator.uniform(0.25, 0.42) * height
@@ -35,8 +39,8 @@ def broadleaf(atlas: Atlas, generator: Generator) -> Mesh:
     thick = 0.018 * height + generator.uniform(0.04, 0.12)
     lean = generator.normal(0.0, 0.25, 2)
     fork = np.array([lean[0], lean[1], stem])
-    count = int(generator.integers(5, 9))
-    spread = 0.22 * height * generator.uniform(0.8, 1.2)
+    count = int(generator.integers(6, 11))
+    spread = 0.25 * height * generator.uniform(0.8, 1.2)
     centers = fork + np.stack(
         [
             generator.normal(0.0, 0.6 * spread, count),
@@ -45,17 +49,17 @@ def broadleaf(atlas: Atlas, generator: Generator) -> Mesh:
         ],
         axis=1,
     )
-    radii = generator.uniform(0.45, 0.8, (count, 1)) * spread * np.array([1.0, 1.0, 0.8])
+    radii = generator.uniform(0.5, 0.9, (count, 1)) * spread * np.array([1.0, 1.0, 0.8])
     parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
     parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
     parts += [
-        blob(center, 0.8 * radius, leaves, generator, 0.25, 5, 8) for center, radius in zip(centers, radii, strict=True)
+        blob(center, 0.85 * radius, leaves, generator, 0.25, 4, 7) for center, radius in zip(centers, radii, strict=True)
     ]
-    parts.append(leaf_cloud(centers, radii, 420, generator.uniform(0.16, 0.3), leaves, generator))
+    parts.append(leaf_cloud(centers, radii, 700, generator.uniform(0.14, 0.24), leaves, generator, detail))
     return concatenate(parts)
 
 
-def conifer(atlas: Atlas, generator: Generator) -> Mesh:
+def conifer(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A spruce or cypress: stacked cones with ragged edges."""
     height, radius = generator.uniform(4.0, 13.0), generator.uniform(0.9, 2.2)
     leaves = Material(atlas.pick("leaves", generator), (0.7, 0.85, 0.8), paint=True)
@@ -67,15 +71,15 @@ def conifer(atlas: Atlas, generator: Generator) -> Mesh:
         z = base + layer * step
         wide = radius * (1.0 - 0.85 * layer / layers)
         parts.append(cylinder((0, 0, z), (0, 0, z + 1.5 * step), (wide, 0.1 * wide), leaves, 9))
-    z = generator.uniform(0.0, 1.0, 260)
-    angle = generator.uniform(0.0, 2.0 * np.pi, 260)
-    reach = radius * (1.0 - 0.9 * z) * generator.uniform(0.8, 1.15, 260)
+    z = 1.0 - np.sqrt(generator.uniform(0.0, 1.0, 420))
+    angle = generator.uniform(0.0, 2.0 * np.pi, 420)
+    reach = radius * (1.0 - 0.9 * z) * generator.uniform(0.8, 1.15, 420)
     centers = np.stack([reach * np.cos(angle), reach * np.sin(angle), base + z * (height - base)], axis=1)
-    parts.append(leaf_cloud(centers, np.full((260, 3), 0.15), 260, 0.24, leaves, generator))
+    parts.append(leaf_cloud(centers, np.full((420, 3), 0.15), 420, 0.2, leaves, generator, detail))
     return concatenate(parts)
 
 
-def bare_tree(atlas: Atlas, generator: Generator) -> Mesh:
+def bare_tree(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A tree without leaves: branches of branches."""
     bark = Material(atlas.pick("bark", generator))
     height = generator.uniform(5.0, 9.0)
@@ -84,7 +88,7 @@ def bare_tree(atlas: Atlas, generator: Generator) -> Mesh:
     def grow(start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int) -> None:
         end = start + length * direction
         parts.append(cylinder(start, end, (radius, 0.6 * radius), bark, 5 if depth < 2 else 3))
-        if depth == 3:
+        if depth == (3 if detail == 1.0 else 2):
             return
         for _ in range(3):
             bent = direction + generator.normal(0.0, 0.45, 3)
@@ -94,19 +98,19 @@ def bare_tree(atlas: Atlas, generator: Generator) -> Mesh:
     return concatenate(parts)
 
 
-def bush(atlas: Atlas, generator: Generator) -> Mesh:
+def bush(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A shrub of about one metre."""
     leaves = Material(atlas.pick("leaves", generator), paint=True)
     count = int(generator.integers(2, 5))
     centers = np.column_stack([generator.normal(0.0, 0.5, (count, 2)), generator.uniform(0.3, 0.6, count)])
     radii = generator.uniform(0.4, 0.8, (count, 3))
     hulls = [blob(c, 0.85 * r, leaves, generator, 0.25, 5, 7) for c, r in zip(centers, radii, strict=True)]
-    return concatenate([*hulls, leaf_cloud(centers, radii, 130, 0.11, leaves, generator)])
+    return concatenate([*hulls, leaf_cloud(centers, radii, 170, 0.10, leaves, generator, detail)])
 
 
-def grass_tuft(atlas: Atlas, generator: Generator) -> Mesh:
+def grass_tuft(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """Tall grass: a fan of thin upright triangles."""
-    count = 46
+    count = int(46 * detail)
     foot = np.column_stack([generator.normal(0.0, 0.35, (count, 2)), np.full(count, -0.05)])
     tip = foot + np.column_stack([generator.normal(0.0, 0.15, (count, 2)), generator.uniform(0.2, 0.65, count)])
     width = 0.04 * generator.normal(size=(count, 3)) * (1.0, 1.0, 0.0)
@@ -114,12 +118,26 @@ def grass_tuft(atlas: Atlas, generator: Generator) -> Mesh:
     return triangles(np.stack([foot - width, foot + width, tip], axis=1), generator.uniform(0, 3, (count, 3, 2)), material)
 
 
-def hedge(atlas: Atlas, generator: Generator) -> Mesh:
+def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
+    """A wall of wild shrubs and young trees, 10 m long along x."""
+    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    count, height = 11, generator.uniform(1.5, 5.0)
+    centers = np.column_stack(
+        [np.linspace(-5, 5, count), generator.normal(0.0, 0.6, count), height * generator.uniform(0.25, 0.55, count)]
+    )
+    radii = np.column_stack(
+        [generator.uniform(0.8, 1.5, (count, 2)), np.maximum(centers[:, 2] * generator.uniform(0.9, 1.2, count), 0.4)]
+    )
+    hulls = [blob(c, 0.88 * r, leaves, generator, 0.25, 5, 7) for c, r in zip(centers, radii, strict=True)]
+    return concatenate([*hulls, leaf_cloud(centers, radii, 900, generator.uniform(0.12, 0.2), leaves, generator, detail)])
+
+
+def hedge(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A clipped hedge, 4 m long along x."""
     height, depth = generator.uniform(0.8, 2.0), generator.uniform(0.5, 0.9)
     leaves = Material(atlas.pick("leaves", generator), paint=True)
     hull = box((0, 0, 0), (4.0, depth, height), leaves)
-    count = 320
+    count = int(320 * detail)
     spot = np.column_stack(
         [generator.uniform(-2, 2, count), generator.choice([-0.5, 0.5], count) * depth, generator.uniform(0, height, count)]
     )

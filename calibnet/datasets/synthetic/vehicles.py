@@ -47,6 +47,13 @@ def _wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: f
     return concatenate(parts)
 
 
+def contact_shadow(atlas: Atlas, length: float, half_width: float) -> Mesh:
+    """The dark ground under a vehicle, where no skylight reaches."""
+    dark = Material(atlas.groups["asphalt"][0], (0.25, 0.25, 0.25))
+    origin = (-0.49 * length, -0.97 * half_width, 0.035)
+    return rectangle(origin, (0.98 * length, 0, 0), (0, 1.94 * half_width, 0), dark)
+
+
 def _lamps_and_plates(atlas: Atlas, length: float, half_width: float, height: float, generator: Generator) -> Mesh:
     lamp, paint = atlas.pick("lamp", generator), atlas.pick("paint", generator)
     parts = []
@@ -115,6 +122,7 @@ def car(atlas: Atlas, generator: Generator) -> Mesh:
         _wheels(atlas, (front - 0.19 * length, rear + 0.19 * length), half, generator.uniform(0.30, 0.36), generator),
         _lamps_and_plates(atlas, length, half, clearance + 0.38, generator),
         box((0, 0, 0.10), (0.8 * length, 1.5 * half, clearance), trim),
+        contact_shadow(atlas, length, half),
     ]
     for side in (-1.0, 1.0):
         parts.append(box((x0 - 0.15, side * (half + 0.08), belt), (0.12, 0.18, 0.14), paint))
@@ -152,6 +160,7 @@ def van(atlas: Atlas, generator: Generator) -> Mesh:
             parts.append(rectangle((rear + 0.3, y, 0.8), (length - 2.6, 0, 0), (0, 0, height - 1.4), art, unit_uv=True))
     parts.append(rectangle((rear - 0.01, -0.7 * half, 1.2), (0, 1.4 * half, 0), (0, 0, 0.5), glass))
     parts.append(_wheels(atlas, (front - 0.9, rear + 0.95), half, 0.34, generator))
+    parts.append(contact_shadow(atlas, length, half))
     parts.append(_lamps_and_plates(atlas, length, half, 0.75, generator))
     return concatenate(parts)
 
@@ -165,7 +174,10 @@ def lorry(atlas: Atlas, generator: Generator) -> Mesh:
     cab = Material(atlas.pick("metal", generator), gloss=0.35, reflectance=0.9, paint=True)
     glass = Material(atlas.pick("glass", generator), gloss=0.9)
     dark = Material(atlas.pick("black", generator))
-    parts = [_wheels(atlas, (front - 1.3, rear + 1.4, rear + 2.5), half - 0.02, 0.48, generator)]
+    parts = [
+        _wheels(atlas, (front - 1.3, rear + 1.4, rear + 2.5), half - 0.02, 0.48, generator),
+        contact_shadow(atlas, length, half),
+    ]
     if bus:
         parts.append(loft([_ring(front, 1.15, 0.4, height - 0.1, 0.95), _ring(front - 0.3, half, 0.35, height, 0.96),
                            _ring(rear, half, 0.35, height, 0.96)], cab))
@@ -185,6 +197,11 @@ def lorry(atlas: Atlas, generator: Generator) -> Mesh:
             parts.append(rectangle((front - 1.3, side * 1.16, 1.5), (0.9, 0, 0), (0, 0, 0.75), glass))
         load = Material(atlas.pick(str(generator.choice(["plain", "metal", "planks"])), generator), paint=True)
         body = length - 2.3
+        if generator.random() < 0.2:
+            tank = Material(load.texture, (0.8, 0.8, 0.82), 0.3)
+            ends = [(rear, 0, 0.5 * height + 0.5), (rear + body - 0.3, 0, 0.5 * height + 0.5)]
+            parts += [cylinder(*ends, 0.5 * height - 0.5, tank, 16), box((rear + 0.5 * body, 0, 0.6), (body, 1.0, 0.5), dark)]
+            return concatenate([*parts, _lamps_and_plates(atlas, length + 0.02, 1.2, 0.85, generator)])
         parts.append(box((rear + 0.5 * body, 0, 0.95), (body, 2 * half, height - 0.95), load))
         parts.append(box((rear + 0.5 * body, 0, 0.6), (body, 1.0, 0.4), dark))
         if generator.random() < 0.7:

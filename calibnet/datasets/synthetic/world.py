@@ -52,7 +52,7 @@ class Scene:
     rail: Mesh
     outer_rails: bool
     park_on_pavement: bool
-    _chunks: OrderedDict[int, Mesh] = field(default_factory=OrderedDict, repr=False)
+    _chunks: OrderedDict[tuple[int, bool], Mesh] = field(default_factory=OrderedDict, repr=False)
 
     def lift(self, lateral: float) -> float:
         """Height of the smooth ground above the centre line."""
@@ -77,17 +77,19 @@ class Scene:
         """Everything around a vehicle at a time, as triangles in the world."""
         station = self.line.nearest_station(world_from_vehicle[:3, 3])
         first, last = int((station - behind) // CHUNK), int((station + ahead) // CHUNK)
-        parts = [self._chunk(index) for index in range(first, last + 1)]
+        here = int(station // CHUNK)
+        parts = [self._chunk(index, abs(index - here) <= 1) for index in range(first, last + 1)]
         parts += _traffic(self, station, time, behind, ahead, world_from_vehicle[:3, 3])
         parts.append(_horizon(self, world_from_vehicle[:3, 3]))
         return concatenate(parts)
 
-    def _chunk(self, index: int) -> Mesh:
-        if index not in self._chunks:
-            self._chunks[index] = populate(self, index)
-            while len(self._chunks) > 16:
+    def _chunk(self, index: int, near: bool) -> Mesh:
+        key = (index, near)
+        if key not in self._chunks:
+            self._chunks[key] = populate(self, index, near)
+            while len(self._chunks) > 24:
                 self._chunks.popitem(last=False)
-        return self._chunks[index]
+        return self._chunks[key]
 
 
 def build_scene(generator: Generator, length: float = 400.0) -> Scene:
