@@ -80,9 +80,10 @@ def camera_folder(parent: Path, prefix: str, camera: int) -> Path:
     """
     folder = parent / f"{prefix}{camera}"
     if camera not in range(4) or not folder.is_dir():
-        present = sorted({path.name[-1] for path in parent.glob(f"{prefix}[0-3]") if path.is_dir()})
+        present = ", ".join(sorted(path.name[-1] for path in parent.glob(f"{prefix}[0-3]") if path.is_dir()))
         raise DatasetError(
-            f"{folder} does not exist, there is no camera {camera}; cameras there: {', '.join(present) or 'none'}."
+            f"{folder} does not exist, there is no camera {camera}; "
+            f"cameras there: {present or 'none, unpack the images'}."
         )
     return folder
 
