@@ -1,0 +1,1 @@
+"""One stage's network: one module per box of the paper's figure."""

@@ -1,0 +1,153 @@
+"""Aggregation of the cost volumes by a 3-D hourglass that fuses the scales (paper section 3.3).
+
+A window of radius ``r`` means ``r`` cells at every scale, so the window of a coarse scale is twice
+as wide in pixels as that of the next finer one. On the way down every second displacement of the
+fine window lands in the centre of the coarse one, on the way up that centre is interpolated back:
+scales are fused where they speak of the same displacement.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from calibnet.network.config import NetworkConfig
+
+
+class WindowConv(nn.Module):
+    """3-D convolution over one axis of the displacement window and over space.
+
+    The depth ``D`` is the flattened window. The axis that is not convolved is put into the batch, so
+    that the end of one row of the window does not leak into the start of the next, as it would in a
+    plain 3-D convolution over ``D``.
+    """
+
+    def __init__(self, channels: int, window: int, axis: str) -> None:
+        super().__init__()
+        self.window, self.along_x = window, axis == "x"
+        self.conv = nn.Conv3d(channels, channels, 3, padding=1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """``[B, C, D, h, w] -> [B, C, D, h, w]``."""
+        batch, channels, _, height, width = x.shape
+        rows = x.permute(0, 2, 3, 4, 1).reshape(batch, self.window, self.window, height, width, channels)
+        if not self.along_x:
+            rows = rows.transpose(1, 2)
+        rows = rows.reshape(-1, self.window, height, width, channels)  # memory stays channels last
+        y = self.conv(rows.permute(0, 4, 1, 2, 3)).permute(0, 2, 3, 4, 1)
+        y = y.reshape(batch, self.window, self.window, height, width, channels)
+        if not self.along_x:
+            y = y.transpose(1, 2)
+        return y.reshape(batch, -1, height, width, channels).permute(0, 4, 1, 2, 3)
+
+
+class VolumeBlock(nn.Module):
+    """A convolution along x, one along y, and a skip: ``[B, C, D, h, w] -> [B, C, D, h, w]``.
+
+    Without normalisation: cosines are well scaled, and its backward pass costs as much as the
+    convolutions.
+    """
+
+    def __init__(self, channels: int, window: int) -> None:
+        super().__init__()
+        self.x, self.y = WindowConv(channels, window, "x"), WindowConv(channels, window, "y")
+
+    def forward(self, volume: Tensor) -> Tensor:
+        """``[B, C, D, h, w] -> [B, C, D, h, w]``."""
+        return (volume + self.y(self.x(volume).relu())).relu()
+
+
+def coarsen_window(volume: Tensor, window: int) -> Tensor:
+    """Place a fine volume's displacements in the coarse window: ``[B, C, D, h, w] -> [B, C, D, h, w]``."""
+    batch, channels, _, height, width = volume.shape
+    picked = volume.unflatten(2, (window, window))[:, :, ::2, ::2]
+    margin = (window - picked.shape[2]) // 2
+    padded = F.pad(picked.flatten(3), (0, 0, margin, margin)).unflatten(3, (-1, height, width))
+    padded = F.pad(padded.flatten(4), (0, 0, margin, margin))
+    return padded.reshape(batch, channels, window * window, height, width)
+
+
+@lru_cache(maxsize=8)
+def refinement(window: int) -> Tensor:
+    """Linear map ``[window, window]`` that samples a coarse window's centre at half-cell steps."""
+    radius = window // 2
+    position = torch.arange(-radius, radius + 1) / 2 + radius
+    return (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
+
+
+def refine_window(volume: Tensor, window: int) -> Tensor:
+    """Interpolate the centre of a coarse volume's window to the fine one; space is left as it is."""
+    along = refinement(window).to(volume)
+    both = torch.einsum("ia,jb->ijab", along, along).reshape(window * window, window * window)
+    return torch.einsum("de,bcehw->bcdhw", both, volume)
+
+
+class Hourglass(nn.Module):
+    """Down through the scales and up again, with a skip at each."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        channels, window = config.volume_channels, config.window
+        self.window, self.fuse = window, config.hierarchical_fusion
+        scales = len(config.volume_scales)
+
+        def stack(count: int) -> nn.Sequential:
+            return nn.Sequential(*(VolumeBlock(channels, window) for _ in range(count)))
+
+        # the finest scale holds nearly all the work: it is convolved only on the way up
+        self.down_blocks = nn.ModuleList(stack(config.hourglass_blocks if scale else 0) for scale in range(scales))
+        self.up_blocks = nn.ModuleList(stack(config.hourglass_blocks) for _ in range(scales))
+        if self.fuse:
+            self.down = nn.ModuleList(
+                nn.Conv3d(channels, channels, (1, 3, 3), (1, 2, 2), (0, 1, 1)) for _ in range(scales - 1)
+            )
+            self.up = nn.ModuleList(nn.Conv3d(channels, channels, 1) for _ in range(scales - 1))
+
+    def forward(self, volumes: list[Tensor]) -> list[Tensor]:
+        """Volumes ``[B, C, D, h_s, w_s]``, fine to coarse, to the same shapes."""
+        entered: list[Tensor] = []
+        for scale, volume in enumerate(volumes):
+            if scale and self.fuse:
+                volume = volume + coarsen_window(self.down[scale - 1](entered[-1]), self.window)
+            entered.append(self.down_blocks[scale](volume))
+        left: list[Tensor] = []
+        for scale in reversed(range(len(volumes))):
+            volume = entered[scale]
+            if left and self.fuse:
+                finer = refine_window(self.up[scale](left[0]), self.window)
+                volume = volume + F.interpolate(finer, scale_factor=(1, 2, 2), mode="nearest")
+            left.insert(0, self.up_blocks[scale](volume))
+        return left
+
+
+class Aggregation(nn.Module):
+    """Volumes of all scales to aggregated volumes and matching scores."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        inputs = config.groups + 2 * config.concat_channels
+        channels = config.volume_channels
+        scales = config.volume_scales
+        self.enter = nn.ModuleList(
+            nn.Sequential(nn.Conv3d(inputs, channels, 1), nn.ReLU(inplace=True)) for _ in scales
+        )
+        count = config.hourglasses if config.aggregation else 0
+        self.hourglasses = nn.ModuleList(Hourglass(config) for _ in range(count))
+        self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for _ in scales)
+
+    def forward(self, volumes: list[Tensor]) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+        """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]``, fine to coarse.
+
+        Returns:
+            Activations before and after the hourglass, ``[B, C, D, h_s, w_s]``, and logits
+            ``[B, D, h_s, w_s]`` over the window.
+        """
+        before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]
+        after = before
+        for hourglass in self.hourglasses:
+            after = hourglass(after)
+        logits = [score(volume).squeeze(1) for score, volume in zip(self.score, after, strict=True)]
+        return before, after, logits

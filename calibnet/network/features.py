@@ -1,0 +1,100 @@
+"""Multi-scale features of the image and of the LiDAR depth (paper section 3.1): a U-Net pyramid."""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from calibnet.network.config import NetworkConfig
+from calibnet.network.layers import ConvBlock, ResidualBlock
+
+IMAGE_CHANNELS = 3
+LIDAR_CHANNELS = 6
+
+
+def image_channels(image: Tensor) -> Tensor:
+    """RGB 0..255 ``[B, 3, H, W]`` (any dtype) to about zero mean and unit variance."""
+    return (image.float() - 110.0) / 65.0
+
+
+def lidar_channels(lidar: Tensor) -> Tensor:
+    """Sparse depth (metres, 0 = empty) and intensity ``[B, 2, H, W]`` to network input ``[B, 6, H, W]``.
+
+    Inverse depth is nearly linear in the pixel shift that a translation causes. The two dilated
+    copies (nearest wins) make 16 beams look more like 64, so that one network serves both.
+    """
+    depth, intensity = lidar[:, :1].float(), lidar[:, 1:].float()
+    occupied = (depth > 0).float()
+    inverse = occupied * (4.0 / depth.clamp(min=1.0))
+    logarithm = occupied * (depth.clamp(min=1.0).log() * 0.5 - 1.0)
+    near = F.max_pool2d(inverse, (5, 3), 1, (2, 1))
+    wide = F.max_pool2d(near, (7, 5), 1, (3, 2))
+    return torch.cat([inverse, logarithm, occupied, intensity * occupied, near, wide], dim=1)
+
+
+class Trunk(nn.Module):
+    """Encoder from 1/2 to 1/32 and decoder back to the finest scale of the cost volumes."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        norm, widths = config.normalization, config.widths
+        self.encoder = nn.ModuleList(
+            nn.Sequential(
+                *([ConvBlock(widths[level - 1], width, norm, stride=2)] if level else []),
+                *(ResidualBlock(width, norm) for _ in range(blocks)),
+            )
+            for level, (width, blocks) in enumerate(zip(widths, config.blocks, strict=True))
+        )
+        channels = config.feature_channels
+        strides = [2 ** (level + 1) for level in range(len(widths))]
+        self.levels = [strides.index(scale) for scale in config.scales]
+        if config.multi_scale_features:
+            self.lateral = nn.ModuleList(nn.Conv2d(widths[level], channels, 1) for level in self.levels)
+            self.smooth = nn.ModuleList(ConvBlock(channels, channels, norm) for _ in self.levels)
+        else:
+            self.lateral = nn.ModuleList([nn.Conv2d(widths[self.levels[0]], channels, 1)])
+        self.project = nn.ModuleList(nn.Conv2d(channels, channels, 1) for _ in self.levels)
+
+    def forward(self, x: Tensor) -> list[Tensor]:
+        """``[B, widths[0], H/2, W/2]`` to features ``[B, C, H/s, W/s]``, one per scale, fine to coarse."""
+        encoded = []
+        last = self.levels[-1] if self.config.multi_scale_features else self.levels[0]
+        for stage in self.encoder[: last + 1]:
+            x = stage(x)
+            encoded.append(x)
+        if not self.config.multi_scale_features:
+            finest = self.lateral[0](encoded[self.levels[0]])
+            return [
+                project(F.avg_pool2d(finest, 2**power) if power else finest)
+                for power, project in enumerate(self.project)
+            ]
+        features: list[Tensor] = []
+        for position in reversed(range(len(self.levels))):
+            merged = self.lateral[position](encoded[self.levels[position]])
+            if features:
+                merged = merged + F.interpolate(features[0], scale_factor=2.0, mode="nearest")
+            features.insert(0, self.smooth[position](merged))
+        return [project(feature) for project, feature in zip(self.project, features, strict=True)]
+
+
+class FeatureExtractor(nn.Module):
+    """Stems for the two inputs and the trunk, one or two of it."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.image_stem = ConvBlock(IMAGE_CHANNELS, config.widths[0], config.normalization, stride=2)
+        self.lidar_stem = ConvBlock(LIDAR_CHANNELS, config.widths[0], config.normalization, stride=2)
+        self.image_trunk = Trunk(config)
+        self.lidar_trunk = self.image_trunk if config.share_extractor else Trunk(config)
+
+    def image(self, image: Tensor) -> list[Tensor]:
+        """RGB 0..255 ``[B, 3, H, W]`` to features ``[B, C, H/s, W/s]``, fine to coarse."""
+        x = image_channels(image).contiguous(memory_format=torch.channels_last)
+        return self.image_trunk(self.image_stem(x))
+
+    def lidar(self, lidar: Tensor) -> list[Tensor]:
+        """Depth and intensity ``[B, 2, H, W]`` to features ``[B, C, H/s, W/s]``, fine to coarse."""
+        x = lidar_channels(lidar).contiguous(memory_format=torch.channels_last)
+        return self.lidar_trunk(self.lidar_stem(x))

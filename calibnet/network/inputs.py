@@ -1,0 +1,65 @@
+"""From a frame and an extrinsic to the network's input; one place for training and inference."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import PinholeCamera, project
+from calibnet.geometry.projection import nearest_per_cell
+from calibnet.geometry.se3 import Matrix, transform_points
+
+
+class LidarInput(NamedTuple):
+    """A scan as the network sees it under one extrinsic.
+
+    Attributes:
+        image: ``[2, H, W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1.
+        cells: per scale, fine to coarse, ``[3, H/s, W/s]`` float32: the nearest point of each cell in
+            the camera frame, zeros where there is none.
+    """
+
+    image: NDArray[np.float32]
+    cells: list[NDArray[np.float32]]
+
+
+def input_camera(camera: PinholeCamera, height: int, width: int, coarsest: int) -> PinholeCamera:
+    """The camera of the resized image: the area of ``height`` x ``width``, the frame's own aspect.
+
+    Both sides are rounded to multiples of the coarsest stride, so the two focal lengths may scale by
+    slightly different factors.
+    """
+    scale = (height * width / (camera.height * camera.width)) ** 0.5
+    rows = max(1, round(camera.height * scale / coarsest)) * coarsest
+    columns = max(1, round(camera.width * scale / coarsest)) * coarsest
+    return camera.resized(columns, rows)
+
+
+def resize_image(image: NDArray[np.uint8], camera: PinholeCamera) -> NDArray[np.uint8]:
+    """Resize ``[H, W, 3]`` to the size of ``camera``; averaging, as fine texture would alias."""
+    import cv2
+
+    size = (camera.width, camera.height)
+    shrinks = camera.width <= image.shape[1] and camera.height <= image.shape[0]
+    return cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+
+
+def lidar_input(
+    points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera, scales: tuple[int, ...]
+) -> LidarInput:
+    """Project a scan ``[N, 4]`` and find the nearest point of each pixel and of each cell."""
+    projection = project(points, camera_from_lidar, camera)
+    # a last row of zeros, which the index -1 of empty cells picks
+    depth = np.append(projection.depth, np.float32(0))
+    intensity = np.append(points[projection.index, 3], np.float32(0))
+    in_camera = transform_points(camera_from_lidar, points[projection.index, :3])
+    in_camera = np.concatenate([in_camera, np.zeros((1, 3), np.float32)])
+    pixel = nearest_per_cell(projection, camera)
+    image = np.stack([depth[pixel], intensity[pixel]]).astype(np.float32)
+    cells = [
+        np.ascontiguousarray(in_camera[nearest_per_cell(projection, camera, scale)].transpose(2, 0, 1))
+        for scale in scales
+    ]
+    return LidarInput(image, cells)

@@ -1,0 +1,107 @@
+"""One stage's network, top to bottom as in the paper's figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from torch import Tensor, nn
+
+from calibnet.geometry import MiscalibrationRange
+from calibnet.network.aggregation import Aggregation
+from calibnet.network.config import NetworkConfig
+from calibnet.network.cost_volume import CostVolume
+from calibnet.network.displacement import DisplacementDecoder, DisplacementField
+from calibnet.network.features import FeatureExtractor
+from calibnet.network.layers import channels_last
+from calibnet.network.pose import HEADS, Pose
+
+
+class NetworkInputs(NamedTuple):
+    """A batch of frames under their initial extrinsics, at the network's input size.
+
+    Attributes:
+        image: ``[B, 3, H, W]`` RGB 0..255, any dtype.
+        lidar: ``[B, 2, H, W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1.
+        intrinsics: ``[B, 3, 3]`` float32.
+        cells: per scale, fine to coarse, ``[B, 3, H/s, W/s]`` float32: the nearest LiDAR point of
+            each cell in the camera frame, zeros where there is none.
+    """
+
+    image: Tensor
+    lidar: Tensor
+    intrinsics: Tensor
+    cells: list[Tensor]
+
+
+class Activations(NamedTuple):
+    """The volumes around the hourglass, ``[B, C, D, h_s, w_s]`` per scale; kept only when asked for."""
+
+    before: list[Tensor]
+    after: list[Tensor]
+
+
+class NetworkOutput(NamedTuple):
+    """What one stage says of a batch.
+
+    Attributes:
+        pose: the correction.
+        field: the displacement field it was read from.
+        scores: per scale the raw matching score ``[B, D, h_s, w_s]``, a cosine.
+        logits: per scale the aggregated score ``[B, D, h_s, w_s]``, a softmax away from a probability.
+        activations: only when asked for.
+    """
+
+    pose: Pose
+    field: DisplacementField
+    scores: list[Tensor]
+    logits: list[Tensor]
+    activations: Activations | None
+
+
+def no_clock(part: str) -> None:
+    """Time nothing."""
+
+
+class CalibrationNetwork(nn.Module):
+    """Features, cost volumes, 3-D hourglass, displacement field, pose."""
+
+    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+        super().__init__()
+        self.config, self.bounds = config, bounds
+        self.features = FeatureExtractor(config)
+        self.cost_volumes = nn.ModuleList(CostVolume(config) for _ in config.volume_scales)
+        self.aggregation = Aggregation(config)
+        self.displacement = DisplacementDecoder(config)
+        self.pose = HEADS[config.head](config, bounds)
+        channels_last(self)
+
+    def forward(
+        self,
+        inputs: NetworkInputs,
+        image_features: list[Tensor] | None = None,
+        keep_activations: bool = False,
+        clock: Callable[[str], None] = no_clock,
+    ) -> NetworkOutput:
+        """Estimate the correction of a batch.
+
+        Args:
+            inputs: see `NetworkInputs`.
+            image_features: of an earlier call on the same image, to save the image branch.
+            keep_activations: keep the volumes around the hourglass for the inspector.
+            clock: called with the name of each part when it is done.
+        """
+        if image_features is None:
+            image_features = self.features.image(inputs.image)
+            clock("image_features")
+        lidar_features = self.features.lidar(inputs.lidar)
+        clock("lidar_features")
+        pairs = zip(self.cost_volumes, lidar_features, image_features, strict=False)
+        volumes, scores = map(list, zip(*(build(lidar, image) for build, lidar, image in pairs), strict=True))
+        clock("cost_volumes")
+        before, after, logits = self.aggregation(volumes)
+        clock("hourglass")
+        field = self.displacement(logits, lidar_features[0], inputs.cells[0])
+        pose = self.pose(field, inputs.cells[0], inputs.intrinsics)
+        clock("pose")
+        return NetworkOutput(pose, field, scores, logits, Activations(before, after) if keep_activations else None)

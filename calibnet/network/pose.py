@@ -1,0 +1,176 @@
+"""Pose estimation (paper section 3.4): two heads with one interface.
+
+`RegressionHead` is the paper's: translation and unit quaternion from the volume. `GeometricHead`
+solves a weighted perspective-n-point problem with the displacement field, so that the camera's
+intrinsics and the scan's depths enter as what they are instead of being learned for one rig.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from calibnet.geometry import MiscalibrationRange
+from calibnet.network.config import NetworkConfig
+from calibnet.network.displacement import DisplacementField
+from calibnet.network.layers import ConvBlock
+
+MINIMUM_DEPTH = 0.1
+
+
+class Pose(NamedTuple):
+    """Estimated correction: ``after = correction @ before``.
+
+    Attributes:
+        correction: ``[B, 4, 4]`` float32, in the camera frame.
+        information: ``[B, 6, 6]`` float32, inverse covariance of ``(translation m, rotation rad)``
+            as the head believes it; None for heads that do not say.
+    """
+
+    correction: Tensor
+    information: Tensor | None
+
+
+def skew(vector: Tensor) -> Tensor:
+    """``[..., 3]`` to the matrices ``[..., 3, 3]`` of the cross product."""
+    x, y, z = vector.unbind(-1)
+    zero = torch.zeros_like(x)
+    return torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=-1).unflatten(-1, (3, 3))
+
+
+def rotation_from_vector(vector: Tensor) -> Tensor:
+    """Rodrigues: rotation vectors ``[B, 3]`` in radians to ``[B, 3, 3]``; smooth at zero."""
+    return torch.linalg.matrix_exp(skew(vector))
+
+
+def rotation_from_quaternion(quaternion: Tensor) -> Tensor:
+    """Quaternions ``[B, 4]`` (w, x, y, z; normalised here) to ``[B, 3, 3]``."""
+    w, x, y, z = F.normalize(quaternion, dim=-1).unbind(-1)
+    rows = [
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ]  # fmt: skip
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+
+
+def rigid(rotation: Tensor, translation: Tensor) -> Tensor:
+    """``[B, 3, 3]`` and ``[B, 3]`` to ``[B, 4, 4]``."""
+    top = torch.cat([rotation, translation[..., None]], dim=-1)
+    bottom = top.new_tensor([0.0, 0.0, 0.0, 1.0]).expand(len(top), 1, 4)
+    return torch.cat([top, bottom], dim=1)
+
+
+def project_points(points: Tensor, intrinsics: Tensor) -> Tensor:
+    """Camera-frame points ``[B, N, 3]`` to pixels ``[B, N, 2]``; depth is clamped to 0.1 m."""
+    homogeneous = points @ intrinsics.transpose(1, 2)
+    return homogeneous[..., :2] / points[..., 2:].clamp(min=MINIMUM_DEPTH)
+
+
+class RegressionHead(nn.Module):
+    """Translation and unit quaternion from pooled features (the paper's head)."""
+
+    POOLED = (4, 8)
+
+    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+        super().__init__()
+        width, norm = config.context_channels, config.normalization
+        self.bounds = bounds
+        self.reduce = nn.Sequential(ConvBlock(width + 5, width, norm, stride=2), ConvBlock(width, width, norm))
+        cells = self.POOLED[0] * self.POOLED[1]
+        self.hidden = nn.Sequential(nn.Linear(width * cells, 256), nn.ReLU(inplace=True))
+        self.translation, self.quaternion = nn.Linear(256, 3), nn.Linear(256, 4)
+
+    def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
+        """Estimate the correction from the field and the cells' points ``[B, 3, h, w]``."""
+        inverse = 4.0 / cells[:, 2:].clamp(min=1.0) * (cells[:, 2:] > 0)
+        inputs = torch.cat([field.features, field.displacement / 32.0, field.log_scale, inverse], dim=1)
+        pooled = F.adaptive_avg_pool2d(self.reduce(inputs.contiguous(memory_format=torch.channels_last)), self.POOLED)
+        hidden = self.hidden(pooled.flatten(1))
+        translation = self.translation(hidden).float() * self.bounds.translation_m
+        half_angle = torch.deg2rad(torch.tensor(self.bounds.rotation_deg / 2))
+        vector = self.quaternion(hidden).float()
+        quaternion = torch.cat([torch.ones_like(vector[:, :1]) + 0.1 * vector[:, :1], vector[:, 1:] * half_angle], dim=1)
+        return Pose(rigid(rotation_from_quaternion(quaternion), translation), None)
+
+
+class GeometricHead(nn.Module):
+    """Weighted Gauss-Newton perspective-n-point over the cells of the finest scale.
+
+    The residuals' weights come from the field's own uncertainty, softened for large residuals as a
+    Laplace likelihood wants; the range the stage was trained for enters as a weak prior, which keeps
+    translation bounded where a scene does not constrain it.
+    """
+
+    ITERATIONS = 5
+
+    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+        super().__init__()
+        sigma = [bounds.translation_m / 3**0.5] * 3 + [float(torch.deg2rad(torch.tensor(bounds.rotation_deg))) / 3**0.5] * 3
+        self.register_buffer("prior", torch.tensor(sigma).clamp(min=1e-4) ** -2, persistent=False)
+
+    def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
+        """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""
+        with torch.autocast(cells.device.type, enabled=False):
+            points = cells.flatten(2).transpose(1, 2)
+            scale = field.log_scale.float().flatten(2).transpose(1, 2).exp()
+            target = project_points(points, intrinsics) + field.displacement.float().flatten(2).transpose(1, 2)
+            return self.solve(points, target, scale, intrinsics)
+
+    def solve(self, points: Tensor, target: Tensor, scale: Tensor, intrinsics: Tensor) -> Pose:
+        """Move ``points [B, N, 3]`` so that they project to ``target [B, N, 2]``.
+
+        Args:
+            points: in the camera frame before the correction; those with depth 0 are ignored.
+            target: pixels.
+            scale: ``[B, N, 2]`` expected absolute error of each target coordinate, pixels.
+            intrinsics: ``[B, 3, 3]``.
+        """
+        occupied = (points[..., 2:] > 0).float()
+        rotation = torch.eye(3, device=points.device).expand(len(points), 3, 3)
+        translation = torch.zeros(len(points), 3, device=points.device)
+        prior = torch.diag(self.prior)
+        information = prior.expand(len(points), 6, 6)
+        for _ in range(self.ITERATIONS):
+            moved = points @ rotation.transpose(1, 2) + translation[:, None]
+            residual = target - project_points(moved, intrinsics)
+            weight = occupied / (scale * torch.sqrt(scale**2 + residual.detach() ** 2))
+            jacobian = projection_jacobian(moved, intrinsics)  # [B, N, 2, 6]
+            weighted = jacobian * weight[..., None]
+            normal = torch.einsum("bnci,bncj->bij", weighted, jacobian)
+            gradient = torch.einsum("bnci,bnc->bi", weighted, residual)
+            gradient = gradient - self.prior * torch.cat([translation, rotation_vector(rotation)], dim=-1)
+            information = normal + prior
+            step = torch.linalg.solve(information, gradient)
+            turn = rotation_from_vector(step[:, 3:])
+            rotation = turn @ rotation
+            translation = (turn @ translation[..., None])[..., 0] + step[:, :3]
+        return Pose(rigid(rotation, translation), information)
+
+
+def rotation_vector(rotation: Tensor) -> Tensor:
+    """Small-angle rotation vector ``[B, 3]`` of ``[B, 3, 3]`` (exact to third order: enough for a prior)."""
+    difference = rotation - rotation.transpose(1, 2)
+    return 0.5 * torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)
+
+
+def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
+    """Derivative ``[B, N, 2, 6]`` of the pixel by a left perturbation ``(translation, rotation)``."""
+    x, y, depth = points.unbind(-1)
+    inverse = 1.0 / depth.clamp(min=MINIMUM_DEPTH)
+    fx, fy = intrinsics[:, None, 0, 0], intrinsics[:, None, 1, 1]
+    zero = torch.zeros_like(x)
+    du = torch.stack([fx * inverse, zero, -fx * x * inverse**2], dim=-1)
+    dv = torch.stack([zero, fy * inverse, -fy * y * inverse**2], dim=-1)
+    by_point = torch.stack([du, dv], dim=-2)  # [B, N, 2, 3]
+    return torch.cat([by_point, -by_point @ skew(points)], dim=-1)
+
+
+HEADS: dict[str, type[RegressionHead] | type[GeometricHead]] = {
+    "regression": RegressionHead,
+    "geometric": GeometricHead,
+}
+"""Pose heads by the name a preset uses; a new head is a class with the same `forward` and a line here."""

@@ -1,0 +1,114 @@
+"""Augmentations that vary the rig and the weather, and not only the view (DESIGN.md, prototype, 7).
+
+Real frames come from few rigs. A mirrored image, a camera turned about its centre, another lens and
+fewer beams are all exact: the same scene as another rig would have seen it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
+from calibnet.network.inputs import resize_image
+
+Generator = np.random.Generator
+
+
+def mirror(frame: Frame) -> Frame:
+    """The frame in a mirror: left and right swapped in image and scan."""
+    camera = frame.camera
+    matrix = camera.matrix.copy()
+    matrix[0, 2] = camera.width - 1 - matrix[0, 2]
+    flip_camera, flip_lidar = np.diag([-1.0, 1, 1, 1]), np.diag([1.0, -1, 1, 1])
+    return replace(
+        frame,
+        image=np.ascontiguousarray(frame.image[:, ::-1]),
+        points=frame.points * np.array([1, -1, 1, 1], np.float32),
+        camera=PinholeCamera(camera.width, camera.height, matrix),
+        camera_from_lidar=flip_camera @ frame.camera_from_lidar @ flip_lidar,
+    )
+
+
+def virtual_camera(frame: Frame, height: int, width: int, generator: Generator) -> Frame:
+    """The frame as seen by a turned camera with another lens, at the network's input size.
+
+    One homography ``K' R K^-1``: turning a camera about its centre and changing its lens moves no
+    parallax, so the picture and the new extrinsic ``R @ camera_from_lidar`` are exact.
+    """
+    import cv2
+
+    zoom = np.exp(generator.uniform(np.log(0.85), np.log(1.5)))
+    scale = max(width / frame.camera.width, height / frame.camera.height) * zoom
+    # averaging down first: the warp only interpolates, and would alias
+    near = frame.camera.resized(round(frame.camera.width * scale), round(frame.camera.height * scale))
+    image = resize_image(frame.image, near)
+    slack_x, slack_y = width - near.width, height - near.height
+    left, top = generator.uniform(min(slack_x, 0), max(slack_x, 0)), generator.uniform(min(slack_y, 0), max(slack_y, 0))
+    matrix = near.matrix.copy()
+    matrix[0] *= generator.uniform(0.96, 1.04)
+    matrix[:2, 2] += left, top
+    turn = np.eye(3)
+    if generator.random() < 0.7:
+        turn = rotation_from_euler_xyz(np.radians(generator.normal(0.0, (2.0, 3.0, 2.0)).clip(-8, 8)))
+    homography = matrix @ turn @ np.linalg.inv(near.matrix)
+    warped = cv2.warpPerspective(image, homography, (width, height), flags=cv2.INTER_LINEAR)
+    return replace(
+        frame,
+        image=warped,
+        camera=PinholeCamera(width, height, matrix),
+        camera_from_lidar=transform(turn, np.zeros(3)) @ frame.camera_from_lidar,
+    )
+
+
+def thin_scan(points: NDArray[np.float32], generator: Generator) -> NDArray[np.float32]:
+    """Fewer beams, fewer points, another range, noise and another response of the receiver."""
+    keep = np.ones(len(points), bool)
+    if generator.random() < 0.4:  # every k-th band of elevation: a scanner with fewer beams
+        elevation = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))
+        band = np.floor(elevation / np.radians(generator.uniform(0.35, 0.6))).astype(np.int64)
+        period = generator.integers(2, 5)
+        keep &= band % period == generator.integers(period)
+    if generator.random() < 0.5:
+        keep &= generator.random(len(points)) < generator.uniform(0.15, 1.0)
+    if generator.random() < 0.2:
+        keep &= np.linalg.norm(points[:, :3], axis=1) < generator.uniform(25.0, 80.0)
+    points = points[keep].copy()
+    points[:, :3] *= 1 + generator.normal(0.0, 0.001, (len(points), 1)).astype(np.float32)
+    if generator.random() < 0.3:
+        points[:, 3] = 0.0
+    else:
+        points[:, 3] = np.clip(generator.uniform(0.5, 1.6) * points[:, 3] ** generator.uniform(0.6, 1.6), 0, 1)
+    return points
+
+
+def photometric(image: NDArray[np.uint8], generator: Generator) -> NDArray[np.uint8]:
+    """Exposure, gamma, colour, blur, noise; sometimes grey."""
+    import cv2
+
+    pixels = image.astype(np.float32) / 255.0
+    if generator.random() < 0.2:
+        pixels = np.repeat(pixels @ np.array([[0.299], [0.587], [0.114]], np.float32), 3, axis=2)
+    elif generator.random() < 0.6:
+        pixels = pixels * generator.uniform(0.8, 1.2, 3).astype(np.float32)
+    pixels = np.clip(pixels, 0, 1) ** np.float32(np.exp(generator.uniform(-0.5, 0.5)))
+    pixels = (pixels - 0.5) * np.float32(generator.uniform(0.6, 1.4)) + np.float32(0.5 + generator.uniform(-0.15, 0.15))
+    if generator.random() < 0.2:
+        pixels = cv2.GaussianBlur(pixels, (0, 0), generator.uniform(0.4, 1.2))
+    if generator.random() < 0.5:
+        sigma = generator.uniform(0.0, 0.04)
+        pixels = pixels + sigma * generator.standard_normal(pixels.shape, dtype=np.float32)
+    return (np.clip(pixels, 0, 1) * 255).astype(np.uint8)
+
+
+def augment(frame: Frame, height: int, width: int, generator: Generator) -> Frame:
+    """All of the above, drawn at random, at the network's input size."""
+    if generator.random() < 0.5:
+        frame = mirror(frame)
+    frame = virtual_camera(frame, height, width, generator)
+    return replace(
+        frame, image=photometric(frame.image, generator), points=thin_scan(frame.points, generator)
+    )

@@ -1,0 +1,133 @@
+"""The hybrid loss (paper section 3.5): pose, quaternion angle, point distance, displacement, matching."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from calibnet.network.config import NetworkConfig
+from calibnet.network.network import NetworkInputs, NetworkOutput
+from calibnet.network.pose import project_points
+
+TEMPERATURE = 14.0
+"""Cosines of unit-norm features become logits times this."""
+
+
+class Target(NamedTuple):
+    """The truth of a batch.
+
+    Attributes:
+        correction: ``[B, 4, 4]`` that undoes the miscalibration.
+        visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
+            inside the image).
+    """
+
+    correction: Tensor
+    visible: list[Tensor]
+
+
+class Losses(NamedTuple):
+    """The terms of the hybrid loss, each already weighted, and two figures for the progress line."""
+
+    matching: Tensor
+    displacement: Tensor
+    pose: Tensor
+    quaternion: Tensor
+    points: Tensor
+    rotation_deg: Tensor
+    translation_cm: Tensor
+
+    @property
+    def total(self) -> Tensor:
+        """What is minimised."""
+        return self.matching + self.displacement + self.pose + self.quaternion + self.points
+
+
+def move(correction: Tensor, points: Tensor) -> Tensor:
+    """Apply ``[B, 4, 4]`` to ``[B, N, 3]``."""
+    return points @ correction[:, :3, :3].transpose(1, 2) + correction[:, None, :3, 3]
+
+
+def true_displacement(cells: Tensor, correction: Tensor, intrinsics: Tensor) -> Tensor:
+    """Pixels ``[B, 2, h, w]`` from where each cell's point is projected to where it belongs."""
+    points = cells.flatten(2).transpose(1, 2)
+    offset = project_points(move(correction, points), intrinsics) - project_points(points, intrinsics)
+    return offset.transpose(1, 2).unflatten(2, cells.shape[2:])
+
+
+def matching_loss(logits: Tensor, displacement: Tensor, visible: Tensor, stride: int, radius: int) -> Tensor:
+    """Cross-entropy over the window against the true displacement, spread over its four nearest cells.
+
+    Args:
+        logits: ``[B, D, h, w]``.
+        displacement: ``[B, 2, h, w]`` true, in pixels.
+        visible: ``[B, h, w]``; cells whose truth lies outside the window do not count either.
+        stride: pixels a cell.
+        radius: of the window, in cells.
+    """
+    window = 2 * radius + 1
+    position = displacement / stride + radius
+    inside = visible & ((position >= 0) & (position <= 2 * radius)).all(1)
+    corner = position.clamp(0, 2 * radius - 1e-3).floor()
+    fraction = (position - corner).clamp(0, 1)
+    log_probability = F.log_softmax(logits.float(), dim=1)
+    loss = torch.zeros_like(log_probability[:, 0])
+    for dy in (0, 1):
+        for dx in (0, 1):
+            wx = fraction[:, 0] if dx else 1 - fraction[:, 0]
+            wy = fraction[:, 1] if dy else 1 - fraction[:, 1]
+            index = ((corner[:, 1] + dy) * window + corner[:, 0] + dx).long()
+            loss = loss - wx * wy * log_probability.gather(1, index[:, None])[:, 0]
+    return (loss * inside).sum() / inside.sum().clamp(min=1)
+
+
+def displacement_loss(output: NetworkOutput, displacement: Tensor, visible: Tensor) -> Tensor:
+    """Laplace negative log-likelihood of the field, per axis, in units of pixels."""
+    error = (output.field.displacement - displacement).abs()
+    likelihood = error * torch.exp(-output.field.log_scale) + output.field.log_scale
+    return (likelihood * visible[:, None]).sum() / (2 * visible.sum().clamp(min=1))
+
+
+def quaternion_angle(rotation: Tensor) -> Tensor:
+    """Angle in radians of rotations ``[B, 3, 3]``; has a gradient at zero, unlike the arccos."""
+    difference = rotation - rotation.transpose(1, 2)
+    sine = torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)
+    sine = 0.5 * (sine.square().sum(-1) + 1e-12).sqrt()
+    return torch.atan2(sine, 0.5 * (rotation.diagonal(dim1=1, dim2=2).sum(-1) - 1))
+
+
+def hybrid_loss(output: NetworkOutput, inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Losses:
+    """All terms of one batch; only the pose's without ``config.hybrid_loss`` (the paper's ablation)."""
+    estimate, truth = output.pose.correction, target.correction
+    difference = estimate @ torch.linalg.inv(truth)
+    angle = quaternion_angle(difference[:, :3, :3])
+    offset = (estimate[:, :3, 3] - truth[:, :3, 3]).norm(dim=-1)
+    zero = angle.new_zeros(())
+    matching, field, points = zero, zero, zero
+    if config.hybrid_loss:
+        matched = zip(output.scores, output.logits, inputs.cells, target.visible, config.volume_scales, strict=False)
+        for score, logits, cells, visible, stride in matched:
+            truth_here = true_displacement(cells, truth, inputs.intrinsics)
+            for scores in (TEMPERATURE * score, logits):
+                matching = matching + matching_loss(scores, truth_here, visible, stride, config.radius)
+        matching = matching / (2 * len(config.volume_scales))
+        truth_here = true_displacement(inputs.cells[0], truth, inputs.intrinsics)
+        field = displacement_loss(output, truth_here, target.visible[0])
+        cloud = inputs.cells[-1].flatten(2).transpose(1, 2)
+        occupied = cloud[..., 2] > 0
+        distance = (move(estimate, cloud) - move(truth, cloud)).norm(dim=-1) * occupied
+        points = distance.sum() / occupied.sum().clamp(min=1)
+    # a few hopeless samples of a batch must not drown the rest
+    offset_cost = torch.where(offset < 1, offset, 1 + (offset.clamp(min=1)).log())
+    return Losses(
+        matching=0.5 * matching,
+        displacement=0.3 * field,
+        pose=2.0 * offset_cost.mean(),
+        quaternion=15.0 * angle.mean(),
+        points=0.5 * torch.log1p(points),
+        rotation_deg=torch.rad2deg(angle.detach()).mean(),
+        translation_cm=100 * offset.detach().mean(),
+    )

@@ -1,0 +1,164 @@
+"""Training samples: a frame, a drawn miscalibration, the network's input and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.utils.data import Dataset
+
+from calibnet.datasets.frame import Frame, Sequence
+from calibnet.geometry import (
+    MiscalibrationRange,
+    PinholeCamera,
+    invert,
+    project,
+    sample_miscalibration,
+    transform_points,
+)
+from calibnet.geometry.projection import nearest_per_cell
+from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
+from calibnet.network.network import NetworkInputs
+from calibnet.training.augmentation import augment
+from calibnet.training.losses import Target
+
+MINIMUM_CELLS = 40
+"""Cells with a point below which a sample teaches nothing and another is drawn."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One sample as arrays; `collate` makes a batch of them."""
+
+    image: NDArray[np.uint8]
+    lidar: LidarInput
+    intrinsics: NDArray[np.float32]
+    correction: NDArray[np.float32]
+    visible: list[NDArray[np.bool_]]
+
+
+def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDArray[np.float64],
+                  camera: PinholeCamera, correction: NDArray[np.float64]) -> list[NDArray[np.bool_]]:  # fmt: skip
+    """Per scale ``[h, w]``: does the camera, truly placed, see the cell's point?
+
+    A point is taken as hidden when another one within 4 px is clearly nearer: the scanner looks over
+    what the camera has in front of it.
+    """
+    truth = project(points, reference, camera)
+    nearest = nearest_per_cell(truth, camera, 4)
+    front = np.where(nearest >= 0, truth.depth[nearest], np.inf)
+    masks = []
+    for cells in lidar.cells:
+        flat = cells.reshape(3, -1).T
+        moved = transform_points(correction, flat)
+        depth = np.maximum(moved[:, 2], 0.1)
+        u = camera.matrix[0, 0] * moved[:, 0] / depth + camera.matrix[0, 2]
+        v = camera.matrix[1, 1] * moved[:, 1] / depth + camera.matrix[1, 2]
+        inside = (flat[:, 2] > 0) & (u > 0) & (u < camera.width - 1) & (v > 0) & (v < camera.height - 1)
+        column = np.clip(u / 4, 0, front.shape[1] - 1).astype(int)
+        row = np.clip(v / 4, 0, front.shape[0] - 1).astype(int)
+        seen = depth < 1.2 * front[row, column] + 1.0
+        masks.append((inside & seen).reshape(cells.shape[1:]))
+    return masks
+
+
+def make_sample(frame: Frame, delta: NDArray[np.float64], scales: tuple[int, ...]) -> Sample:
+    """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``."""
+    lidar = lidar_input(frame.points, delta @ frame.camera_from_lidar, frame.camera, scales)
+    correction = invert(delta)
+    visible = visible_cells(lidar, frame.points, frame.camera_from_lidar, frame.camera, correction)
+    return Sample(
+        frame.image, lidar, frame.camera.matrix.astype(np.float32), correction.astype(np.float32), visible
+    )
+
+
+def plain(frame: Frame, height: int, width: int, coarsest: int) -> Frame:
+    """The frame at the size inference uses, not augmented."""
+    camera = input_camera(frame.camera, height, width, coarsest)
+    return Frame(
+        frame.index, frame.timestamp, resize_image(frame.image, camera), frame.points, camera, frame.camera_from_lidar
+    )
+
+
+def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
+    """Stack samples of one input size."""
+
+    def stack(arrays: Many[NDArray[np.generic]]) -> torch.Tensor:
+        return torch.from_numpy(np.stack(arrays))
+
+    scales = range(len(samples[0].visible))
+    inputs = NetworkInputs(
+        stack([s.image for s in samples]).permute(0, 3, 1, 2),
+        stack([s.lidar.image for s in samples]),
+        stack([s.intrinsics for s in samples]),
+        [stack([s.lidar.cells[scale] for s in samples]) for scale in scales],
+    )
+    truth = stack([s.correction for s in samples])
+    return inputs, Target(truth, [stack([s.visible[scale] for s in samples]) for scale in scales])
+
+
+@dataclass(frozen=True)
+class Source:
+    """A sequence and how often it is drawn, relative to the other sources."""
+
+    sequence: Sequence
+    weight: float
+
+
+class TrainingSamples(Dataset[Sample]):
+    """An endless, random and repeatable stream: sample ``n`` depends on the seed and on ``n`` alone.
+
+    Frames are kept in memory once read: the real ones are few. The input size is drawn once per
+    batch, so that lenses and aspect ratios vary while a batch stays one tensor.
+    """
+
+    SHAPES = ((160, 512), (192, 448), (224, 384))
+    SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
+
+    def __init__(
+        self,
+        sources: Many[Source],
+        bounds: MiscalibrationRange,
+        scales: tuple[int, ...],
+        area: int,
+        batch: int,
+        seed: int,
+    ) -> None:
+        self.sources, self.bounds, self.scales = list(sources), bounds, scales
+        self.batch, self.seed = batch, seed
+        weights = np.array([source.weight for source in sources], dtype=np.float64)
+        self.probability = weights / weights.sum()
+        factor = (area / (160 * 512)) ** 0.5
+        self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
+        self.cache: dict[tuple[int, int], Frame] = {}
+
+    def read(self, source: int, position: int) -> Frame:
+        """One frame, from memory if it was read before; a sequence may keep its own cache instead."""
+        sequence = self.sources[source].sequence
+        if getattr(sequence, "caches", False):
+            return sequence[position]
+        if (source, position) not in self.cache:
+            self.cache[source, position] = sequence[position]
+        return self.cache[source, position]
+
+    def __getitem__(self, number: int) -> Sample:
+        """Draw sample ``number``."""
+        shape = np.random.default_rng([self.seed, 1, number // self.batch]).choice(3, p=self.SHAPE_PROBABILITY)
+        height, width = self.shapes[shape]
+        generator = np.random.default_rng([self.seed, 2, number])
+        while True:
+            source = int(generator.choice(len(self.sources), p=self.probability))
+            frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
+            frame = augment(frame, height, width, generator)
+            sample = make_sample(frame, self.draw(generator), self.scales)
+            if sample.visible[0].sum() >= MINIMUM_CELLS:
+                return sample
+
+    def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
+        """A miscalibration: mostly anywhere in the range, sometimes small, as a stage must also know when to stop."""
+        share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
+        bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
+        return sample_miscalibration(bounds, generator)

@@ -1,0 +1,255 @@
+"""The training loop of one stage: Lightning Fabric, a time or sample budget, exact resume."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import torch
+from lightning_fabric import Fabric
+from lightning_fabric.plugins.precision import MixedPrecision
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.utils.data import DataLoader, Sampler
+
+from calibnet.errors import CalibrationError, ConfigError
+from calibnet.geometry import MiscalibrationRange
+from calibnet.network.config import load_preset
+from calibnet.network.network import CalibrationNetwork, NetworkOutput
+from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
+from calibnet.training.data import training_sources
+from calibnet.training.losses import Losses, Target, hybrid_loss
+from calibnet.training.samples import TrainingSamples, collate
+from calibnet.training.validation import Validation, ValidationFigures
+from calibnet.weights import load_network, save_network, weights_path
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """Everything that decides a run; stored in its checkpoints and in the weights' record."""
+
+    preset: str
+    range: str
+    output: str  # folder of checkpoint and weights
+    data: list[str] = field(default_factory=list)
+    validate: list[str] = field(default_factory=list)
+    synthetic: float = 0.4  # share of the samples that come from the synthetic world
+    scenes: int = 4000  # synthetic scenes, each rendered once
+    minutes: float | None = None  # budget: of training time, over all resumed runs
+    samples: int | None = None  # budget: of samples; a run with it is exactly repeatable
+    batch: int = 8
+    learning_rate: float = 1e-3
+    seed: int = 0
+    workers: int = 1
+    initialize: str | None = None  # weights file of a neighbouring stage
+    scene_cache: str | None = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One line of progress."""
+
+    samples: int
+    minutes: float
+    share: float  # of the budget, 0..1
+    samples_per_second: float
+    losses: dict[str, float]
+
+
+class Observer(Protocol):
+    """Watches a run; the command line prints, the inspector logs to Rerun."""
+
+    def progressed(self, progress: Progress) -> None:
+        """Called every few seconds with running means of the losses."""
+
+    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
+        """Called after each validation."""
+
+
+class BatchNumbers(Sampler[list[int]]):
+    """Sample numbers batch by batch, from any batch on; every process of several takes its own."""
+
+    def __init__(self, first: int, batch: int, rank: int, world: int) -> None:
+        self.first, self.batch, self.rank, self.world = first, batch, rank, world
+
+    def __iter__(self) -> Iterator[list[int]]:
+        number = self.first * self.world + self.rank
+        while True:
+            yield list(range(number * self.batch, (number + 1) * self.batch))
+            number += self.world
+
+
+class FloatInputs(MixedPrecision):
+    """bf16 autocast that leaves the inputs alone: points rounded to bf16 would be off by decimetres."""
+
+    def __init__(self) -> None:
+        super().__init__("bf16-mixed", device="cuda" if torch.cuda.is_available() else "cpu")
+
+    def convert_input(self, data: Any) -> Any:
+        """Keep the inputs as they are."""
+        return data
+
+
+class Trainer:
+    """Trains one stage within its budget; `run` ends with the weights on disk."""
+
+    REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
+    WARM_UP, FINAL_RATE = 0.03, 0.02
+
+    def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:
+        """Prepare data, network and optimizer; with ``resume``, continue from the output folder."""
+        if not (options.minutes or options.samples):
+            raise ConfigError("Training needs a budget: give --minutes or --samples.")
+        self.options, self.observer = options, observer
+        torch.manual_seed(options.seed)
+        self.fabric = Fabric(accelerator="auto", devices="auto", plugins=[FloatInputs()])
+        self.fabric.launch()
+        self.bounds = MiscalibrationRange.parse(options.range)
+        self.folder = Path(options.output)
+        self.network = CalibrationNetwork(load_preset(options.preset), self.bounds)
+        config = self.network.config
+        if options.initialize:
+            self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
+            if config.share_image_branch:
+                for name, parameter in self.network.features.named_parameters():
+                    parameter.requires_grad_(not name.startswith("image_"))
+        sources, held_out = training_sources(
+            options.data, options.validate, options.synthetic, options.scenes, options.seed,
+            Path(options.scene_cache) if options.scene_cache else None,
+        )  # fmt: skip
+        area = config.input_height * config.input_width
+        self.data = TrainingSamples(sources, self.bounds, config.volume_scales, area, options.batch, options.seed)
+        self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.998))
+        trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
+        optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)
+        self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None
+        self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
+        self.average.to(self.fabric.device)
+        self.steps, self.seconds = 0, 0.0
+        if resume and self.checkpoint.exists():
+            self._resume()
+        elif self.checkpoint.exists():
+            raise ConfigError(f"{self.checkpoint} is there from an earlier run: add --resume, or remove it to start again.")
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file a run is resumed from."""
+        return weights_path(self.options.preset, self.bounds, self.folder).with_suffix(".checkpoint")
+
+    @property
+    def samples(self) -> int:
+        """Samples seen so far, over all processes."""
+        return self.steps * self.options.batch * self.fabric.world_size
+
+    @property
+    def share(self) -> float:
+        """How much of the budget is used, 0..1."""
+        if self.options.samples:
+            return min(1.0, self.samples / self.options.samples)
+        return min(1.0, self.seconds / (60 * (self.options.minutes or math.inf)))
+
+    def run(self) -> Path:
+        """Train until the budget is used; returns the weights' path."""
+        loader = DataLoader(
+            self.data,
+            batch_sampler=BatchNumbers(self.steps, self.options.batch, self.fabric.global_rank, self.fabric.world_size),
+            collate_fn=collate,
+            num_workers=self.options.workers,
+            persistent_workers=self.options.workers > 0,
+            prefetch_factor=4 if self.options.workers else None,
+        )
+        batches = iter(self.fabric.setup_dataloaders(loader, use_distributed_sampler=False))
+        started = self.seconds - time.monotonic()
+        reported = checkpointed = validated = self.seconds
+        steps_reported, means = self.steps, Means()
+        self.model.train()
+        while self.share < 1.0:
+            inputs, target = next(batches)
+            means.add(self._step(inputs, target))
+            self.seconds = started + time.monotonic()
+            if self.seconds - reported > self.REPORT_SECONDS:
+                rate = (self.steps - steps_reported) * self.options.batch / (self.seconds - reported)
+                self.observer.progressed(self._progress(rate, means.take()))
+                reported, steps_reported = self.seconds, self.steps
+            if self.seconds - checkpointed > self.CHECKPOINT_SECONDS:
+                self._save_checkpoint()
+                checkpointed = self.seconds
+            if self.seconds - validated > self.VALIDATION_SECONDS:
+                self._validate()
+                validated = self.seconds
+        figures = self._validate()
+        self._save_checkpoint()
+        return self._save_weights(figures)
+
+    def _step(self, inputs: Any, target: Target) -> Losses:
+        rate = self.options.learning_rate * min(1.0, (self.share + 1e-3) / self.WARM_UP)
+        cosine = 0.5 * (1 + math.cos(math.pi * self.share))
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate * (self.FINAL_RATE + (1 - self.FINAL_RATE) * cosine)
+        output: NetworkOutput = self.model(inputs)
+        losses = hybrid_loss(output, inputs, target, self.network.config)
+        if not torch.isfinite(losses.total):
+            raise CalibrationError(
+                f"The loss became {losses.total.item()} after {self.samples} samples; resume from {self.checkpoint} with a lower --learning-rate."
+            )
+        self.optimizer.zero_grad(set_to_none=True)
+        self.fabric.backward(losses.total)
+        self.fabric.clip_gradients(self.model, self.optimizer, max_norm=1.0)
+        self.optimizer.step()
+        self.average.update_parameters(self.network)
+        self.steps += 1
+        return losses
+
+    def _progress(self, rate: float, losses: dict[str, float]) -> Progress:
+        return Progress(self.samples, self.seconds / 60, self.share, rate, losses)
+
+    def _validate(self) -> ValidationFigures | None:
+        if self.validation is None:
+            return None
+        figures = self.validation(self.average.module)
+        self.observer.validated(self._progress(0.0, {}), figures)
+        return figures
+
+    def _save_checkpoint(self) -> None:
+        state = {"steps": self.steps, "seconds": self.seconds, "options": asdict(self.options)}
+        if self.fabric.is_global_zero:
+            save_checkpoint(self.checkpoint, self.network, self.average, self.optimizer.optimizer, state)
+
+    def _resume(self) -> None:
+        tensors, state = read_checkpoint(self.checkpoint)
+        if (state["options"]["preset"], state["options"]["range"]) != (self.options.preset, self.options.range):
+            raise ConfigError(f"{self.checkpoint} is of another preset or range; choose another --output folder.")
+        restore(tensors, self.network, self.average, self.optimizer.optimizer)
+        self.steps, self.seconds = int(state["steps"]), float(state["seconds"])
+
+    def _save_weights(self, figures: ValidationFigures | None) -> Path:
+        from calibnet.training.record import training_record
+
+        record = training_record(self.options, self.samples, self.seconds / 60, self.fabric.device.type, figures)
+        path = weights_path(self.options.preset, self.bounds, self.folder)
+        if self.fabric.is_global_zero:
+            save_network(path, self.network, self.average.module.state_dict(), record)
+        return path
+
+
+class Means:
+    """Running means of the losses between two progress lines."""
+
+    def __init__(self) -> None:
+        self.sums: dict[str, float] = {}
+        self.count = 0
+
+    def add(self, losses: Losses) -> None:
+        """Take one step's losses in."""
+        self.count += 1
+        for name, value in losses._asdict().items():
+            self.sums[name] = self.sums.get(name, 0.0) + float(value.detach())
+
+    def take(self) -> dict[str, float]:
+        """The means since the last call."""
+        means = {name: total / max(1, self.count) for name, total in self.sums.items()}
+        self.sums, self.count = {}, 0
+        return means

@@ -1,0 +1,67 @@
+"""Single-shot errors of one stage on held-out frames, under miscalibrations that never change."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from calibnet.datasets import Sequence
+from calibnet.geometry import pose_error, sample_miscalibration
+from calibnet.network.network import CalibrationNetwork
+from calibnet.training.samples import Sample, collate, make_sample, plain
+
+
+class ValidationFigures(NamedTuple):
+    """Errors before and after one shot of the stage: medians, and the rotation's 95th percentile."""
+
+    initial_rotation_deg: float
+    initial_translation_cm: float
+    rotation_deg: float
+    translation_cm: float
+    rotation_p95_deg: float
+    samples: int
+
+
+class Validation:
+    """The held-out samples, prepared once."""
+
+    def __init__(self, sequences: list[Sequence], network: CalibrationNetwork, repeats: int, seed: int) -> None:
+        config = network.config
+        generator = np.random.default_rng([seed, 3])
+        self.samples: list[Sample] = []
+        for sequence in sequences:
+            for frame in sequence:
+                small = plain(frame, config.input_height, config.input_width, config.scales[-1])
+                self.samples += [
+                    make_sample(small, sample_miscalibration(network.bounds, generator), config.volume_scales)
+                    for _ in range(repeats)
+                ]
+
+    def __call__(self, network: CalibrationNetwork) -> ValidationFigures:
+        """Run the network over all samples, one by one as the cascade does."""
+        device = next(network.parameters()).device
+        before, after = [], []
+        training = network.training
+        network.eval()
+        with torch.inference_mode(), torch.autocast(device.type, torch.bfloat16):
+            for sample in self.samples:
+                inputs, _ = collate([sample])
+                moved = type(inputs)(
+                    *(part.to(device) for part in inputs[:3]), [part.to(device) for part in inputs.cells]
+                )
+                estimate = network(moved).pose.correction[0].double().cpu().numpy()
+                truth = sample.correction.astype(np.float64)
+                before.append(pose_error(np.eye(4), truth))
+                after.append(pose_error(estimate, truth))
+        network.train(training)
+        rotation = [error.rotation_deg for error in after]
+        return ValidationFigures(
+            float(np.median([error.rotation_deg for error in before])),
+            float(np.median([error.translation_cm for error in before])),
+            float(np.median(rotation)),
+            float(np.median([error.translation_cm for error in after])),
+            float(np.percentile(rotation, 95)),
+            len(self.samples),
+        )

@@ -1,0 +1,99 @@
+"""Reading and writing one stage's weights."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from calibnet.errors import WeightsError
+from calibnet.geometry import MiscalibrationRange
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from calibnet.network.network import CalibrationNetwork
+
+HEADER = "calib-inspect"
+
+
+def weights_path(preset: str, bounds: MiscalibrationRange, folder: Path | None = None) -> Path:
+    """Where the weights of a preset's stage lie: in ``folder``, or in the package."""
+    name = f"{preset}-{bounds.rotation_deg:g}deg-{bounds.translation_m:g}m.safetensors"
+    return (folder or Path(__file__).parent) / name
+
+
+def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tensor], record: dict[str, Any]) -> None:
+    """Write ``state`` (half precision) with the network's config and the training record; atomic."""
+    import torch
+    from safetensors.torch import save_file
+
+    bounds = network.bounds
+    header = {
+        "config": asdict(network.config),
+        "range": str(bounds),
+        "record": record,
+    }
+    tensors = {
+        name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".part")
+    save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
+    partial.replace(path)
+
+
+def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Drop the second name of tensors that two modules share: safetensors stores each once."""
+    seen: set[int] = set()
+    return {name: t for name, t in state.items() if not (t.data_ptr() in seen or seen.add(t.data_ptr()))}  # type: ignore[func-returns-value]
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """The header of a weights file: ``config``, ``range`` and ``record``.
+
+    Raises:
+        WeightsError: the file is missing, cut short or not ours.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    if not path.is_file():
+        raise WeightsError(f"There are no weights at {path}; train them with `calib-inspect train`.")
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+    except (SafetensorError, OSError) as error:
+        raise WeightsError(f"{path} is not a complete safetensors file ({error}); copy or train it again.") from None
+    if HEADER not in metadata:
+        raise WeightsError(f"{path} was not written by calib-inspect: its header has no {HEADER!r} entry.")
+    header: dict[str, Any] = json.loads(metadata[HEADER])
+    return header
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """The training record: data, minutes, samples, seed, commit, validation figures."""
+    record: dict[str, Any] = read_header(path)["record"]
+    return record
+
+
+def load_network(path: Path) -> CalibrationNetwork:
+    """Build the network a weights file describes and fill it; in evaluation mode, float32.
+
+    Raises:
+        WeightsError: the file is missing, cut short, foreign or does not fit its own config.
+    """
+    from safetensors.torch import load_file
+
+    from calibnet.network.config import parse_config
+    from calibnet.network.network import CalibrationNetwork
+
+    header = read_header(path)
+    config = parse_config(header["config"], f"The header of {path}")
+    network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))
+    tensors = {name: tensor.float() for name, tensor in load_file(path).items()}
+    missing, unexpected = network.load_state_dict(tensors, strict=False)
+    shared = {name for name in missing if name.startswith("features.lidar_trunk.") and config.share_extractor}
+    if set(missing) - shared or unexpected:
+        raise WeightsError(f"{path} does not fit the network of this version; train it again.")
+    return network.eval()
