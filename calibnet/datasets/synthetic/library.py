@@ -12,7 +12,7 @@ from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.textures import Atlas, atlas
 
 Generator = np.random.Generator
-_FAR = 0.3
+_FAR = 0.2
 """Share of the leaves that plants keep where they are seen from afar."""
 _PLANTS: dict[str, tuple[int, Callable[[Atlas, Generator, float], Mesh]]] = {
     "broadleaf": (14, vegetation.broadleaf),

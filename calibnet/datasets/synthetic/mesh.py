@@ -20,7 +20,8 @@ class Mesh:
         uv: ``[T, 3, 2]`` float32, texture coordinates in metres (the atlas knows how large a tile is).
         texture: ``[T]`` int32, layer of the texture atlas.
         tint: ``[T, 3]`` float32, linear RGB factor on the texture.
-        gloss: ``[T]`` float32, 0 matte to 1 mirror-like (car paint, glass).
+        gloss: ``[T]`` float32, 0 matte to 1 mirror-like (car paint, glass); below 0 foliage, which
+            scatters light whatever its normal.
         reflectance: ``[T]`` float32, LiDAR factor on the texture's own; above 1 is retro-reflective.
         paint: ``[T]`` bool, triangles that take the colour given to ``placed``.
     """

@@ -218,7 +218,7 @@ def _nature(
     if style.kind != "street":
         far = style.front + (18.0 if style.buildings > 0.4 else 2.0)
         for _ in range(2):
-            scatter(tree(), 1.5 * style.trees, far, far + 25.0, (0.9, 1.7))
+            scatter(tree(), (0.8 if style.buildings > 0.4 else 1.5) * style.trees, far, far + 25.0, (0.9, 1.7))
     elif generator.random() < 0.3 * style.trees:
         scatter(tree(), 1.0, style.front + 2.0, style.front + 12.0, (0.8, 1.4))
     scatter("bush", (4.0 if wild else 1.5) * style.bushes, verge + 1.0, verge + (14.0 if wild else 5.0), (0.5, 1.4))

@@ -102,17 +102,18 @@ def radiance(
     albedo *= mesh.tint[hits.triangle]
     albedo *= _stains(point)[:, None]
 
+    gloss = mesh.gloss[hits.triangle]
     up = 0.5 + 0.5 * normal[:, 2:]
     light = up * weather.ambient + (1.0 - up) * weather.bounce
     if weather.sun.any():
         slant = np.maximum(normal @ weather.sun_direction, 0.0)
+        slant[gloss < 0.0] = 0.3 + 0.3 * slant[gloss < 0.0]
         lit = np.flatnonzero(slant > 0.0)
         shadow = occluded(scene, point[lit] + 0.02 * normal[lit], weather.sun_direction)
         slant[lit[shadow]] = 0.0
         light = light + slant[:, None] * weather.sun
     colour = albedo * light
 
-    gloss = mesh.gloss[hits.triangle]
     shiny = np.flatnonzero(gloss > 0.0)
     if len(shiny):
         mirror = rays[shiny] - 2.0 * (rays[shiny] * normal[shiny]).sum(axis=1, keepdims=True) * normal[shiny]

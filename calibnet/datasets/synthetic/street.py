@@ -125,12 +125,12 @@ def person(atlas: Atlas, generator: Generator) -> Mesh:
     parts = []
     for side in (-1.0, 1.0):
         foot = (side * stride, side * 0.09, 0.0)
-        parts.append(cylinder(foot, (0, side * 0.08, 0.5 * h), (0.06, 0.09), trousers, 7))
+        parts.append(cylinder(foot, (0, side * 0.08, 0.5 * h), (0.06, 0.09), trousers, 5))
         hand = (-side * 0.7 * stride, side * 0.26, 0.45 * h)
-        parts.append(cylinder((0, side * 0.2, 0.8 * h), hand, (0.06, 0.04), shirt, 6))
-    parts.append(blob((0, 0, 0.66 * h), (0.15, 0.22, 0.2 * h), shirt, generator, 0.05, 6, 9))
-    parts.append(blob((0.01, 0, 0.93 * h), (0.09, 0.08, 0.07 * h), skin, generator, 0.03, 5, 8))
-    parts.append(blob((-0.02, 0, 0.955 * h), (0.095, 0.09, 0.055 * h), hair, generator, 0.03, 5, 8))
+        parts.append(cylinder((0, side * 0.2, 0.8 * h), hand, (0.06, 0.04), shirt, 4))
+    parts.append(blob((0, 0, 0.66 * h), (0.15, 0.22, 0.2 * h), shirt, generator, 0.05, 5, 7))
+    parts.append(blob((0.01, 0, 0.93 * h), (0.09, 0.08, 0.07 * h), skin, generator, 0.03, 4, 6))
+    parts.append(blob((-0.02, 0, 0.955 * h), (0.095, 0.09, 0.055 * h), hair, generator, 0.03, 4, 6))
     if generator.random() < 0.4:
         parts.append(box((-0.2, 0, 0.58 * h), (0.16, 0.3, 0.22 * h), Material(atlas.pick("cloth", generator), tones[1])))
     return concatenate(parts)

@@ -121,7 +121,7 @@ def soil(generator: Generator) -> Image:
 def leaves(generator: Generator) -> Image:
     kind = generator.choice([[0.24, 0.31, 0.16], [0.30, 0.35, 0.18], [0.19, 0.27, 0.17], [0.36, 0.36, 0.24]])
     image = flat(tuple(np.array(kind) * generator.uniform(0.7, 1.2)), 0.5)
-    image *= np.clip(1.0 + 0.30 * noise(generator, 8, 5, 0.95) + 0.2 * noise(generator, 64, 3, 0.9), 0.15, 2.2)[..., None]
+    image *= np.clip(1.0 + 0.25 * noise(generator, 8, 5, 0.9) + 0.35 * noise(generator, 32, 4, 0.9), 0.1, 2.4)[..., None]
     return image
 
 
@@ -295,7 +295,7 @@ _PLAN: tuple[tuple[str, float, int, Callable[[Generator], Image]], ...] = (
     ("brick", 1.5, 6, bricks),
     ("grass", 3.0, 6, grass),
     ("soil", 4.0, 6, soil),
-    ("leaves", 2.0, 8, leaves),
+    ("leaves", 1.4, 8, leaves),
     ("bark", 1.0, 3, bark),
     ("facade", 6.0, 36, facade),
     ("ground_floor", 4.0, 14, ground_floor),

@@ -11,6 +11,15 @@ from calibnet.datasets.synthetic.textures import Atlas
 Generator = np.random.Generator
 
 
+def _foliage(atlas: Atlas, generator: Generator) -> Material:
+    return Material(atlas.pick("leaves", generator), gloss=-1.0, paint=True)
+
+
+def _mesh_of(detail: float) -> tuple[int, int]:
+    """Rows and columns of a hull's lumps."""
+    return (4, 7) if detail == 1.0 else (3, 5)
+
+
 def leaf_cloud(
     centers: NDArray[np.float64], radii: NDArray[np.float64], count: int, size: float, material: Material,
     generator: Generator, detail: float = 1.0,
@@ -35,7 +44,7 @@ def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     height = generator.uniform(5.0, 12.0)
     stem = generator.uniform(0.25, 0.42) * height
     bark = Material(atlas.pick("bark", generator))
-    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    leaves = _foliage(atlas, generator)
     thick = 0.018 * height + generator.uniform(0.04, 0.12)
     lean = generator.normal(0.0, 0.25, 2)
     fork = np.array([lean[0], lean[1], stem])
@@ -53,16 +62,16 @@ def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
     parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
     parts += [
-        blob(center, 0.85 * radius, leaves, generator, 0.25, 4, 7) for center, radius in zip(centers, radii, strict=True)
+        blob(center, 0.85 * radius, leaves, generator, 0.25, *_mesh_of(detail)) for center, radius in zip(centers, radii, strict=True)
     ]
-    parts.append(leaf_cloud(centers, radii, 700, generator.uniform(0.14, 0.24), leaves, generator, detail))
+    parts.append(leaf_cloud(centers, radii, 640, generator.uniform(0.14, 0.24), leaves, generator, detail))
     return concatenate(parts)
 
 
 def conifer(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A spruce or cypress: stacked cones with ragged edges."""
     height, radius = generator.uniform(4.0, 13.0), generator.uniform(0.9, 2.2)
-    leaves = Material(atlas.pick("leaves", generator), (0.7, 0.85, 0.8), paint=True)
+    leaves = _foliage(atlas, generator)
     parts = [cylinder((0, 0, -0.2), (0, 0, 0.9 * height), (0.16, 0.04), Material(atlas.pick("bark", generator)), 6)]
     layers = int(generator.integers(4, 8))
     base = generator.uniform(0.05, 0.2) * height
@@ -100,11 +109,11 @@ def bare_tree(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
 
 def bush(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A shrub of about one metre."""
-    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    leaves = _foliage(atlas, generator)
     count = int(generator.integers(2, 5))
     centers = np.column_stack([generator.normal(0.0, 0.5, (count, 2)), generator.uniform(0.3, 0.6, count)])
     radii = generator.uniform(0.4, 0.8, (count, 3))
-    hulls = [blob(c, 0.85 * r, leaves, generator, 0.25, 5, 7) for c, r in zip(centers, radii, strict=True)]
+    hulls = [blob(c, 0.85 * r, leaves, generator, 0.25, *_mesh_of(detail)) for c, r in zip(centers, radii, strict=True)]
     return concatenate([*hulls, leaf_cloud(centers, radii, 170, 0.10, leaves, generator, detail)])
 
 
@@ -120,7 +129,7 @@ def grass_tuft(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
 
 def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A wall of wild shrubs and young trees, 10 m long along x."""
-    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    leaves = _foliage(atlas, generator)
     count, height = 11, generator.uniform(1.5, 5.0)
     centers = np.column_stack(
         [np.linspace(-5, 5, count), generator.normal(0.0, 0.6, count), height * generator.uniform(0.25, 0.55, count)]
@@ -128,14 +137,14 @@ def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     radii = np.column_stack(
         [generator.uniform(0.8, 1.5, (count, 2)), np.maximum(centers[:, 2] * generator.uniform(0.9, 1.2, count), 0.4)]
     )
-    hulls = [blob(c, 0.88 * r, leaves, generator, 0.25, 5, 7) for c, r in zip(centers, radii, strict=True)]
-    return concatenate([*hulls, leaf_cloud(centers, radii, 900, generator.uniform(0.12, 0.2), leaves, generator, detail)])
+    hulls = [blob(c, 0.88 * r, leaves, generator, 0.25, *_mesh_of(detail)) for c, r in zip(centers, radii, strict=True)]
+    return concatenate([*hulls, leaf_cloud(centers, radii, 800, generator.uniform(0.16, 0.26), leaves, generator, detail)])
 
 
 def hedge(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     """A clipped hedge, 4 m long along x."""
     height, depth = generator.uniform(0.8, 2.0), generator.uniform(0.5, 0.9)
-    leaves = Material(atlas.pick("leaves", generator), paint=True)
+    leaves = _foliage(atlas, generator)
     hull = box((0, 0, 0), (4.0, depth, height), leaves)
     count = int(320 * detail)
     spot = np.column_stack(

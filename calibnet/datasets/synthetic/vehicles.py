@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, loft, quads, rectangle
+from calibnet.datasets.synthetic.mesh import (
+    Material,
+    Mesh,
+    box,
+    concatenate,
+    cylinder,
+    loft,
+    quads,
+    rectangle,
+    triangles,
+)
 from calibnet.datasets.synthetic.textures import Atlas
 
 Generator = np.random.Generator
@@ -25,25 +35,24 @@ def _ring(x: float, half_width: float, bottom: float, top: float, taper: float) 
 def _wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: float, generator: Generator) -> Mesh:
     rubber = Material(atlas.pick("black", generator), reflectance=0.6)
     face = Material(atlas.pick("wheel", generator))
+    sides = 12
+    angle = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    circle = np.stack([np.cos(angle), np.zeros(sides), np.sin(angle)], axis=1)
+    after = np.roll(circle, -1, axis=0)
+    disc = np.stack([np.zeros_like(circle), circle, after], axis=1)
+    disc_uv = 0.5 + 0.5 * disc[..., [0, 2]]
+    upper = disc[: sides // 2 + 1]
     parts = []
     for x in axles:
         for side in (-1.0, 1.0):
             outer = side * (half_width + 0.02)
-            parts.append(cylinder((x, outer - side * 0.22, radius), (x, outer, radius), radius, rubber, 14))
-            angle = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
-            rim = np.stack([x + radius * np.cos(angle), np.full(14, outer + side * 0.004), radius * (1 + np.sin(angle))], 1)
-            disc = 0.5 + 0.5 * np.stack([np.cos(angle), np.sin(angle)], 1)
-            hub = np.tile([[x, outer + side * 0.004, radius]], (14, 1))
-            fan = np.stack([hub, rim, np.roll(rim, -1, axis=0), hub], axis=1)
-            fan_uv = np.stack([np.full((14, 2), 0.5), disc, np.roll(disc, -1, axis=0), np.full((14, 2), 0.5)], axis=1)
-            parts.append(quads(fan, fan_uv, face))
-            arch = [(x + 1.22 * radius * c, radius * (1 + 1.22 * s)) for c, s in zip(np.cos(angle[:8]), np.sin(angle[:8]), strict=True)]
-            flank = side * (half_width + 0.006)
-            arch_fan = [
-                [(x, flank, radius), (a, flank, b), (c, flank, d), (x, flank, radius)]
-                for (a, b), (c, d) in zip(arch[:-1], arch[1:], strict=True)
-            ]
-            parts.append(quads(arch_fan, np.zeros((len(arch_fan), 4, 2)), rubber))
+            hub = np.array([x, outer, radius])
+            tread = np.stack([circle, after, after, circle], axis=1) * radius + hub
+            tread[:, 2:, 1] -= side * 0.2
+            parts.append(quads(tread, np.zeros((sides, 4, 2)), rubber))
+            parts.append(triangles(disc * radius + hub, disc_uv, face))
+            arch = upper * 1.22 * radius + hub - (0.0, side * 0.014, 0.0)
+            parts.append(triangles(arch, upper[..., [0, 2]], rubber))
     return concatenate(parts)
 
 
