@@ -1,7 +1,20 @@
 """A random, seeded driving world, ray-cast for a camera and a spinning LiDAR."""
 
+from calibnet.datasets.synthetic.kitti_export import write_kitti_odometry
 from calibnet.datasets.synthetic.render import render_frame, sample_frame
-from calibnet.datasets.synthetic.rig import KITTI_LIKE, Rig, sample_rig
+from calibnet.datasets.synthetic.rig import KITTI_LIKE, Lidar, Rig, sample_rig
+from calibnet.datasets.synthetic.sequence import SyntheticSequence
 from calibnet.datasets.synthetic.world import Scene, build_scene
 
-__all__ = ["KITTI_LIKE", "Rig", "Scene", "build_scene", "render_frame", "sample_frame", "sample_rig"]
+__all__ = [
+    "KITTI_LIKE",
+    "Lidar",
+    "Rig",
+    "Scene",
+    "SyntheticSequence",
+    "build_scene",
+    "render_frame",
+    "sample_frame",
+    "sample_rig",
+    "write_kitti_odometry",
+]

@@ -1,0 +1,80 @@
+"""A drive through one synthetic scene, rendered frame by frame as it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.synthetic.camera import sample_exposure
+from calibnet.datasets.synthetic.render import render_frame
+from calibnet.datasets.synthetic.rig import Rig, sample_rig
+from calibnet.datasets.synthetic.world import EGO_SPEED, build_scene
+from calibnet.errors import ConfigError
+from calibnet.geometry.se3 import Matrix
+
+FRAME_INTERVAL = 0.1
+"""Seconds between frames, as KITTI's scanner turns."""
+_NATIVE_PIXELS, _NATIVE_WIDTH = 1242 * 375, 1242
+
+
+class SyntheticSequence:
+    """A `Sequence` of a car that drives about a metre a frame among moving traffic.
+
+    A frame depends on the seed and its position only, whatever was read before it.
+    """
+
+    def __init__(self, seed: int, length: int, rig: Rig | None = None) -> None:
+        """Build the scene.
+
+        Args:
+            seed: of the scene, its traffic, the noise and, without ``rig``, the sensors.
+            length: number of frames.
+            rig: sensors and mount; drawn from the seed if not given.
+
+        Raises:
+            ConfigError: the seed is negative or there is no frame.
+        """
+        if seed < 0 or length < 1:
+            raise ConfigError(f"A synthetic drive needs a seed from 0 and a length from 1, not {seed} and {length}.")
+        generator = np.random.default_rng([seed, 1])
+        travel = length * EGO_SPEED * FRAME_INTERVAL
+        self.seed, self.length = seed, length
+        self.scene = build_scene(generator, travel)
+        self.exposure = sample_exposure(generator)
+        self.mount = rig or sample_rig(generator, _NATIVE_PIXELS, _NATIVE_WIDTH)
+        self.name = f"synthetic/{seed}"
+        self.rig = self.mount.name
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return self.length
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Render the frames in order."""
+        return (self[position] for position in range(self.length))
+
+    def world_from_vehicle(self, position: int) -> Matrix:
+        """Where the car is at a frame, 4x4: x forward, y left, z up on the road below the LiDAR."""
+        return self.scene.pose(position * EGO_SPEED * FRAME_INTERVAL)
+
+    def __getitem__(self, position: int) -> Frame:
+        """Render one frame.
+
+        Raises:
+            IndexError: there is no such position.
+        """
+        index = position + self.length if position < 0 else position
+        if not 0 <= index < self.length:
+            raise IndexError(f"{self.name} has {self.length} frames, not one at {position}.")
+        return render_frame(
+            self.scene,
+            self.mount,
+            self.world_from_vehicle(index),
+            np.random.default_rng([self.seed, 2, index]),
+            index=index,
+            timestamp=index * FRAME_INTERVAL,
+            exposure=self.exposure,
+            source=f"{self.name} frame {index}",
+        )
