@@ -49,7 +49,7 @@ def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDA
     """
     truth = project(points, reference, camera)
     nearest = nearest_per_cell(truth, camera, 4)
-    front = np.where(nearest >= 0, truth.depth[nearest], np.inf)
+    front = np.append(truth.depth, np.float32(np.inf))[nearest]  # empty cells pick the last, -1
     masks = []
     for cells in lidar.cells:
         flat = cells.reshape(3, -1).T
@@ -70,9 +70,7 @@ def make_sample(frame: Frame, delta: NDArray[np.float64], scales: tuple[int, ...
     lidar = lidar_input(frame.points, delta @ frame.camera_from_lidar, frame.camera, scales)
     correction = invert(delta)
     visible = visible_cells(lidar, frame.points, frame.camera_from_lidar, frame.camera, correction)
-    return Sample(
-        frame.image, lidar, frame.camera.matrix.astype(np.float32), correction.astype(np.float32), visible
-    )
+    return Sample(frame.image, lidar, frame.camera.matrix.astype(np.float32), correction.astype(np.float32), visible)
 
 
 def plain(frame: Frame, height: int, width: int, coarsest: int) -> Frame:
