@@ -84,12 +84,16 @@ def test_points_lie_on_what_the_camera_sees(seed):
     mesh = scene.mesh(pose, 0.0)
     caster = o3d.t.geometry.RaycastingScene()
     vertices = mesh.corners.reshape(-1, 3)
-    caster.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)))
+    caster.add_triangles(
+        o3d.core.Tensor(vertices), o3d.core.Tensor(np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3))
+    )
     scale = 4  # rays at a quarter of a pixel
     matrix = np.diag([scale, scale, 1.0]) @ frame.camera.matrix
     rays = caster.create_rays_pinhole(
         o3d.core.Tensor(matrix + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])),  # Open3D's centres are at halves
-        o3d.core.Tensor(camera_from_world), scale * frame.camera.width, scale * frame.camera.height,
+        o3d.core.Tensor(camera_from_world),
+        scale * frame.camera.width,
+        scale * frame.camera.height,
     )
     hit = caster.cast_rays(rays)["t_hit"].numpy()  # rays have z = 1: the parameter is the depth
     cell = np.round(scale * pixel).astype(int)
@@ -216,10 +220,13 @@ def test_own_camera_sees_what_a_resized_one_sees():
 
     exposure = dataclasses.replace(SyntheticSequence(1, 1, SMALL).exposure, noise=0.0, quality=0, blur=0.3)
     scene = build_scene(np.random.default_rng(1))
-    large = dataclasses.replace(SMALL, camera=PinholeCamera(640, 200, np.array([[400.0, 0, 315], [0, 400, 95], [0, 0, 1]])))
+    large = dataclasses.replace(
+        SMALL, camera=PinholeCamera(640, 200, np.array([[400.0, 0, 315], [0, 400, 95], [0, 0, 1]]))
+    )
     small = dataclasses.replace(large, camera=large.camera.resized(320, 100))
     a, b = (
-        render_frame(scene, rig, scene.pose(80.0), np.random.default_rng(0), exposure=exposure).image for rig in (large, small)
+        render_frame(scene, rig, scene.pose(80.0), np.random.default_rng(0), exposure=exposure).image
+        for rig in (large, small)
     )
     halved = cv2.resize(a, (320, 100), interpolation=cv2.INTER_AREA).astype(np.float32)
     errors = {}

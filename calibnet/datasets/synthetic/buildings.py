@@ -139,11 +139,15 @@ def block(atlas: Atlas, generator: Generator, width: float, storeys: int) -> Mes
     name = str(generator.choice(["facade", "facade", "facade", "metal", "concrete"]))
     wall = Material(atlas.pick(name, generator), _tint(generator), 0.0)
     trim = Material(atlas.pick("concrete", generator), _tint(generator, 0.05))
-    parts = [_walls(width, depth, 0.0, height, wall, 6.0 / (width / max(1, round(width / 6.0)))),
-             box((0.0, 0.5 * depth, height), (width + 0.3, depth + 0.3, 0.6), trim)]
+    parts = [
+        _walls(width, depth, 0.0, height, wall, 6.0 / (width / max(1, round(width / 6.0)))),
+        box((0.0, 0.5 * depth, height), (width + 0.3, depth + 0.3, 0.6), trim),
+    ]
     for x in np.linspace(-0.5 * width, 0.5 * width, int(generator.integers(2, 6))):
         parts.append(box((x, -0.15, 0.0), (0.45, 0.4, height), trim))
     if name in ("metal", "concrete"):
         art = Material(atlas.pick("art", generator))
-        parts.append(rectangle((-0.3 * width, -0.05, 0.6 * height), (0.5 * width, 0, 0), (0, 0, 0.25 * height), art, True))
+        parts.append(
+            rectangle((-0.3 * width, -0.05, 0.6 * height), (0.5 * width, 0, 0), (0, 0, 0.25 * height), art, True)
+        )
     return concatenate(parts)

@@ -72,7 +72,12 @@ def pixel_rays(camera: PinholeCamera) -> NDArray[np.float32]:
 
 
 def photograph(
-    caster: Any, mesh: Mesh, weather: Weather, camera: PinholeCamera, world_from_camera: Matrix, exposure: Exposure,
+    caster: Any,
+    mesh: Mesh,
+    weather: Weather,
+    camera: PinholeCamera,
+    world_from_camera: Matrix,
+    exposure: Exposure,
     generator: Generator,
 ) -> NDArray[np.uint8]:
     """The image ``[H, W, 3]`` uint8 that a camera takes of a mesh."""
@@ -92,19 +97,21 @@ def develop(linear: NDArray[np.float32], exposure: Exposure, generator: Generato
     import cv2
 
     height, width = linear.shape[:2]
-    image = np.minimum(linear, 8.0)
-    image = cv2.GaussianBlur(image, (0, 0), exposure.blur)
+    image: NDArray[np.float32] = cv2.GaussianBlur(np.minimum(linear, 8.0), (0, 0), exposure.blur).astype(
+        np.float32, copy=False
+    )
     metered = float(np.minimum(image[height // 2 :], 2.0).mean())  # by the road, as cars do, not by the sky
     image *= np.float32(exposure.level / max(metered, 1e-3)) * np.asarray(exposure.white, dtype=np.float32)
     y, x = np.linspace(-1, 1, height, dtype=np.float32), np.linspace(-1, 1, width, dtype=np.float32)
     image *= (1.0 - exposure.vignetting * 0.5 * (y[:, None] ** 2 + x**2))[..., None]
     image = np.clip(image, 0.0, 1.0)
-    image = cv2.pow(image, 1.0 / exposure.gamma)
+    image = np.asarray(cv2.pow(image, 1.0 / exposure.gamma), dtype=np.float32)
     grey = image.mean(axis=2, keepdims=True)
     image = grey + exposure.saturation * (image - grey)
     image = 0.5 + exposure.contrast * (image - 0.5)
     image += exposure.noise * generator.standard_normal(image.shape, dtype=np.float32)
     pixels = (255.0 * np.clip(image, 0.0, 1.0)).astype(np.uint8)
     if exposure.quality:
-        pixels = cv2.imdecode(cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, exposure.quality])[1], 1)
+        data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, exposure.quality])[1]
+        pixels = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
     return np.ascontiguousarray(pixels)

@@ -52,7 +52,8 @@ def write_kitti_odometry(
         (folder / "times.txt").write_text("\n".join(times) + "\n")
         poses.write_text("\n".join(_numbers(pose[:3]) for pose in _camera_poses(sequence)) + "\n")
     except OSError as error:
-        raise DatasetError(f"{error.filename or folder} cannot be written ({error.strerror}); free or choose another folder.") from None
+        where = error.filename or folder
+        raise DatasetError(f"{where} cannot be written ({error.strerror}); choose another folder.") from None
     return folder
 
 

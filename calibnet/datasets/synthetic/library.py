@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from calibnet.datasets.synthetic import barriers, street, vegetation, vehicles
+from calibnet.datasets.synthetic import barriers, lorries, street, vegetation, vehicles
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.textures import Atlas, atlas
 
@@ -26,7 +26,7 @@ _PLANTS: dict[str, tuple[int, Callable[[Atlas, Generator, float], Mesh]]] = {
 _THINGS: dict[str, tuple[int, Callable[[Atlas, Generator], Mesh]]] = {
     "car": (28, vehicles.car),
     "van": (8, vehicles.van),
-    "lorry": (10, vehicles.lorry),
+    "lorry": (10, lorries.lorry),
     "bicycle": (3, vehicles.bicycle),
     "cyclist": (4, street.cyclist),
     "lamp_post": (8, street.lamp_post),
@@ -49,7 +49,8 @@ _THINGS: dict[str, tuple[int, Callable[[Atlas, Generator], Mesh]]] = {
 @lru_cache(maxsize=1)
 def library() -> dict[str, tuple[tuple[Mesh, Mesh], ...]]:
     """All prototypes by name, each as seen from near and from afar; the same in every process."""
-    tiles, shelves = atlas(), {}
+    tiles = atlas()
+    shelves: dict[str, tuple[tuple[Mesh, Mesh], ...]] = {}
     for name, (count, grow) in _PLANTS.items():
         seeds = [[7_101, len(shelves), number] for number in range(count)]
         shelves[name] = tuple(

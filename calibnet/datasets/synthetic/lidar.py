@@ -33,6 +33,10 @@ def scan(
 
     Args:
         caster: the ``RaycastingScene`` of ``mesh``.
+        mesh: the world.
+        lidar: the scanner.
+        world_from_lidar: its pose, 4x4.
+        generator: noise and drop-outs.
         facing: azimuth of the sector's middle, radians.
         sector: half its width, radians; pi for a whole revolution.
     """

@@ -170,8 +170,13 @@ def cylinder(
 
 
 def blob(
-    center: ArrayLike, radii: ArrayLike, material: Material, generator: np.random.Generator, rough: float = 0.15,
-    rows: int = 6, columns: int = 9,
+    center: ArrayLike,
+    radii: ArrayLike,
+    material: Material,
+    generator: np.random.Generator,
+    rough: float = 0.15,
+    rows: int = 6,
+    columns: int = 9,
 ) -> Mesh:
     """A lumpy ellipsoid: foliage, bushes, heads, boulders."""
     polar = np.linspace(0.0, np.pi, rows + 1)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calibnet.datasets.synthetic import buildings, library, road
-from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate
+from calibnet.datasets.synthetic import buildings, library
+from calibnet.datasets.synthetic.ground import cross_section, markings
+from calibnet.datasets.synthetic.mesh import Mesh, concatenate
 from calibnet.datasets.synthetic.textures import atlas
 
 if TYPE_CHECKING:
@@ -16,16 +17,25 @@ if TYPE_CHECKING:
 Generator = np.random.Generator
 CHUNK = 20.0
 """Metres of road that are populated together."""
-CAMBER = 0.04
-"""Metres by which the edge of the carriageway lies below its centre."""
 _BUILDERS = {
     "town_house": buildings.town_house,
     "detached_house": buildings.detached_house,
     "block": buildings.block,
 }
 _CAR_COLOURS = np.array(
-    [[0.75, 0.75, 0.76], [0.5, 0.52, 0.54], [0.2, 0.21, 0.23], [0.02, 0.02, 0.025], [0.02, 0.05, 0.2],
-     [0.35, 0.02, 0.02], [0.9, 0.9, 0.9], [0.05, 0.15, 0.08], [0.4, 0.3, 0.2], [0.7, 0.5, 0.02], [0.1, 0.3, 0.6]]
+    [
+        [0.75, 0.75, 0.76],
+        [0.5, 0.52, 0.54],
+        [0.2, 0.21, 0.23],
+        [0.02, 0.02, 0.025],
+        [0.02, 0.05, 0.2],
+        [0.35, 0.02, 0.02],
+        [0.9, 0.9, 0.9],
+        [0.05, 0.15, 0.08],
+        [0.4, 0.3, 0.2],
+        [0.7, 0.5, 0.02],
+        [0.1, 0.3, 0.6],
+    ]
 )
 
 
@@ -46,7 +56,7 @@ def populate(scene: Scene, index: int, near: bool) -> Mesh:
     """
     generator = np.random.default_rng([scene.seed, index + 10_000])
     start, stop = index * CHUNK, (index + 1) * CHUNK
-    parts = [*ground(scene, start, stop), *_markings(scene, generator, start, stop)]
+    parts = [*cross_section(scene, start, stop), *markings(scene, generator, start, stop)]
     for side in (-1.0, 1.0):
         parts += _plots(scene, generator, start, stop, side, near)
         parts += _roadside(scene, generator, start, stop, side)
@@ -56,67 +66,15 @@ def populate(scene: Scene, index: int, near: bool) -> Mesh:
     return concatenate(parts)
 
 
-def ground(scene: Scene, start: float, stop: float) -> list[Mesh]:
-    """The swept cross-section."""
-    style, strips = scene.style, []
-    kerb = Material(scene.kerb_texture, (0.9, 0.9, 0.9))
-    for side in (-1.0, 1.0):
-        a, b, c = side * style.edge, side * (style.edge + style.pavement), side * (style.front + 1.0)
-        far, lift = side * (style.front + 75.0), style.kerb
-        rough = style.rough if style.kind in ("off-road", "park") else 0.0
-        strips.append(road.Strip(0.0, a, 0.0, -CAMBER, style.road, 0.1 * rough))
-        if style.kerb:
-            strips.append(road.Strip(a, a + 0.02 * side, -CAMBER, lift, kerb))
-            strips.append(road.Strip(a + 0.02 * side, a + 0.16 * side, lift, lift, kerb))
-        if style.pavement:
-            strips.append(road.Strip(a + 0.16 * side if style.kerb else a, b, lift, lift + 0.03, style.walk))
-        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -CAMBER), lift + 0.05, style.verge, rough))
-        bank = scene.banks[0 if side < 0 else 1]
-        strips.append(road.Strip(c, far, lift + 0.05, lift + 0.05 + bank, style.field, style.rough))
-    return road.sweep(scene.line, tuple(strips), start, stop, 2.5)
-
-
-def _markings(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
-    style, line = scene.style, scene.line
-    if style.kind in ("off-road", "park"):
-        return []
-    areas, paint, camber = [], scene.paint, CAMBER / style.edge
-    lanes_edge = style.median + style.lanes * style.lane
-    for side in (-1.0, 1.0):
-        if scene.edge_lines:
-            areas.append(road.solid(start, stop, side * (lanes_edge - 0.15), 0.13))
-        for lane in range(1, style.lanes):
-            areas.append(road.dashes(start, stop, side * (style.median + lane * style.lane), 0.14, *scene.dash))
-        if style.median:
-            areas.append(road.solid(start, stop, side * (style.median + 0.2), 0.15))
-    if not style.median and scene.center_line == "dashed":
-        areas.append(road.dashes(start, stop, 0.0, 0.13, *scene.dash))
-    elif not style.median and scene.center_line == "double":
-        areas += [road.solid(start, stop, lateral, 0.11) for lateral in (-0.12, 0.12)]
-    parts = []
-    if style.kind != "highway" and generator.random() < 0.10:  # a zebra crossing
-        stripes = np.arange(-lanes_edge + 0.3, lanes_edge - 0.5, 1.0)
-        at = generator.uniform(start + 2.0, stop - 5.0)
-        areas.append(np.stack([np.full_like(stripes, at), np.full_like(stripes, at + 3.0), stripes, stripes + 0.5], 1))
-    if style.kind != "highway" and generator.random() < 0.12:  # a stop line and an arrow
-        at, own = generator.uniform(start, stop), style.lane_center(0, True)
-        areas.append(np.array([[at, at + 0.4, own - 0.45 * style.lane, own + 0.45 * style.lane]]))
-        areas.append(np.array([[at - 5.0, at - 2.0, own - 0.08, own + 0.08], [at - 2.4, at - 2.0, own - 0.4, own + 0.4]]))
-    if areas:
-        parts.append(road.decals(line, np.concatenate(areas), paint, 0.012, camber))
-    patches = int(generator.integers(0, 4))
-    if patches:  # repairs, manholes, oil
-        s, y = generator.uniform(start, stop, patches), generator.uniform(-style.edge, style.edge - 1.0, patches)
-        long, wide = generator.choice([0.6, 0.6, 1.2, 2.5], patches), generator.uniform(0.5, 1.5, patches)
-        tone = float(generator.choice([0.45, 0.7, 1.3]))
-        material = Material(style.road.texture, (tone, tone, tone))
-        parts.append(road.decals(line, np.stack([s, s + long, y, y + wide], 1), material, 0.006, camber))
-    return parts
-
-
 def _stand(
-    scene: Scene, mesh: Mesh, station: float, lateral: float, turn: float = 0.0, lift: float = 0.0,
-    scale: object = 1.0, colour: object = None,
+    scene: Scene,
+    mesh: Mesh,
+    station: float,
+    lateral: float,
+    turn: float = 0.0,
+    lift: float = 0.0,
+    scale: object = 1.0,
+    colour: object = None,
 ) -> Mesh:
     """Place a prototype on the ground at a station; ``turn`` is relative to the road's direction."""
     heading = float(scene.line.heading(station)) + turn
@@ -124,10 +82,9 @@ def _stand(
     return mesh.placed(position, heading, scale, colour)  # type: ignore[arg-type]
 
 
-def _plots(
-    scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool
-) -> list[Mesh]:
-    style, parts = scene.style, []
+def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool) -> list[Mesh]:
+    style = scene.style
+    parts: list[Mesh] = []
     if generator.random() < 0.06 and style.kind in ("street", "suburb", "industrial"):
         return parts  # a side street
     pieces = 1 if style.building == "block" or generator.random() < 0.45 else 2
@@ -136,10 +93,14 @@ def _plots(
         station = start + (piece + 0.5) * width
         fence = generator.random() < style.fences and style.setback > 2.0
         if fence:
-            shape = library.pick(scene.fence_kind, generator, near) if scene.fence_kind != "fence" else scene.fence(side)
+            shape = (
+                library.pick(scene.fence_kind, generator, near) if scene.fence_kind != "fence" else scene.fence(side)
+            )
             lateral = side * (style.edge + style.pavement + 0.4)
-            parts += [_stand(scene, shape, s, lateral, colour=scene.leaf_colour)
-                      for s in np.arange(station - 0.5 * width + 2.0, station + 0.5 * width, 4.0)]
+            parts += [
+                _stand(scene, shape, s, lateral, colour=scene.leaf_colour)
+                for s in np.arange(station - 0.5 * width + 2.0, station + 0.5 * width, 4.0)
+            ]
         if generator.random() >= style.buildings:
             continue
         gap = 0.0 if style.building == "town_house" and generator.random() < 0.8 else generator.uniform(1.0, 5.0)
@@ -155,7 +116,8 @@ def _plots(
 
 
 def _roadside(scene: Scene, generator: Generator, start: float, stop: float, side: float) -> list[Mesh]:
-    style, parts = scene.style, []
+    style = scene.style
+    parts: list[Mesh] = []
     if style.parked:
         lateral = side * (style.edge - 0.5 * max(style.parking, 2.0) + (0.0 if style.parking > 1.0 else 0.9))
         if style.parking > 1.0 or scene.park_on_pavement:
@@ -164,13 +126,29 @@ def _roadside(scene: Scene, generator: Generator, start: float, stop: float, sid
                     mesh, colour = vehicle("van" if generator.random() < 0.12 else "car", generator)
                     turn = (0.0 if generator.random() < 0.8 else np.pi) + (0.0 if side == style.side else np.pi)
                     spot = lateral + generator.normal(0.0, 0.08)
-                    parts.append(_stand(scene, mesh, slot + generator.uniform(-0.4, 0.4), spot,
-                                        turn + generator.normal(0.0, 0.02), -scene.lift(spot) - 0.03, colour=colour))
+                    parts.append(
+                        _stand(
+                            scene,
+                            mesh,
+                            slot + generator.uniform(-0.4, 0.4),
+                            spot,
+                            turn + generator.normal(0.0, 0.02),
+                            -scene.lift(spot) - 0.03,
+                            colour=colour,
+                        )
+                    )
     walk = style.edge + (0.5 if style.pavement else 1.5)
     facing = 0.0 if side == style.side else np.pi
     for name, share, distance in (
-        ("lamp_post", 0.5, 0.0), ("sign", 0.55, 0.1), ("pole", 0.15, 0.3), ("bollard", 0.25, 0.0),
-        ("bin", 0.3, 1.0), ("traffic_light", 0.12, 0.1), ("billboard", 0.08, 2.0), ("bench", 0.08, 1.2), ("bicycle", 0.2, 1.0),
+        ("lamp_post", 0.5, 0.0),
+        ("sign", 0.55, 0.1),
+        ("pole", 0.15, 0.3),
+        ("bollard", 0.25, 0.0),
+        ("bin", 0.3, 1.0),
+        ("traffic_light", 0.12, 0.1),
+        ("billboard", 0.08, 2.0),
+        ("bench", 0.08, 1.2),
+        ("bicycle", 0.2, 1.0),
     ):
         if generator.random() < share * style.furniture:
             turn = facing + generator.normal(0.0, 0.15)
@@ -188,14 +166,20 @@ def _roadside(scene: Scene, generator: Generator, start: float, stop: float, sid
         if generator.random() < 0.12:
             lateral = side * generator.uniform(0.6, 1.0) * style.edge
         figure, shirt = library.pick("person", generator), generator.uniform(0.02, 0.8, 3)
-        parts.append(_stand(scene, figure, generator.uniform(start, stop), lateral, generator.uniform(0, 6.3), colour=shirt))
+        parts.append(
+            _stand(scene, figure, generator.uniform(start, stop), lateral, generator.uniform(0, 6.3), colour=shirt)
+        )
+    if generator.random() < 0.4 * style.people:
+        lateral = side * (style.edge - max(style.parking, 0.6) - 0.3)
+        turn = 0.0 if side == style.side else np.pi
+        shirt, shape = generator.uniform(0.02, 0.8, 3), library.pick("cyclist", generator)
+        parts.append(_stand(scene, shape, generator.uniform(start, stop), lateral, turn, colour=shirt))
     return parts
 
 
-def _nature(
-    scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool
-) -> list[Mesh]:
-    style, parts = scene.style, []
+def _nature(scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool) -> list[Mesh]:
+    style = scene.style
+    parts: list[Mesh] = []
     verge = style.edge + style.pavement if style.kind != "street" else style.edge + 0.8
     wild = style.kind in ("off-road", "park")
 
@@ -235,7 +219,8 @@ def _nature(
 
 
 def _motorway(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
-    style, parts = scene.style, []
+    style = scene.style
+    parts: list[Mesh] = []
     rail = scene.rail
     for station in np.arange(start + 2.0, stop, 4.0):
         parts.append(_stand(scene, rail, station, 0.0))

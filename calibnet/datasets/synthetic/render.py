@@ -32,6 +32,11 @@ def render_frame(
     """Photograph and scan a scene from one pose.
 
     Args:
+        scene: the world.
+        rig: sensors and mount.
+        index: number of the frame.
+        exposure: how the camera develops; drawn if not given.
+        source: names the frame in messages.
         vehicle_pose: ``world_from_vehicle``, for instance from ``scene.pose(station)``.
         generator: noise, drop-outs and, unless given, the exposure.
         timestamp: seconds; where the moving traffic is.
@@ -41,16 +46,21 @@ def render_frame(
     world_from_camera = world_from_lidar @ invert(rig.camera_from_lidar)
     axis = rig.camera_from_lidar[2, :3]  # the camera's optical axis in the LiDAR frame
     facing = float(np.arctan2(axis[1], axis[0]))
-    backwards = abs(facing) > 0.5 * np.pi
-    reach = (120.0, 30.0) if backwards else (30.0, 120.0)
-    if sector > 3.0 or abs(np.sin(facing)) > 0.7:
-        reach = (100.0, 120.0)
-    mesh = scene.mesh(vehicle_pose, timestamp, *reach)
+    mesh = scene.mesh(vehicle_pose, timestamp, *_reach(facing, sector))
     rays = caster(mesh)
     points = scan(rays, mesh, rig.lidar, world_from_lidar, facing, sector, generator)
     settings = exposure or sample_exposure(generator)
     image = photograph(rays, mesh, scene.weather, rig.camera, world_from_camera, settings, generator)
     return Frame(index, timestamp, image, points, rig.camera, rig.camera_from_lidar.copy(), source)
+
+
+def _reach(facing: float, sector: float) -> tuple[float, float]:
+    """Metres of road behind and ahead that a camera and a sector of the scan can see, or cast shadows into."""
+    if sector > 0.6 * np.pi:
+        return 100.0, 120.0
+    if abs(np.sin(facing)) > 0.7:
+        return 65.0, 65.0
+    return (15.0, 120.0) if abs(facing) < 0.5 * np.pi else (120.0, 15.0)
 
 
 def sample_frame(seed: int) -> Frame:

@@ -84,7 +84,9 @@ _PATTERNS = {
     "OS1-64": lambda: np.linspace(16.6, -16.6, 64),
     "OS1-32": lambda: np.linspace(22.5, -22.5, 32),
     "Pandar40": _pandar40,
-    "Pandar64": lambda: np.concatenate([[14.9, 11.0, 8.0, 5.0], np.linspace(3.0, -6.0, 52), np.linspace(-7.0, -24.0, 8)]),
+    "Pandar64": lambda: np.concatenate(
+        [[14.9, 11.0, 8.0, 5.0], np.linspace(3.0, -6.0, 52), np.linspace(-7.0, -24.0, 8)]
+    ),
     "OS2-128": lambda: np.linspace(11.2, -11.2, 128),
     "OS0-128": lambda: np.linspace(30.0, -30.0, 128),
     "VLS-128": _dense128,
@@ -134,7 +136,9 @@ def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Matrix)
 
 def sample_camera(generator: Generator, pixels: int, maximum_width: int) -> PinholeCamera:
     """Draw an image shape and a lens, at most ``maximum_width`` wide and about ``pixels`` in all."""
-    aspect = float(generator.choice([3.31, 3.31, 3.31, 2.6, 2.6, 2.0, 2.0, 1.78, 1.78, 1.6, 1.333]) * generator.uniform(0.95, 1.05))
+    aspect = float(
+        generator.choice([3.31, 3.31, 3.31, 2.6, 2.6, 2.0, 2.0, 1.78, 1.78, 1.6, 1.333]) * generator.uniform(0.95, 1.05)
+    )
     width = int(min(maximum_width, np.sqrt(pixels * aspect)))
     height = round(width / aspect)
     limit = 110.0 if aspect > 1.6 else 95.0
@@ -145,7 +149,7 @@ def sample_camera(generator: Generator, pixels: int, maximum_width: int) -> Pinh
     return PinholeCamera(width, height, matrix)
 
 
-def sample_rig(generator: Generator, pixels: int = 145_000, maximum_width: int = 660) -> Rig:
+def sample_rig(generator: Generator, pixels: int = 128_000, maximum_width: int = 660) -> Rig:
     """Draw a whole rig: scanner, lens, image shape and mount."""
     side = generator.random()
     if side < 0.72:
@@ -157,7 +161,7 @@ def sample_rig(generator: Generator, pixels: int = 145_000, maximum_width: int =
         yaw += generator.normal(0.0, np.radians(5.0))
     lidar_height = generator.uniform(1.4, 2.2)
     spread = np.array([0.4, 0.35, 0.3])
-    position = np.clip(generator.normal(0.0, spread) + (0.1 * np.cos(yaw), 0.0, -0.2), -1.2, 1.2)
+    position = np.clip(generator.normal([0.1 * np.cos(yaw), 0.0, -0.2], spread), -1.2, 1.2)
     if generator.random() < 0.15:
         position[:2] = generator.uniform(-1.2, 1.2, 2)
     position[2] = max(position[2], 0.9 - lidar_height)

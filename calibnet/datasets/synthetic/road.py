@@ -94,7 +94,7 @@ def bumps(position: Vector) -> Vector:
 
 def sweep(line: CentreLine, strips: tuple[Strip, ...], start: float, stop: float, step: float) -> list[Mesh]:
     """Extrude strips along the centre line between two stations."""
-    stations = np.linspace(start, stop, max(int(round((stop - start) / step)), 1) + 1)
+    stations = np.linspace(start, stop, max(round((stop - start) / step), 1) + 1)
     meshes = []
     for strip in strips:
         width = abs(strip.outer - strip.inner)
@@ -139,6 +139,6 @@ def dashes(start: float, stop: float, lateral: float, width: float, length: floa
 
 def solid(start: float, stop: float, lateral: float, width: float, step: float = 2.5) -> Vector:
     """Areas of a solid line, in pieces short enough to follow bends."""
-    edges = np.linspace(start, stop, max(int(round((stop - start) / step)), 1) + 1)
+    edges = np.linspace(start, stop, max(round((stop - start) / step), 1) + 1)
     half = np.full(len(edges) - 1, 0.5 * width)
     return np.stack([edges[:-1], edges[1:], lateral - half, lateral + half], axis=1)

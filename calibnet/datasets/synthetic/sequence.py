@@ -10,7 +10,8 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic.camera import sample_exposure
 from calibnet.datasets.synthetic.render import render_frame
 from calibnet.datasets.synthetic.rig import Rig, sample_rig
-from calibnet.datasets.synthetic.world import EGO_SPEED, build_scene
+from calibnet.datasets.synthetic.surroundings import EGO_SPEED
+from calibnet.datasets.synthetic.world import build_scene
 from calibnet.errors import ConfigError
 from calibnet.geometry.se3 import Matrix
 

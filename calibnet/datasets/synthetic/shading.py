@@ -37,7 +37,9 @@ class Hits:
 
     def select(self, mask: NDArray[np.bool_]) -> Hits:
         """The hits of a mask ``[N]``."""
-        return Hits(self.rays[mask], self.distance[mask], self.triangle[mask], self.barycentric[mask], self.normal[mask])
+        return Hits(
+            self.rays[mask], self.distance[mask], self.triangle[mask], self.barycentric[mask], self.normal[mask]
+        )
 
 
 def caster(mesh: Mesh) -> Any:
@@ -47,7 +49,7 @@ def caster(mesh: Mesh) -> Any:
     scene = o3d.t.geometry.RaycastingScene(nthreads=_THREADS)
     vertices = np.ascontiguousarray(mesh.corners.reshape(-1, 3))
     faces = np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
-    scene.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(faces))
+    scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(faces))
     return scene
 
 
@@ -57,7 +59,7 @@ def _rays(origin: ArrayLike, directions: Array) -> Any:
     rays = np.empty((len(directions), 6), dtype=np.float32)
     rays[:, :3] = origin
     rays[:, 3:] = directions
-    return o3d.core.Tensor(rays)
+    return o3d.core.Tensor.from_numpy(rays)
 
 
 def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
@@ -112,7 +114,7 @@ def radiance(
         shadow = occluded(scene, point[lit] + 0.02 * normal[lit], weather.sun_direction)
         slant[lit[shadow]] = 0.0
         light = light + slant[:, None] * weather.sun
-    colour = albedo * light
+    colour: Array = albedo * light
 
     shiny = np.flatnonzero(gloss > 0.0)
     if len(shiny):
@@ -128,4 +130,5 @@ def radiance(
 def _stains(point: Array) -> Array:
     """A slow change of brightness over the world, so that repeated tiles do not show."""
     cell = (point * np.float32(9.0)).astype(np.int32) & (TILE - 1)
-    return np.float32(0.7) + np.float32(0.6) * turbulence()[(cell[:, 1] + cell[:, 2]) & (TILE - 1), cell[:, 0]]
+    stain: Array = turbulence()[(cell[:, 1] + cell[:, 2]) & (TILE - 1), cell[:, 0]]
+    return np.float32(0.7) + np.float32(0.6) * stain

@@ -50,7 +50,9 @@ def bollard(atlas: Atlas, generator: Generator) -> Mesh:
     if kind == 0:
         return cylinder((0, 0, 0), (0, 0, 0.7), (0.2, 0.04), paint)
     body = Material(atlas.pick("plain", generator), (0.9, 0.9, 0.9) if kind == 1 else (0.15, 0.15, 0.15))
-    return concatenate([cylinder((0, 0, 0), (0, 0, 1.0), 0.07, body), cylinder((0, 0, 0.75), (0, 0, 0.9), 0.075, paint)])
+    return concatenate(
+        [cylinder((0, 0, 0), (0, 0, 1.0), 0.07, body), cylinder((0, 0, 0.75), (0, 0, 0.9), 0.075, paint)]
+    )
 
 
 def sign(atlas: Atlas, generator: Generator) -> Mesh:
@@ -65,7 +67,7 @@ def sign(atlas: Atlas, generator: Generator) -> Mesh:
     center, middle = np.tile([[-0.06, 0.0, height]], (sides, 1)), np.full((sides, 2), 0.5)
     fan = np.stack([center, rim, np.roll(rim, -1, axis=0), center], axis=1)
     uv = np.stack([middle, disc, np.roll(disc, -1, axis=0), middle], axis=1)
-    back = quads(fan + (0.02, 0, 0), uv, Material(atlas.pick("metal", generator), (0.4, 0.4, 0.4)))
+    back = quads(np.add(fan, (0.02, 0.0, 0.0)), uv, Material(atlas.pick("metal", generator), (0.4, 0.4, 0.4)))
     return concatenate([cylinder((0, 0, 0), (0, 0, height + 0.4 * size), 0.035, metal, 7), quads(fan, uv, face), back])
 
 
@@ -118,9 +120,9 @@ def person(atlas: Atlas, generator: Generator) -> Mesh:
     tones = [tuple(generator.uniform(0.03, 0.6, 3)) for _ in range(2)]
     shirt = Material(atlas.pick("cloth", generator), (tones[0][0], tones[0][1], tones[0][2]), paint=True)
     trousers = Material(atlas.pick("cloth", generator), (0.7 * tones[1][0], 0.7 * tones[1][1], 0.9 * tones[1][2]))
-    shade = generator.uniform(0.25, 0.8)
+    shade, dye = generator.uniform(0.25, 0.8), generator.uniform(0.5, 3.0)
     skin = Material(atlas.pick("plain", generator), (shade, 0.72 * shade, 0.58 * shade))
-    hair = Material(atlas.pick("black", generator), tuple(generator.uniform(0.5, 3.0, 1).repeat(3)))
+    hair = Material(atlas.pick("black", generator), (dye, dye, dye))
     h = height
     parts = []
     for side in (-1.0, 1.0):
@@ -132,7 +134,9 @@ def person(atlas: Atlas, generator: Generator) -> Mesh:
     parts.append(blob((0.01, 0, 0.93 * h), (0.09, 0.08, 0.07 * h), skin, generator, 0.03, 4, 6))
     parts.append(blob((-0.02, 0, 0.955 * h), (0.095, 0.09, 0.055 * h), hair, generator, 0.03, 4, 6))
     if generator.random() < 0.4:
-        parts.append(box((-0.2, 0, 0.58 * h), (0.16, 0.3, 0.22 * h), Material(atlas.pick("cloth", generator), tones[1])))
+        parts.append(
+            box((-0.2, 0, 0.58 * h), (0.16, 0.3, 0.22 * h), Material(atlas.pick("cloth", generator), tones[1]))
+        )
     return concatenate(parts)
 
 

@@ -97,21 +97,41 @@ def sample_style(atlas: Atlas, generator: Generator) -> Style:
     return Style(
         kind=kind,
         side=-1 if generator.random() < 0.75 else 1,
-        lanes=int(generator.integers(2, 4)) if highway else (2 if kind == "street" and generator.random() < 0.25 else 1),
+        lanes=int(generator.integers(2, 4))
+        if highway
+        else (2 if kind == "street" and generator.random() < 0.25 else 1),
         lane=float(uniform(1.4, 2.2)) if wild else float(uniform(2.8, 3.7)),
         median=float(uniform(0.8, 3.0)) if highway else 0.0,
         parking=float(uniform(2.0, 2.4)) if kind in ("street", "suburb") and generator.random() < 0.7 else 0.3,
         pavement=0.0 if highway or wild else float(uniform(1.3, 4.0)),
         kerb=0.0 if highway or wild else float(uniform(0.06, 0.16)),
-        setback={"street": uniform(0.0, 3.0), "suburb": uniform(3.0, 9.0), "highway": uniform(12.0, 30.0),
-                 "industrial": uniform(3.0, 12.0), "park": uniform(12.0, 30.0), "off-road": 40.0}[kind],
-        buildings={"street": uniform(0.75, 1.0), "suburb": uniform(0.5, 0.9), "highway": uniform(0.0, 0.35),
-                   "industrial": uniform(0.4, 0.9), "park": uniform(0.0, 0.3), "off-road": 0.0}[kind],
+        setback={
+            "street": uniform(0.0, 3.0),
+            "suburb": uniform(3.0, 9.0),
+            "highway": uniform(12.0, 30.0),
+            "industrial": uniform(3.0, 12.0),
+            "park": uniform(12.0, 30.0),
+            "off-road": 40.0,
+        }[kind],
+        buildings={
+            "street": uniform(0.75, 1.0),
+            "suburb": uniform(0.5, 0.9),
+            "highway": uniform(0.0, 0.35),
+            "industrial": uniform(0.4, 0.9),
+            "park": uniform(0.0, 0.3),
+            "off-road": 0.0,
+        }[kind],
         storeys={"street": (2, 7), "suburb": (1, 3), "highway": (2, 8), "industrial": (2, 7)}.get(kind, (1, 3)),
         building={"street": "town_house", "suburb": "detached_house", "park": "detached_house"}.get(kind, "block"),
-        parked={"street": uniform(0.2, 0.9), "suburb": uniform(0.1, 0.7), "industrial": uniform(0.1, 0.6)}.get(kind, 0.0),
-        trees={"street": uniform(0.0, 0.6), "suburb": uniform(0.2, 1.0), "highway": uniform(0.1, 1.0),
-               "industrial": uniform(0.0, 0.5)}.get(kind, uniform(0.4, 1.0)),
+        parked={"street": uniform(0.2, 0.9), "suburb": uniform(0.1, 0.7), "industrial": uniform(0.1, 0.6)}.get(
+            kind, 0.0
+        ),
+        trees={
+            "street": uniform(0.0, 0.6),
+            "suburb": uniform(0.2, 1.0),
+            "highway": uniform(0.1, 1.0),
+            "industrial": uniform(0.0, 0.5),
+        }.get(kind, uniform(0.4, 1.0)),
         bushes=float(uniform(0.3, 1.0)) if wild else float(uniform(0.0, 0.5)),
         thickets={"street": 0.0, "suburb": 0.3, "industrial": 0.3}.get(kind, uniform(0.2, 1.0)),
         furniture={"street": uniform(0.4, 1.0), "off-road": 0.03}.get(kind, uniform(0.2, 0.7)),
@@ -122,8 +142,12 @@ def sample_style(atlas: Atlas, generator: Generator) -> Style:
         speed=float(uniform(20.0, 33.0)) if highway else float(uniform(6.0, 14.0)),
         heavy=float(uniform(0.15, 0.6)) if highway or kind == "industrial" else float(uniform(0.05, 0.25)),
         rough={"off-road": uniform(0.15, 0.7), "park": uniform(0.1, 0.4)}.get(kind, uniform(0.0, 0.25)),
-        road=material("soil", "grass", "paving") if wild else material("asphalt", "asphalt", "asphalt", "concrete", grey=tone),
+        road=material("soil", "grass", "paving")
+        if wild
+        else material("asphalt", "asphalt", "asphalt", "concrete", grey=tone),
         walk=material("paving", "paving", "asphalt", "concrete"),
         verge=material("grass") if kind != "street" else material("paving", "grass", "asphalt"),
-        field=material("grass", "grass", "soil") if kind not in ("street", "industrial") else material("asphalt", "grass", "concrete"),
+        field=material("grass", "grass", "soil")
+        if kind not in ("street", "industrial")
+        else material("asphalt", "grass", "concrete"),
     )

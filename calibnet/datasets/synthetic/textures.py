@@ -46,7 +46,9 @@ class Atlas:
         place = uv / metres[:, None]
         place -= np.floor(place)
         cell = np.minimum((place * size[:, None]).astype(np.int32), size[:, None] - 1)
-        return self.texels[self.level_offset[level] + (layer * size + cell[:, 1]) * size + cell[:, 0]]
+        row = self.level_offset[level] + (layer * size + cell[:, 1]) * size + cell[:, 0]
+        picked: NDArray[np.uint8] = self.texels[row]
+        return picked
 
 
 @lru_cache(maxsize=1)
@@ -79,6 +81,6 @@ def atlas() -> Atlas:
 @lru_cache(maxsize=1)
 def turbulence() -> NDArray[np.float32]:
     """Tileable noise ``[TILE, TILE]`` of mean 0.5, for clouds and stains."""
-    from calibnet.datasets.synthetic.tiles import noise
+    from calibnet.datasets.synthetic.drawing import noise
 
     return 0.5 + 0.35 * noise(np.random.default_rng(3), 4, 6, 0.6)

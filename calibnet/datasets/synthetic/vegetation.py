@@ -21,8 +21,13 @@ def _mesh_of(detail: float) -> tuple[int, int]:
 
 
 def leaf_cloud(
-    centers: NDArray[np.float64], radii: NDArray[np.float64], count: int, size: float, material: Material,
-    generator: Generator, detail: float = 1.0,
+    centers: NDArray[np.float64],
+    radii: NDArray[np.float64],
+    count: int,
+    size: float,
+    material: Material,
+    generator: Generator,
+    detail: float = 1.0,
 ) -> Mesh:
     """``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``.
 
@@ -62,7 +67,8 @@ def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
     parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
     parts += [
-        blob(center, 0.85 * radius, leaves, generator, 0.25, *_mesh_of(detail)) for center, radius in zip(centers, radii, strict=True)
+        blob(center, 0.85 * radius, leaves, generator, 0.25, *_mesh_of(detail))
+        for center, radius in zip(centers, radii, strict=True)
     ]
     parts.append(leaf_cloud(centers, radii, 640, generator.uniform(0.14, 0.24), leaves, generator, detail))
     return concatenate(parts)
@@ -80,10 +86,10 @@ def conifer(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
         z = base + layer * step
         wide = radius * (1.0 - 0.85 * layer / layers)
         parts.append(cylinder((0, 0, z), (0, 0, z + 1.5 * step), (wide, 0.1 * wide), leaves, 9))
-    z = 1.0 - np.sqrt(generator.uniform(0.0, 1.0, 420))
+    share = 1.0 - np.sqrt(generator.uniform(0.0, 1.0, 420))  # of the height, as the surface of a cone
     angle = generator.uniform(0.0, 2.0 * np.pi, 420)
-    reach = radius * (1.0 - 0.9 * z) * generator.uniform(0.8, 1.15, 420)
-    centers = np.stack([reach * np.cos(angle), reach * np.sin(angle), base + z * (height - base)], axis=1)
+    reach = radius * (1.0 - 0.9 * share) * generator.uniform(0.8, 1.15, 420)
+    centers = np.stack([reach * np.cos(angle), reach * np.sin(angle), base + share * (height - base)], axis=1)
     parts.append(leaf_cloud(centers, np.full((420, 3), 0.15), 420, 0.2, leaves, generator, detail))
     return concatenate(parts)
 
@@ -94,7 +100,9 @@ def bare_tree(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     height = generator.uniform(5.0, 9.0)
     parts: list[Mesh] = []
 
-    def grow(start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int) -> None:
+    def grow(
+        start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int
+    ) -> None:
         end = start + length * direction
         parts.append(cylinder(start, end, (radius, 0.6 * radius), bark, 5 if depth < 2 else 3))
         if depth == (3 if detail == 1.0 else 2):
@@ -124,7 +132,9 @@ def grass_tuft(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     tip = foot + np.column_stack([generator.normal(0.0, 0.15, (count, 2)), generator.uniform(0.2, 0.65, count)])
     width = 0.04 * generator.normal(size=(count, 3)) * (1.0, 1.0, 0.0)
     material = Material(atlas.pick("grass", generator), (1.2, 1.2, 1.0), paint=True)
-    return triangles(np.stack([foot - width, foot + width, tip], axis=1), generator.uniform(0, 3, (count, 3, 2)), material)
+    return triangles(
+        np.stack([foot - width, foot + width, tip], axis=1), generator.uniform(0, 3, (count, 3, 2)), material
+    )
 
 
 def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
@@ -138,7 +148,9 @@ def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
         [generator.uniform(0.8, 1.5, (count, 2)), np.maximum(centers[:, 2] * generator.uniform(0.9, 1.2, count), 0.4)]
     )
     hulls = [blob(c, 0.88 * r, leaves, generator, 0.25, *_mesh_of(detail)) for c, r in zip(centers, radii, strict=True)]
-    return concatenate([*hulls, leaf_cloud(centers, radii, 800, generator.uniform(0.16, 0.26), leaves, generator, detail)])
+    return concatenate(
+        [*hulls, leaf_cloud(centers, radii, 800, generator.uniform(0.16, 0.26), leaves, generator, detail)]
+    )
 
 
 def hedge(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
@@ -148,7 +160,11 @@ def hedge(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     hull = box((0, 0, 0), (4.0, depth, height), leaves)
     count = int(320 * detail)
     spot = np.column_stack(
-        [generator.uniform(-2, 2, count), generator.choice([-0.5, 0.5], count) * depth, generator.uniform(0, height, count)]
+        [
+            generator.uniform(-2, 2, count),
+            generator.choice([-0.5, 0.5], count) * depth,
+            generator.uniform(0, height, count),
+        ]
     )
     top = generator.random(count) < 0.3
     spot[top, 1], spot[top, 2] = generator.uniform(-0.5, 0.5, top.sum()) * depth, height

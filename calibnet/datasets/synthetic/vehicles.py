@@ -1,6 +1,8 @@
-"""Cars, vans, lorries and buses; x forward, standing on z = 0, painted triangles take the instance's colour."""
+"""Cars, vans and bicycles; x forward, standing on z = 0, painted triangles take the instance's colour."""
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,7 +22,9 @@ from calibnet.datasets.synthetic.textures import Atlas
 Generator = np.random.Generator
 
 
-def _ring(x: float, half_width: float, bottom: float, top: float, taper: float) -> list[tuple[float, float, float]]:
+def cross_section(
+    x: float, half_width: float, bottom: float, top: float, taper: float
+) -> list[tuple[float, float, float]]:
     """An octagonal cross-section of a body at ``x``; ``taper`` narrows its top."""
     height, upper = top - bottom, half_width * taper
     right = [
@@ -32,7 +36,8 @@ def _ring(x: float, half_width: float, bottom: float, top: float, taper: float) 
     return right + [(x, -y, z) for _, y, z in reversed(right)]
 
 
-def _wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: float, generator: Generator) -> Mesh:
+def wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: float, generator: Generator) -> Mesh:
+    """Wheels and their dark arches on both sides of the axles at ``x``."""
     rubber = Material(atlas.pick("black", generator), reflectance=0.6)
     face = Material(atlas.pick("wheel", generator))
     sides = 12
@@ -63,7 +68,8 @@ def contact_shadow(atlas: Atlas, length: float, half_width: float) -> Mesh:
     return rectangle(origin, (0.98 * length, 0, 0), (0, 1.94 * half_width, 0), dark)
 
 
-def _lamps_and_plates(atlas: Atlas, length: float, half_width: float, height: float, generator: Generator) -> Mesh:
+def lamps_and_plates(atlas: Atlas, length: float, half_width: float, height: float, generator: Generator) -> Mesh:
+    """Head and tail lamps, retro-reflective number plates, a grille."""
     lamp, paint = atlas.pick("lamp", generator), atlas.pick("paint", generator)
     parts = []
     for front in (True, False):
@@ -98,12 +104,12 @@ def car(atlas: Atlas, generator: Generator) -> Mesh:
     nose, tail = belt - generator.uniform(0.12, 0.25), belt - (0.06 if style else 0.02)
     body = loft(
         [
-            _ring(front, 0.86 * half, clearance + 0.14, nose - 0.12, 0.95),
-            _ring(front - 0.10, 0.94 * half, clearance + 0.02, nose, 0.93),
-            _ring(front - bonnet, half, clearance, belt, 0.93),
-            _ring(rear + boot + 0.15, half, clearance, belt + 0.02, 0.93),
-            _ring(rear + 0.08, 0.95 * half, clearance + 0.05, tail, 0.93),
-            _ring(rear, 0.88 * half, clearance + 0.2, tail - 0.15, 0.95),
+            cross_section(front, 0.86 * half, clearance + 0.14, nose - 0.12, 0.95),
+            cross_section(front - 0.10, 0.94 * half, clearance + 0.02, nose, 0.93),
+            cross_section(front - bonnet, half, clearance, belt, 0.93),
+            cross_section(rear + boot + 0.15, half, clearance, belt + 0.02, 0.93),
+            cross_section(rear + 0.08, 0.95 * half, clearance + 0.05, tail, 0.93),
+            cross_section(rear, 0.88 * half, clearance + 0.2, tail - 0.15, 0.95),
         ],
         paint,
     )
@@ -123,13 +129,22 @@ def car(atlas: Atlas, generator: Generator) -> Mesh:
             inward = 1.0 if a < 0 else -1.0
             post = [(a, y0, belt), (a + inward * w, y0, belt), (b + inward * w, y1, height), (b, y1, height)]
             pillars.append(post)
-        pillars.append([(x1, side * (roof + 0.01), height - 0.07), (x2, side * (roof + 0.01), height - 0.09),
-                        (x2, side * roof, height), (x1, side * roof, height)])
+        pillars.append(
+            [
+                (x1, side * (roof + 0.01), height - 0.07),
+                (x2, side * (roof + 0.01), height - 0.09),
+                (x2, side * roof, height),
+                (x1, side * roof, height),
+            ]
+        )
     posts = quads(pillars, np.zeros((len(pillars), 4, 2)), paint)
     parts = [
-        body, cabin, top, posts,
-        _wheels(atlas, (front - 0.19 * length, rear + 0.19 * length), half, generator.uniform(0.30, 0.36), generator),
-        _lamps_and_plates(atlas, length, half, clearance + 0.38, generator),
+        body,
+        cabin,
+        top,
+        posts,
+        wheels(atlas, (front - 0.19 * length, rear + 0.19 * length), half, generator.uniform(0.30, 0.36), generator),
+        lamps_and_plates(atlas, length, half, clearance + 0.38, generator),
         box((0, 0, 0.10), (0.8 * length, 1.5 * half, clearance), trim),
         contact_shadow(atlas, length, half),
     ]
@@ -137,7 +152,11 @@ def car(atlas: Atlas, generator: Generator) -> Mesh:
         parts.append(box((x0 - 0.15, side * (half + 0.08), belt), (0.12, 0.18, 0.14), paint))
         seam = Material(trim.texture, (0.6, 0.6, 0.6))
         for x in (x0 - 0.1, 0.5 * (x0 + x3), x3 + 0.25):
-            parts.append(rectangle((x, side * (half + 0.004), clearance + 0.2), (0.015, 0, 0), (0, 0, belt - clearance - 0.3), seam))
+            parts.append(
+                rectangle(
+                    (x, side * (half + 0.004), clearance + 0.2), (0.015, 0, 0), (0, 0, belt - clearance - 0.3), seam
+                )
+            )
     return concatenate(parts)
 
 
@@ -149,16 +168,20 @@ def van(atlas: Atlas, generator: Generator) -> Mesh:
     glass = Material(atlas.pick("glass", generator), gloss=0.9)
     body = loft(
         [
-            _ring(front, 0.9 * half, 0.3, 0.95, 0.95),
-            _ring(front - 0.55, half, 0.22, 1.15, 0.92),
-            _ring(front - 1.25, half, 0.22, height - 0.05, 0.9),
-            _ring(front - 1.6, half, 0.22, height, 0.92),
-            _ring(rear, half, 0.25, height, 0.92),
+            cross_section(front, 0.9 * half, 0.3, 0.95, 0.95),
+            cross_section(front - 0.55, half, 0.22, 1.15, 0.92),
+            cross_section(front - 1.25, half, 0.22, height - 0.05, 0.9),
+            cross_section(front - 1.6, half, 0.22, height, 0.92),
+            cross_section(rear, half, 0.25, height, 0.92),
         ],
         paint,
     )
-    shield = [(front - 0.5, 0.85 * half, 1.13), (front - 0.5, -0.85 * half, 1.13),
-              (front - 1.25, -0.78 * half, height - 0.18), (front - 1.25, 0.78 * half, height - 0.18)]
+    shield = [
+        (front - 0.5, 0.85 * half, 1.13),
+        (front - 0.5, -0.85 * half, 1.13),
+        (front - 1.25, -0.78 * half, height - 0.18),
+        (front - 1.25, 0.78 * half, height - 0.18),
+    ]
     shield = [(x + 0.06, y, z + 0.05) for x, y, z in shield]
     parts = [body, quads([shield], np.zeros((1, 4, 2)), glass)]
     for side in (-1.0, 1.0):
@@ -168,61 +191,9 @@ def van(atlas: Atlas, generator: Generator) -> Mesh:
             art = Material(atlas.pick("art", generator))
             parts.append(rectangle((rear + 0.3, y, 0.8), (length - 2.6, 0, 0), (0, 0, height - 1.4), art, unit_uv=True))
     parts.append(rectangle((rear - 0.01, -0.7 * half, 1.2), (0, 1.4 * half, 0), (0, 0, 0.5), glass))
-    parts.append(_wheels(atlas, (front - 0.9, rear + 0.95), half, 0.34, generator))
+    parts.append(wheels(atlas, (front - 0.9, rear + 0.95), half, 0.34, generator))
     parts.append(contact_shadow(atlas, length, half))
-    parts.append(_lamps_and_plates(atlas, length, half, 0.75, generator))
-    return concatenate(parts)
-
-
-def lorry(atlas: Atlas, generator: Generator) -> Mesh:
-    """A lorry with a box body or container, or a bus."""
-    bus = generator.random() < 0.3
-    length = generator.uniform(10.0, 12.0) if bus else generator.uniform(7.0, 14.0)
-    half, height = 1.25, generator.uniform(2.9, 3.3) if bus else generator.uniform(3.2, 3.9)
-    front, rear = 0.5 * length, -0.5 * length
-    cab = Material(atlas.pick("metal", generator), gloss=0.35, reflectance=0.9, paint=True)
-    glass = Material(atlas.pick("glass", generator), gloss=0.9)
-    dark = Material(atlas.pick("black", generator))
-    parts = [
-        _wheels(atlas, (front - 1.3, rear + 1.4, rear + 2.5), half - 0.02, 0.48, generator),
-        contact_shadow(atlas, length, half),
-    ]
-    if bus:
-        parts.append(loft([_ring(front, 1.15, 0.4, height - 0.1, 0.95), _ring(front - 0.3, half, 0.35, height, 0.96),
-                           _ring(rear, half, 0.35, height, 0.96)], cab))
-        panes = int(length // 1.4)
-        for side in (-1.0, 1.0):
-            for pane in range(panes):
-                start = (rear + 0.4 + 1.4 * pane, side * (half + 0.01), 1.3)
-                parts.append(rectangle(start, (1.28, 0, 0), (0, 0, 0.95), glass))
-        parts.append(rectangle((front + 0.01, -1.0, 1.2), (0, 2.0, 0), (0, 0, 1.4), glass))
-        parts.append(rectangle((rear - 0.01, -0.9, 1.6), (0, 1.8, 0), (0, 0, 0.8), glass))
-    else:
-        cabin_height = generator.uniform(2.5, 3.4)
-        parts.append(box((front - 0.95, 0, 0.5), (1.9, 2.3, cabin_height - 0.5), cab))
-        parts.append(rectangle((front + 0.01, -1.05, 1.5), (0, 2.1, 0), (0, 0, 0.85), glass))
-        parts.append(rectangle((front + 0.01, -0.9, 0.7), (0, 1.8, 0), (0, 0, 0.6), dark))
-        for side in (-1.0, 1.0):
-            parts.append(rectangle((front - 1.3, side * 1.16, 1.5), (0.9, 0, 0), (0, 0, 0.75), glass))
-        load = Material(atlas.pick(str(generator.choice(["plain", "metal", "planks"])), generator), paint=True)
-        body = length - 2.3
-        if generator.random() < 0.2:
-            tank = Material(load.texture, (0.8, 0.8, 0.82), 0.3)
-            ends = [(rear, 0, 0.5 * height + 0.5), (rear + body - 0.3, 0, 0.5 * height + 0.5)]
-            parts += [cylinder(*ends, 0.5 * height - 0.5, tank, 16), box((rear + 0.5 * body, 0, 0.6), (body, 1.0, 0.5), dark)]
-            return concatenate([*parts, _lamps_and_plates(atlas, length + 0.02, 1.2, 0.85, generator)])
-        parts.append(box((rear + 0.5 * body, 0, 0.95), (body, 2 * half, height - 0.95), load))
-        parts.append(box((rear + 0.5 * body, 0, 0.6), (body, 1.0, 0.4), dark))
-        if generator.random() < 0.7:
-            art = Material(atlas.pick("art", generator))
-            for side in (-1.0, 1.0):
-                start = (rear + 0.3, side * (half + 0.01), 1.1)
-                parts.append(rectangle(start, (body - 0.6, 0, 0), (0, 0, height - 1.3), art, unit_uv=True))
-        for y in (-0.65, 0.65):
-            parts.append(rectangle((rear - 0.015, y - 0.012, 1.0), (0, 0.024, 0), (0, 0, height - 1.1), dark))
-        warning = Material(atlas.pick("paint", generator), (0.9, 0.3, 0.1), 0.0, 3.0)
-        parts.append(rectangle((rear - 0.02, -1.1, 0.75), (0, 2.2, 0), (0, 0, 0.14), warning))
-    parts.append(_lamps_and_plates(atlas, length + 0.02, 1.2, 0.85, generator))
+    parts.append(lamps_and_plates(atlas, length, half, 0.75, generator))
     return concatenate(parts)
 
 
@@ -233,8 +204,13 @@ def bicycle(atlas: Atlas, generator: Generator) -> Mesh:
     for x in (-0.52, 0.52):
         angle = np.linspace(0.0, 2.0 * np.pi, 11)
         rim = np.stack([x + 0.33 * np.cos(angle), np.zeros(11), 0.34 + 0.33 * np.sin(angle)], 1)
-        parts += [cylinder(a, b, 0.025, dark, 4) for a, b in zip(rim[:-1], rim[1:], strict=True)]
-    for a, b in (((-0.52, 0, 0.34), (-0.15, 0, 0.85)), ((-0.15, 0, 0.4), (0.4, 0, 0.8)), ((-0.15, 0, 0.4), (-0.52, 0, 0.34)),
-                 ((0.52, 0, 0.34), (0.4, 0, 0.95)), ((0.4, -0.28, 1.0), (0.4, 0.28, 1.0))):
+        parts += [cylinder(a, b, 0.025, dark, 4) for a, b in pairwise(rim)]
+    for a, b in (
+        ((-0.52, 0, 0.34), (-0.15, 0, 0.85)),
+        ((-0.15, 0, 0.4), (0.4, 0, 0.8)),
+        ((-0.15, 0, 0.4), (-0.52, 0, 0.34)),
+        ((0.52, 0, 0.34), (0.4, 0, 0.95)),
+        ((0.4, -0.28, 1.0), (0.4, 0.28, 1.0)),
+    ):
         parts.append(cylinder(a, b, 0.03, frame, 4))
     return concatenate([*parts, box((-0.17, 0, 0.85), (0.25, 0.14, 0.07), dark)])

@@ -50,7 +50,7 @@ class Weather:
         if self.sun.any():
             glow = np.maximum(direction @ self.sun_direction, 0.0)[:, None]
             colour = colour + self.sun * (0.12 * glow**8 + 3.0 * glow**400)
-        return colour.astype(np.float32)
+        return np.asarray(colour, dtype=np.float32)
 
 
 def sample_weather(generator: Generator) -> Weather:
@@ -58,16 +58,16 @@ def sample_weather(generator: Generator) -> Weather:
     overcast = generator.random() < 0.28
     elevation = np.radians(generator.uniform(12.0, 65.0))
     azimuth = generator.uniform(0.0, 2.0 * np.pi)
-    direction = np.array(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-    )
+    direction = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     warmth = np.clip(1.0 - elevation / 0.8, 0.0, 1.0) * generator.uniform(0.5, 1.0)
     sun = generator.uniform(1.3, 4.0) * np.array([1.0, 0.95 - 0.15 * warmth, 0.88 - 0.35 * warmth])
     blue = np.array([0.30, 0.48, 0.85]) * generator.uniform(0.6, 1.0)
     grey = np.array([0.78, 0.82, 0.86]) * generator.uniform(0.7, 1.1)
     clouds = generator.uniform(0.8, 1.0) if overcast else generator.uniform(0.0, 0.65)
     zenith = blue * (1.0 - 0.9 * clouds) + grey * 0.9 * clouds
-    horizon = np.array([0.85, 0.90, 0.95]) * generator.uniform(0.75, 1.05) * (1.0, 1.0 - 0.1 * warmth, 1.0 - 0.25 * warmth)
+    horizon = (
+        np.array([0.85, 0.90, 0.95]) * generator.uniform(0.75, 1.05) * (1.0, 1.0 - 0.1 * warmth, 1.0 - 0.25 * warmth)
+    )
     shade = 1.0 if overcast else generator.uniform(0.35, 1.0)  # how light shadows are
     return Weather(
         sun_direction=direction.astype(np.float32),

@@ -9,18 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic import library
-from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate, quads
-from calibnet.datasets.synthetic.population import CHUNK, populate, vehicle
+from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate
+from calibnet.datasets.synthetic.population import CHUNK, populate
 from calibnet.datasets.synthetic.road import CentreLine
 from calibnet.datasets.synthetic.style import Style, sample_style
+from calibnet.datasets.synthetic.surroundings import horizon, moving_traffic
 from calibnet.datasets.synthetic.textures import atlas
 from calibnet.datasets.synthetic.weather import Weather, sample_weather
 from calibnet.geometry import rotation_from_euler_xyz, transform
 from calibnet.geometry.se3 import Matrix
 
 Generator = np.random.Generator
-EGO_SPEED = 10.0
-"""Metres a second: a metre a frame at 10 Hz."""
 
 
 @dataclass(eq=False)
@@ -79,8 +78,8 @@ class Scene:
         first, last = int((station - behind) // CHUNK), int((station + ahead) // CHUNK)
         here = int(station // CHUNK)
         parts = [self._chunk(index, abs(index - here) <= 1) for index in range(first, last + 1)]
-        parts += _traffic(self, station, time, behind, ahead, world_from_vehicle[:3, 3])
-        parts.append(_horizon(self, world_from_vehicle[:3, 3]))
+        parts += moving_traffic(self, station, time, behind, ahead, world_from_vehicle[:3, 3])
+        parts.append(horizon(self, world_from_vehicle[:3, 3]))
         return concatenate(parts)
 
     def _chunk(self, index: int, near: bool) -> Mesh:
@@ -101,7 +100,9 @@ def build_scene(generator: Generator, length: float = 400.0) -> Scene:
     bends = np.column_stack(
         [bend * generator.uniform(0.2, 0.6, 2), wave * generator.uniform(0.7, 2.5, 2), generator.uniform(0, 6.3, 2)]
     )
-    hills = np.column_stack([generator.uniform(0.0, 1.8, 2), generator.uniform(160, 400, 2), generator.uniform(0, 6.3, 2)])
+    hills = np.column_stack(
+        [generator.uniform(0.0, 1.8, 2), generator.uniform(160, 400, 2), generator.uniform(0, 6.3, 2)]
+    )
     tone = float(generator.uniform(0.6, 1.0))
     season = np.array([1.0, 1.0, 1.0]) if generator.random() < 0.85 else np.array([2.2, 1.2, 0.6])
     return Scene(
@@ -109,8 +110,10 @@ def build_scene(generator: Generator, length: float = 400.0) -> Scene:
         style=style,
         weather=sample_weather(generator),
         line=CentreLine(bends, hills, length),
-        paint=Material(tiles.pick("paint", generator), (tone, tone, tone * float(generator.choice([1.0, 1.0, 0.3]))), 0.0, 1.0),
-        kerb_texture=tiles.pick("concrete", generator),
+        paint=Material(
+            tiles.pick("paint", generator), (tone, tone, tone * float(generator.choice([1.0, 1.0, 0.3]))), 0.0, 1.0
+        ),
+        kerb_texture=tiles.pick("kerb", generator),
         dash=((6.0, 12.0), (3.0, 6.0), (2.0, 4.0), (4.0, 8.0))[int(generator.integers(4))],
         center_line=str(generator.choice(["dashed", "double", "none"], p=[0.5, 0.2, 0.3])),
         edge_lines=bool(style.kind == "highway" or generator.random() < 0.4),
@@ -122,54 +125,3 @@ def build_scene(generator: Generator, length: float = 400.0) -> Scene:
         outer_rails=bool(generator.random() < 0.6),
         park_on_pavement=bool(generator.random() < 0.3),
     )
-
-
-def _traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Matrix) -> list[Mesh]:
-    """Moving vehicles: every lane is an endless queue on a jittered grid that moves at one speed."""
-    style, parts = scene.style, []
-    if not style.traffic:
-        return parts
-    for own in (True, False):
-        for lane in range(style.lanes):
-            speed = EGO_SPEED if own and lane == 0 else scene.style.speed * (1.0 + 0.15 * lane)
-            travelled = (speed if own else -speed) * time
-            gap = style.traffic * (1.5 if own and lane == 0 else 1.0)
-            first = int((station - behind - travelled) // gap)
-            for number in range(first, int((station + ahead - travelled) // gap) + 1):
-                generator = np.random.default_rng([scene.seed, 7, int(own), lane, number + 1_000_000])
-                place = travelled + gap * (number + generator.uniform(0.15, 0.85))
-                heavy = generator.random() < style.heavy
-                kind = "lorry" if heavy and generator.random() < 0.5 else "van" if heavy else "car"
-                mesh, colour = vehicle(kind, generator)
-                lateral = style.lane_center(lane, own) + generator.normal(0.0, 0.15)
-                position = scene.line.place(place, lateral)
-                distance = float(np.linalg.norm(position - ego))
-                clear = 9.0 if own and lane == 0 else 4.5
-                if distance < clear + (6.0 if kind == "lorry" else 0.0):
-                    continue
-                turn = float(scene.line.heading(place)) + (0.0 if own else np.pi)
-                parts.append(mesh.placed(position - (0, 0, 0.02), turn, 1.0, colour))
-    return parts
-
-
-def _horizon(scene: Scene, ego: Matrix) -> Mesh:
-    """Distant land and a skyline around the vehicle, beyond any LiDAR's reach."""
-    generator = np.random.default_rng([scene.seed, 3])
-    groups = ("leaves", "facade", "soil") if scene.style.kind in ("street", "industrial") else ("leaves", "grass")
-    parts = []
-    for radius, low, high in ((190.0, 2.0, 14.0), (420.0, 6.0, 45.0)):
-        count = 180
-        angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
-        height = generator.uniform(low, high) * (0.6 + 0.4 * np.sin(3.0 * angle[:-1] + generator.uniform(0, 6)))
-        height = height * generator.uniform(0.6, 1.2, count)
-        ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count + 1, -12.0)], 1) + ego
-        top = ring + np.stack([np.zeros(count + 1), np.zeros(count + 1), 12.0 + np.append(height, height[0])], 1)
-        flat = generator.random() < 0.5  # steps, as roofs, or slopes, as trees and hills
-        right = np.column_stack([top[1:, :2], top[:-1, 2]]) if flat else top[1:]
-        corners = np.stack([ring[:-1], ring[1:], right, top[:-1]], axis=1)
-        u = np.stack([angle[:-1], angle[1:], angle[1:], angle[:-1]], 1) * radius
-        uv = np.stack([u, corners[..., 2] * -1.0], axis=-1) * 0.5
-        parts.append(quads(corners, uv, Material(atlas().pick(str(generator.choice(groups)), generator), (0.6, 0.6, 0.6))))
-    plain = np.array([[[-450, -450, -6], [450, -450, -6], [450, 450, -6], [-450, 450, -6]]]) + ego
-    parts.append(quads(plain, plain[..., :2] - ego[:2], scene.style.field))
-    return concatenate(parts)
