@@ -6,10 +6,15 @@ through `Layout.stages`.
 
 from __future__ import annotations
 
+import rerun as rr
 import rerun.blueprint as rrb
 
 from inspector import entities
-from inspector.observation import Detail, Layout, StageLayout
+from inspector.legends import LEGEND_SPACING
+from inspector.observation import Detail, Grid, Layout, StageLayout
+
+SCENE_BACKGROUND = (44, 47, 54)
+"""Grey enough that dark points of the picture stay visible."""
 
 View = rrb.View | rrb.Container
 
@@ -17,7 +22,7 @@ View = rrb.View | rrb.Container
 def make_blueprint(layout: Layout) -> rrb.Blueprint:
     """All tabs that the recording has data for."""
     tabs: list[View] = [overview_tab(layout), cascade_tab(layout)]
-    inside = [stage for stage in layout.stages if stage.strides]
+    inside = [stage for stage in layout.stages if stage.grids]
     if inside:
         tabs += [
             rrb.Tabs(*(cost_volume_page(stage, layout) for stage in inside), name="Cost volumes"),
@@ -37,7 +42,9 @@ def make_blueprint(layout: Layout) -> rrb.Blueprint:
 def overview_tab(layout: Layout) -> View:
     """The result at one look: three overlays, the depth colours, the error curves, the table."""
     overlays = [
-        overlay_view("Miscalibrated" if layout.has_reference else "Start: calibration as given", entities.OVERLAY_MISCALIBRATED),
+        overlay_view(
+            "Miscalibrated" if layout.has_reference else "Start: calibration as given", entities.OVERLAY_MISCALIBRATED
+        ),
         overlay_view("Corrected", entities.OVERLAY_CORRECTED),
     ]
     if layout.has_reference:
@@ -59,7 +66,7 @@ def overview_tab(layout: Layout) -> View:
         rrb.Horizontal(*overlays),
         legend("Depth of the points", entities.LEGEND_DEPTH),
         below,
-        row_shares=[4.0, 1.0, 8.0],
+        row_shares=[4.0, 1.2, 9.0],
         name="Overview",
     )
 
@@ -68,18 +75,25 @@ def cascade_tab(layout: Layout) -> View:
     """The overlay after every stage, beside the displacement and confidence that led to it."""
     rows: list[View] = [
         rrb.Horizontal(
-            overlay_view("Before stage 1: miscalibrated" if layout.has_reference else "Start", entities.OVERLAY_MISCALIBRATED),
+            overlay_view(
+                "Before the first stage: miscalibrated" if layout.has_reference else "Start",
+                entities.OVERLAY_MISCALIBRATED,
+            ),
             overlay_view("Current: play the timeline “step” to see it corrected", entities.OVERLAY_CURRENT),
             legend("Colours of displacement (direction; white = none)", entities.LEGEND_DISPLACEMENT),
         )
     ]
     for stage in layout.stages:
         views: list[View] = [overlay_view(f"After {_lower(stage.title)}", entities.overlay_stage(stage.number))]
-        if stage.strides:
-            stride = stage.strides[0]
+        if stage.grids:
+            grid = stage.grids[0]
             views += [
-                image_view(f"{stage.title}: displacement found, arrows in cells of {stride} px", entities.displacement(stage.number)),
-                image_view(f"{stage.title}: confidence, bright = sure", entities.confidence(stage.number)),
+                image_view(
+                    f"{stage.title}: displacement found, arrows in cells of {grid.stride} px",
+                    entities.displacement(stage.number),
+                    grid,
+                ),
+                image_view(f"{stage.title}: confidence, bright = sure", entities.confidence(stage.number), grid),
             ]
         rows.append(rrb.Horizontal(*views))
     return rrb.Vertical(*rows, name="Cascade")
@@ -88,16 +102,20 @@ def cascade_tab(layout: Layout) -> View:
 def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
     """One row a scale: score where points are now, best match, the chosen cell's window, the tensor."""
     rows: list[View] = []
-    for stride in stage.strides:
+    truth = ", white true" if layout.has_reference else ""
+    for grid in stage.grids:
+        stride = grid.stride
         score, best = entities.score(stage.number, stride), entities.best_match(stage.number, stride)
         views: list[View] = [
-            image_view(f"1/{stride}: score where points are now, bright = match", score),
-            image_view(f"1/{stride}: best match, colour = direction", best),
-            image_view(f"1/{stride}: search window of the framed cell", entities.window(stage.number, stride)),
+            image_view(f"1/{stride}: score where points are now, bright = match", score, grid),
+            image_view(f"1/{stride}: best match, colour = direction", best, grid),
+            image_view(f"Red now, green found{truth}", entities.window(stage.number, stride)),
         ]
         if layout.detail is Detail.FULL:
-            views.append(tensor_view(f"1/{stride}: whole cost volume, sliders dy dx", entities.cost_volume(stage.number, stride)))
-        rows.append(rrb.Horizontal(*views, column_shares=[3.0, 3.0, 1.5, 3.0][: len(views)]))
+            views.append(
+                tensor_view(f"1/{stride}: whole cost volume, sliders dy dx", entities.cost_volume(stage.number, stride))
+            )
+        rows.append(rrb.Horizontal(*views, column_shares=[3.0, 3.0, 2.0, 3.0][: len(views)]))
     return rrb.Vertical(*rows, name=stage.title)
 
 
@@ -105,10 +123,16 @@ def hourglass_page(stage: StageLayout) -> View:
     """One row a scale: the strongest channels before and after aggregation."""
     rows = [
         rrb.Horizontal(
-            image_view(f"1/{stride}: before the hourglass, 16 liveliest channels", entities.hourglass_before(stage.number, stride)),
-            image_view(f"1/{stride}: after the hourglass, 16 liveliest channels", entities.hourglass_after(stage.number, stride)),
+            image_view(
+                f"1/{stride}: before the hourglass, 16 liveliest channels",
+                entities.hourglass_before(stage.number, stride),
+            ),
+            image_view(
+                f"1/{stride}: after the hourglass, 16 liveliest channels",
+                entities.hourglass_after(stage.number, stride),
+            ),
         )
-        for stride in stage.strides
+        for stride, _, _ in stage.grids
     ]
     return rrb.Vertical(*rows, name=stage.title)
 
@@ -120,19 +144,20 @@ def scene_tab(layout: Layout) -> View:
         scene_view(f"Cloud coloured through the {start} extrinsic", entities.CLOUD_CORRECTED),
         scene_view("Cloud coloured through the corrected extrinsic", entities.CLOUD_INITIAL),
     )
-    return rrb.Vertical(
-        clouds, legend("Camera frustums", entities.LEGEND_STAGES), row_shares=[12.0, 1.0], name="3D"
-    )
+    return rrb.Vertical(clouds, frustum_legend(layout), row_shares=[12.0, 1.0], name="3D")
 
 
 def overlay_view(name: str, points: str) -> rrb.Spatial2DView:
     """Points over the frame's image."""
-    return rrb.Spatial2DView(origin="/", contents=[f"/{entities.IMAGE}", f"/{points}"], name=name)
+    return rrb.Spatial2DView(origin="/", contents=[f"/{entities.IMAGE}", f"/{points}/**"], name=name)
 
 
-def image_view(name: str, path: str) -> rrb.Spatial2DView:
-    """A map and the marks drawn on it."""
-    return rrb.Spatial2DView(origin=f"/{path}", name=name)
+def image_view(name: str, path: str, grid: Grid | None = None) -> rrb.Spatial2DView:
+    """A map and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
+    if grid is None:
+        return rrb.Spatial2DView(origin=f"/{path}", name=name)
+    bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
 
 
 def legend(name: str, path: str) -> rrb.Spatial2DView:
@@ -140,14 +165,19 @@ def legend(name: str, path: str) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(origin=f"/{path}", name=name)
 
 
+def frustum_legend(layout: Layout) -> rrb.Spatial2DView:
+    """The names of the frustums in their colours, all in one row."""
+    width = LEGEND_SPACING * (len(layout.stages) + (2 if layout.has_reference else 1))
+    bounds = rrb.VisualBounds2D(x_range=(-LEGEND_SPACING / 2, width - LEGEND_SPACING / 2), y_range=(-8.0, 16.0))
+    return rrb.Spatial2DView(origin=f"/{entities.LEGEND_STAGES}", name="Camera frustums", visual_bounds=bounds)
+
+
 def tensor_view(name: str, path: str) -> rrb.TensorView:
     """A cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
     return rrb.TensorView(
         origin=f"/{path}",
         name=name,
-        slice_selection=rrb.TensorSliceSelection(
-            width=3, height=2, slider=[0, 1]
-        ),
+        slice_selection=rrb.TensorSliceSelection(width=3, height=2, slider=[0, 1]),
         scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="nearest"),
         view_fit="FillKeepAspectRatio",
     )
@@ -159,8 +189,12 @@ def scene_view(name: str, without: str) -> rrb.Spatial3DView:
         origin=f"/{entities.WORLD}",
         contents=["$origin/**", f"- /{without}"],
         name=name,
-        eye_controls=rrb.EyeControls3D(position=(-6.0, 2.5, 4.0), look_target=(8.0, 0.0, 0.0), eye_up=(0.0, 0.0, 1.0)),
+        eye_controls=rrb.EyeControls3D(
+            position=(-6.0, 2.0, 2.8), look_target=(12.0, 0.0, -0.5), eye_up=(0.0, 0.0, 1.0)
+        ),
         line_grid=rrb.LineGrid3D(visible=False),
+        background=SCENE_BACKGROUND,
+        defaults=[rr.TransformAxes3D(0.0)],
     )
 
 

@@ -16,6 +16,7 @@ EMPTY: Final[Rgb] = (34, 34, 40)
 """Cells that hold no LiDAR point."""
 INITIAL: Final[Rgb] = (255, 75, 75)
 REFERENCE: Final[Rgb] = (255, 255, 255)
+FOUND: Final[Rgb] = (90, 255, 120)
 STAGES: Final[dict[int, Rgb]] = {
     1: (255, 140, 40),
     2: (255, 205, 60),
@@ -39,10 +40,11 @@ def depth_colors(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
         ``[..., 3]`` uint8 RGB.
     """
     log_depth = np.log(np.maximum(depth, 1e-3) / NEAR_M) / np.log(FAR_M / NEAR_M)
-    return TURBO[(245 - 235 * np.clip(log_depth, 0.0, 1.0)).astype(np.intp)]
+    colors: NDArray[np.uint8] = TURBO[(245 - 235 * np.clip(log_depth, 0.0, 1.0)).astype(np.intp)]
+    return colors
 
 
-def flow_colors(displacement: NDArray[np.floating], reach: float) -> NDArray[np.uint8]:
+def flow_colors(displacement: NDArray[np.floating] | NDArray[np.integer], reach: float) -> NDArray[np.uint8]:
     """Hue by direction, saturation by the square root of length; white = none.
 
     Args:
@@ -58,14 +60,16 @@ def flow_colors(displacement: NDArray[np.floating], reach: float) -> NDArray[np.
     saturation = np.sqrt(np.clip(np.hypot(dx, dy) / reach, 0.0, 1.0))
     hsv = np.stack([hue, saturation, np.ones_like(hue)], axis=-1).astype(np.float32)
     rgb = cv2.cvtColor(hsv[None], cv2.COLOR_HSV2RGB)[0]
-    return (255.0 * rgb).round().astype(np.uint8).reshape(*shape, 3)
+    colors: NDArray[np.uint8] = (255.0 * rgb).round().astype(np.uint8).reshape(*shape, 3)
+    return colors
 
 
 def map_colors(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
     """Viridis from ``low`` (dark) to ``high`` (bright); ``[...]`` to ``[..., 3]`` uint8 RGB."""
     span = max(high - low, 1e-6)
     level = np.clip((np.nan_to_num(values.astype(np.float32)) - low) / span, 0.0, 1.0)
-    return VIRIDIS[(255.0 * level).astype(np.intp)]
+    colors: NDArray[np.uint8] = VIRIDIS[(255.0 * level).astype(np.intp)]
+    return colors
 
 
 def robust_limits(values: NDArray[np.floating]) -> tuple[float, float]:

@@ -21,6 +21,7 @@ OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
 OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
 OVERLAY_CURRENT = "overlay/current"
+OVERLAY_CAPTION = "overlay/current/caption"
 
 WORLD = "world"
 CLOUD_INITIAL = "world/cloud/initial"
@@ -32,6 +33,10 @@ CAMERA_REFERENCE = "world/camera/reference"
 LEGEND_DEPTH = "legend/depth"
 LEGEND_DISPLACEMENT = "legend/displacement"
 LEGEND_STAGES = "legend/stages"
+
+TRAINING_APPLICATION_ID = "calib_inspect_training"
+TRAINING = "training"
+VALIDATION = "validation"
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 """The error curves and their units."""
@@ -102,9 +107,14 @@ def window(stage: int, stride: int) -> str:
     return f"stage_{stage}/scale_{stride}/window"
 
 
-def window_marks(stage: int, stride: int) -> str:
-    """The true and the found displacement in that window."""
-    return f"stage_{stage}/scale_{stride}/window/marks"
+def window_cells(stage: int, stride: int) -> str:
+    """The cell where the point is now and the one where it was found, framed in that window."""
+    return f"{window(stage, stride)}/cells"
+
+
+def window_truth(stage: int, stride: int) -> str:
+    """Where the reference puts the point, in that window or, if outside, on its border."""
+    return f"{window(stage, stride)}/truth"
 
 
 def chosen_cell(parent: str) -> str:

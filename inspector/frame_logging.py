@@ -12,7 +12,7 @@ from inspector.overlay import Overlay, Thinning, make_overlay
 from inspector.table import stage_table
 
 JPEG_QUALITY = 85
-THINNING = {Detail.OVERVIEW: Thinning(cells_across=160, pixel=1.0), Detail.FULL: Thinning(cells_across=400, pixel=0.25)}
+THINNING = {Detail.OVERVIEW: Thinning(cells_across=160, pixel=1.0), Detail.FULL: Thinning(cells_across=260, pixel=0.25)}
 """Overview keeps about 3,000 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
 
 
@@ -40,11 +40,29 @@ def log_frame(rec: rr.RecordingStream, observation: Observation, detail: Detail)
     if observation.reference is not None:
         rec.log(entities.OVERLAY_REFERENCE, overlay(observation.reference).archetype())
     rec.log(entities.OVERLAY_CURRENT, miscalibrated.archetype())
-    for number, points in after_stage.items():
-        rec.log(entities.overlay_stage(number), points.archetype())
-        rec.set_time(entities.STEP, sequence=first_step + number)
+    _log_caption(rec, observation, "start" if observation.reference is None else "miscalibrated", trace.initial)
+    for stage in trace.stages:
+        points = after_stage[stage.number]
+        rec.log(entities.overlay_stage(stage.number), points.archetype())
+        rec.set_time(entities.STEP, sequence=first_step + stage.number)
         rec.log(entities.OVERLAY_CURRENT, points.archetype())
+        _log_caption(rec, observation, f"after stage {stage.number}", stage.after)
         rec.set_time(entities.STEP, sequence=first_step)
+
+
+def _log_caption(
+    rec: rr.RecordingStream, observation: Observation, state: str, camera_from_lidar: NDArray[np.float64]
+) -> None:
+    """Write into the picture which stage `entities.OVERLAY_CURRENT` shows, and how far off it is."""
+    error = observation.error(camera_from_lidar)
+    figures = "" if error is None else f": {error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
+    width = observation.frame.camera.width
+    rec.log(
+        entities.OVERLAY_CAPTION,
+        rr.Points2D(
+            [[width / 2, 0.0]], labels=f"{state}{figures}", colors=colors.REFERENCE, radii=0.0, show_labels=True
+        ),
+    )
 
 
 def _log_errors(rec: rr.RecordingStream, observation: Observation) -> None:
@@ -63,15 +81,15 @@ def log_curve_styles(rec: rr.RecordingStream, layout: Layout) -> None:
     """Name and colour the error curves, once for the recording."""
     if not layout.has_reference:
         return
-    for kind, unit in entities.ERROR_KINDS.items():
+    for kind in entities.ERROR_KINDS:
         curves = {entities.error_initial(kind): ("miscalibrated", colors.INITIAL)}
         for stage in layout.stages:
-            name = f"after stage {stage.number} (±{stage.range.replace('/', '°/')} m)"
+            name = f"after {stage.title.lower()}"
             curves[entities.error_stage(kind, stage.number)] = (name, colors.STAGES[stage.number])
         for path, (name, color) in curves.items():
             rec.log(
                 path,
-                rr.SeriesLines(names=f"{name} [{unit}]", colors=color, widths=2.0),
-                rr.SeriesPoints(names=f"{name} [{unit}]", colors=color, marker_sizes=3.0),
+                rr.SeriesLines(names=name, colors=color, widths=2.0),
+                rr.SeriesPoints(names=name, colors=color, marker_sizes=3.0),
                 static=True,
             )

@@ -10,6 +10,8 @@ from inspector.observation import Layout
 
 BAR_WIDTH, BAR_HEIGHT = 600, 8
 WHEEL_RADIUS = 40
+LEGEND_SPACING = 120.0
+"""Between two names of the frustum legend, in its own units."""
 LABELLED_DEPTHS_M = (3, 5, 10, 20, 40, 80)
 
 
@@ -48,7 +50,7 @@ def _log_camera_names(rec: rr.RecordingStream, layout: Layout) -> None:
     names |= {f"after stage {stage.number}": colors.STAGES[stage.number] for stage in layout.stages}
     if layout.has_reference:
         names["reference"] = colors.REFERENCE
-    positions = [(120.0 * position, 0.0) for position in range(len(names))]
+    positions = [(LEGEND_SPACING * position, 0.0) for position in range(len(names))]
     _log_labels(rec, entities.LEGEND_STAGES, positions, list(names), list(names.values()))
 
 
@@ -61,8 +63,6 @@ def _log_labels(
 ) -> None:
     rec.log(
         path,
-        rr.Points2D(
-            positions, labels=labels, colors=label_colors, radii=rr.Radius.ui_points(5.0), show_labels=True
-        ),
+        rr.Points2D(positions, labels=labels, colors=label_colors, radii=rr.Radius.ui_points(5.0), show_labels=True),
         static=True,
     )

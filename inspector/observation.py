@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,19 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import PoseError, pose_error
 from calibnet.trace import CascadeTrace
 
-Skipped = tuple[int, str]
-"""A stage that did not run, and why."""
+
+class Skipped(Protocol):
+    """A stage that did not run, and why."""
+
+    @property
+    def number(self) -> int:
+        """1 to 5."""
+        ...
+
+    @property
+    def reason(self) -> str:
+        """One sentence that names the stage."""
+        ...
 
 
 class Detail(StrEnum):
@@ -44,13 +56,27 @@ class Observation:
         return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
 
 
+class Grid(NamedTuple):
+    """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width`` of them."""
+
+    stride: int
+    height: int
+    width: int
+
+
 @dataclass(frozen=True)
 class StageLayout:
-    """A stage that appears in the recording: its number, range as text, and cost-volume strides."""
+    """A stage that appears in the recording.
+
+    Attributes:
+        number: 1 to 5.
+        range: for instance ``"5/0.5"``.
+        grids: stride, height and width in cells of each cost volume, fine to coarse.
+    """
 
     number: int
     range: str
-    strides: tuple[int, ...]
+    grids: tuple[Grid, ...]
 
     @property
     def title(self) -> str:
@@ -74,7 +100,9 @@ class Layout:
             StageLayout(
                 stage.number,
                 str(stage.range),
-                tuple(scale.stride for scale in stage.detail.scales) if stage.detail else (),
+                tuple(Grid(scale.stride, *scale.occupied.shape) for scale in stage.detail.scales)
+                if stage.detail
+                else (),
             )
             for stage in observation.trace.stages
         )

@@ -13,8 +13,9 @@ from calibnet.geometry import project
 from calibnet.geometry.projection import nearest_per_cell
 from inspector.colors import depth_colors
 
-POINT_SIZE = 1.6
+POINT_SIZE = 1.1
 """Radius in points of the screen, so that zooming separates the points instead of growing them."""
+
 
 @dataclass(frozen=True)
 class Thinning:

@@ -15,6 +15,7 @@ from typing import Any
 
 import rerun as rr
 
+from calibnet.errors import CalibnetError
 from inspector import entities
 from inspector.blueprint import make_blueprint
 from inspector.frame_logging import log_curve_styles, log_frame
@@ -27,8 +28,17 @@ APPLICATION_ID = "calib-inspect"
 FLUSH_EVERY = {Detail.OVERVIEW: 4, Detail.FULL: 1}
 """Frames between flushes. Every flush writes one chunk an entity, some 3 kB each: a third of a
 small frame, nothing beside a large one. A kill loses at most this many frames."""
+FLUSH_TIMEOUT_S = 60.0
 FLUSH_BYTES = 64 * 1024 * 1024
 """Above any batch, so that only the flushes cut chunks."""
+
+
+class RecordingLostError(CalibnetError):
+    """Nothing can be written any more; Rerun would wait for it for ever, even when the process ends."""
+
+
+class ViewerClosedError(CalibnetError):
+    """The only place the recording went to has gone."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +51,7 @@ class RunDescription:
     """
 
     title: str
-    options: dict[str, str | int]
+    options: dict[str, Any]
 
     @property
     def recording_id(self) -> str:
@@ -64,6 +74,7 @@ class Recording:
         rr.set_strict_mode(True)
         self._detail: Detail = layout.detail
         self._frames = 0
+        self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
         self._rec = rr.RecordingStream(
             APPLICATION_ID,
             recording_id=description.recording_id,
@@ -87,12 +98,31 @@ class Recording:
         log_scene(self._rec, observation, self._detail)
         self._frames += 1
         if self._frames % FLUSH_EVERY[self._detail] == 0:
-            self._rec.flush()
+            self._flush()
 
     def close(self) -> None:
         """Flush and write the footer; more calls do nothing."""
-        self._rec.flush()
+        self._flush()
         self._rec.disconnect()
+
+    def _flush(self) -> None:
+        """Hand all rows to the sinks.
+
+        Raises:
+            RecordingLostError: the file's writer has given up, for instance on a quota.
+            ViewerClosedError: the viewer has gone and there is no file.
+        """
+        try:
+            self._rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        except RuntimeError as error:
+            if "timed out" in str(error):
+                raise RecordingLostError(
+                    "The recording can no longer be written: the disk or a quota is full, or a viewer does not respond."
+                ) from None
+            if not self._has_file:
+                raise ViewerClosedError(
+                    "The viewer has closed the connection, and there is no --save to go on with."
+                ) from None
 
     def __enter__(self) -> Recording:
         return self

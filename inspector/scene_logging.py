@@ -16,6 +16,7 @@ from inspector import colors, entities
 from inspector.observation import Detail, Observation
 
 POINTS = {Detail.OVERVIEW: 6_000, Detail.FULL: 30_000}
+SEEN_SHARE = 0.8
 OUTSIDE = (70, 72, 80)
 """Points that the camera does not see."""
 POINT_SIZE = 1.8
@@ -32,9 +33,9 @@ def log_scene_frame(rec: rr.RecordingStream) -> None:
 def log_scene(rec: rr.RecordingStream, observation: Observation, detail: Detail) -> None:
     """Log both clouds and all frustums of one frame."""
     frame, trace = observation.frame, observation.trace
-    limit = POINTS[detail]
-    rec.log(entities.CLOUD_INITIAL, _cloud(frame, trace.initial, limit))
-    rec.log(entities.CLOUD_CORRECTED, _cloud(frame, trace.corrected, limit))
+    points = _subsample(observation, POINTS[detail])
+    rec.log(entities.CLOUD_INITIAL, _colored(frame, points, trace.initial))
+    rec.log(entities.CLOUD_CORRECTED, _colored(frame, points, trace.corrected))
     _log_camera(rec, entities.CAMERA_INITIAL, trace.initial, frame.camera, colors.INITIAL)
     for stage in trace.stages:
         color = colors.STAGES[stage.number]
@@ -43,11 +44,26 @@ def log_scene(rec: rr.RecordingStream, observation: Observation, detail: Detail)
         _log_camera(rec, entities.CAMERA_REFERENCE, observation.reference, frame.camera, colors.REFERENCE)
 
 
-def _cloud(frame: Frame, camera_from_lidar: NDArray[np.float64], limit: int) -> rr.Points3D:
-    """The scan, subsampled evenly; points that fall into the image have its colour."""
-    near = np.flatnonzero(np.square(frame.points[:, :3]).sum(axis=1) < RANGE_M**2)
-    kept = near[:: max(1, -(-len(near) // limit))]
-    points = frame.points[kept]
+def _subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
+    """At most ``limit`` points ``[M, 4]``, most of them such as the camera sees before or after."""
+    frame = observation.frame
+    near = np.square(frame.points[:, :3]).sum(axis=1) < RANGE_M**2
+    seen = np.zeros(len(frame.points), dtype=np.bool_)
+    for camera_from_lidar in (observation.trace.initial, observation.trace.corrected):
+        seen[project(frame.points, camera_from_lidar, frame.camera).index] = True
+    parts = [
+        _evenly(np.flatnonzero(near & seen), round(SEEN_SHARE * limit)),
+        _evenly(np.flatnonzero(near & ~seen), round((1.0 - SEEN_SHARE) * limit)),
+    ]
+    return frame.points[np.concatenate(parts)]
+
+
+def _evenly(rows: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
+    return rows[:: max(1, -(-len(rows) // limit))]
+
+
+def _colored(frame: Frame, points: NDArray[np.float32], camera_from_lidar: NDArray[np.float64]) -> rr.Points3D:
+    """Points with the colour of the pixel they fall on, grey where they fall on none."""
     projection = project(points, camera_from_lidar, frame.camera)
     rgb = np.full((len(points), 3), OUTSIDE, dtype=np.uint8)
     u, v = np.rint(projection.pixels).astype(np.intp).T

@@ -14,8 +14,6 @@ from inspector.observation import Detail, Observation
 CELL_FRAME: colors.Rgb = (255, 0, 200)
 ARROW_EVERY = 2
 """Cells between two arrows of the displacement field, in both directions."""
-DIMMED = 0.35
-"""Brightness of cells without a LiDAR point, which no stage looks at."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
 
 
@@ -39,9 +37,7 @@ def log_stage(
         log_hourglass(rec, stage.number, scale)
 
 
-def log_displacement(
-    rec: rr.RecordingStream, number: int, results: StageDetail, stride: int, reach_px: float
-) -> None:
+def log_displacement(rec: rr.RecordingStream, number: int, results: StageDetail, stride: int, reach_px: float) -> None:
     """Log the displacement field as flow colours with arrows, and its confidence."""
     seen = results.confidence > 0
     field = colors.flow_colors(results.displacement, reach_px)
@@ -72,7 +68,7 @@ def log_cost_volume(
     middle_y, middle_x = scale.volume.shape[0] // 2, scale.volume.shape[1] // 2
     centre = scale.volume[middle_y, middle_x]
     score = colors.map_colors(centre, *colors.robust_limits(centre[scale.occupied]))
-    score[~scale.occupied] = (DIMMED * score[~scale.occupied]).astype(np.uint8)
+    score[~scale.occupied] = colors.EMPTY
     rec.log(entities.score(number, stride), rr.Image(score))
     best = colors.flow_colors(scale.best, max(middle_x, middle_y))
     best[~scale.occupied] = colors.EMPTY
@@ -99,20 +95,26 @@ def _log_window(rec: rr.RecordingStream, number: int, scale: ScaleTrace, match: 
         frame = rr.Boxes2D(mins=[[x, y]], sizes=[[1, 1]], colors=CELL_FRAME, radii=rr.Radius.ui_points(1.5))
         rec.log(entities.chosen_cell(parent), frame)
     window = scale.volume[:, :, y, x].astype(np.float32)
-    rec.log(entities.window(number, stride), rr.Image(colors.map_colors(window, float(window.min()), float(window.max()))))
-    middle = np.array([window.shape[1] // 2, window.shape[0] // 2]) + 0.5
-    found = middle + scale.best[y, x]
-    marks, labels, mark_colors = [middle, found], ["now", "found"], [colors.INITIAL, colors.STAGES[5]]
-    if match.true_displacement is not None:
-        true = middle + np.asarray(match.true_displacement) / stride
-        marks, labels = [*marks, np.clip(true, 0.0, [window.shape[1], window.shape[0]])], [*labels, "true"]
-        mark_colors = [*mark_colors, colors.REFERENCE]
     rec.log(
-        entities.window_marks(number, stride),
-        rr.Points2D(
-            np.array(marks), labels=labels, colors=mark_colors, radii=rr.Radius.ui_points(5.0), show_labels=True
+        entities.window(number, stride), rr.Image(colors.map_colors(window, float(window.min()), float(window.max())))
+    )
+    middle = np.array([window.shape[1] // 2, window.shape[0] // 2]) + 0.5
+    rec.log(
+        entities.window_cells(number, stride),
+        rr.Boxes2D(
+            centers=[middle, middle + scale.best[y, x]],
+            half_sizes=[[0.5, 0.5], [0.4, 0.4]],
+            colors=[colors.INITIAL, colors.FOUND],
+            radii=rr.Radius.ui_points(1.5),
         ),
     )
+    if match.true_displacement is not None:
+        true = middle + np.asarray(match.true_displacement) / stride
+        at_border = np.clip(true, 0.0, [window.shape[1], window.shape[0]])
+        rec.log(
+            entities.window_truth(number, stride),
+            rr.Points2D([at_border], colors=colors.REFERENCE, radii=rr.Radius.ui_points(5.0)),
+        )
 
 
 def log_hourglass(rec: rr.RecordingStream, number: int, scale: ScaleTrace) -> None:
@@ -122,5 +124,3 @@ def log_hourglass(rec: rr.RecordingStream, number: int, scale: ScaleTrace) -> No
         (entities.hourglass_after(number, scale.stride), scale.after),
     ):
         rec.log(path, rr.EncodedImage(contents=channel_grid_png(activations), media_type="image/png"))
-
-

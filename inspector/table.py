@@ -24,7 +24,7 @@ def stage_table(observation: Observation) -> str:
     """The table of one frame, with the stages that did not run and why."""
     frame = observation.frame
     lines = [f"### Frame {frame.index}", "", *_stages(observation), "", *_axes(observation), ""]
-    lines += [f"*Stage {number} did not run: {reason.rstrip('.')}.*\n" for number, reason in observation.skipped]
+    lines += [f"{stage.reason}\n" for stage in observation.skipped]
     if observation.reference is None:
         lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
     return "\n".join([*lines, *_extrinsic(observation.trace.corrected), "", READING_AID, ""])
@@ -33,7 +33,7 @@ def stage_table(observation: Observation) -> str:
 def _stages(observation: Observation) -> list[str]:
     trace = observation.trace
     with_errors = observation.reference is not None
-    skipped = {number for number, _ in observation.skipped}
+    skipped = {stage.number for stage in observation.skipped}
     ran = {stage.number: stage for stage in trace.stages}
     header = ["", "trained for", *(["rotation error", "translation error"] if with_errors else []), "corrected by"]
     rows = [["miscalibrated" if with_errors else "start", NOTHING, *_error(observation.error(trace.initial)), NOTHING]]

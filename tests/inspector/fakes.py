@@ -6,12 +6,16 @@ tests and pictures show what a working cascade would.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import (
     RANGES,
+    MiscalibrationRange,
     PinholeCamera,
     euler_xyz,
     invert,
@@ -46,6 +50,13 @@ def make_frame(index: int = 0, width: int = 400, height: int = 120, points: int 
     return Frame(index, 0.1 * index, image.astype(np.uint8), scan, camera, REFERENCE, f"fake {index}")
 
 
+@dataclass(frozen=True)
+class SkippedStage:
+    number: int
+    range: MiscalibrationRange
+    reason: str
+
+
 class FakeSequence:
     """Frames numbered ``first``, ``first + 1`` and so on."""
 
@@ -65,7 +76,7 @@ class FakeSequence:
 class FakeCascade:
     """Moves to the dataset's extrinsic, leaving `LEFTOVER` of the error at every stage."""
 
-    skipped: tuple[tuple[int, str], ...] = ((1, "no weights for ±20°/1.5 m"),)
+    skipped: ClassVar = [SkippedStage(2, RANGES[1], "Stage 2 (±10°/1 m) has no weights: train it.")]
 
     def __init__(
         self,

@@ -1,0 +1,277 @@
+"""``calib-inspect seq|raw|object|folder|demo``: calibrate frames and record every stage."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from inspector.cli.errors import ExitCode, fail
+from inspector.cli.options import FRAMES, MISCALIBRATION, RANGE, STAGES
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from calibnet.datasets import Sequence
+    from calibnet.geometry import MiscalibrationRange
+    from calibnet.geometry.se3 import Matrix
+    from inspector.outputs import Outputs
+    from inspector.start import Start
+    from inspector.summary import Summary
+
+DEFAULT_RANGE = "5/0.5"
+DEMO_LENGTH = 12
+RECORDINGS = Path("recordings")
+
+_FOLDER = click.Path(file_okay=False, path_type=Path)
+_SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
+    click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
+    click.option(
+        "--range",
+        "bounds",
+        type=RANGE,
+        help=f"Draw the miscalibration from ± these degrees and metres.  [default: {DEFAULT_RANGE}]",
+    ),
+    click.option("--miscalibrate", "given", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."),
+    click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random."),
+    click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
+    click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    click.option(
+        "--detail",
+        type=click.Choice(["overview", "full"]),
+        default="full",
+        show_default=True,
+        help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most.",
+    ),
+    click.option(
+        "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording to this file."
+    ),
+    click.option("--headless", is_flag=True, help="Open no window."),
+    click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
+    click.option("--bind", default="127.0.0.1", show_default=True, help="Address that --serve listens on."),
+    click.option("--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."),
+)
+
+
+def shared_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command all options of a calibration run; it passes them on to `calibrate`."""
+    for option in reversed(_SHARED_OPTIONS):
+        command = option(command)
+    return command
+
+
+root_option = click.option("--root", type=_FOLDER, envvar="KITTI_ROOT", help="The dataset's folder.  [env: KITTI_ROOT]")
+camera_option = click.option(
+    "--camera", type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
+)
+
+
+@click.command()
+@click.argument("sequence")
+@root_option
+@camera_option
+@shared_options
+def seq(sequence: str, root: Path | None, camera: int, **options: Any) -> int:
+    """Calibrate a KITTI odometry sequence, for instance 04.
+
+    --root is the folder that holds `sequences`.
+    """
+    from calibnet.datasets import open_sequence
+
+    folder = require_root(root, "odometry")
+    return calibrate(
+        open_sequence("kitti-odometry", folder, sequence=sequence, camera=camera), camera=camera, **options
+    )
+
+
+@click.command()
+@click.argument("date")
+@click.argument("drive")
+@root_option
+@camera_option
+@shared_options
+def raw(date: str, drive: str, root: Path | None, camera: int, **options: Any) -> int:
+    """Calibrate a KITTI raw drive, for instance 2011_09_26 0005.
+
+    --root is the folder that holds the dates.
+    """
+    from calibnet.datasets import open_sequence
+
+    folder = require_root(root, "raw")
+    return calibrate(
+        open_sequence("kitti-raw", folder, date=date, drive=drive, camera=camera), camera=camera, **options
+    )
+
+
+@click.command("object")
+@click.option("--split", default="training", show_default=True, help="training, testing, or a list in ImageSets.")
+@root_option
+@camera_option
+@shared_options
+def object_(split: str, root: Path | None, camera: int, **options: Any) -> int:
+    """Calibrate the frames of the KITTI object detection benchmark.
+
+    --root is the folder that holds `training`.
+    """
+    from calibnet.datasets import open_sequence
+
+    folder = require_root(root, "object detection")
+    return calibrate(open_sequence("kitti-object", folder, split=split, camera=camera), camera=camera, **options)
+
+
+@click.command()
+@click.argument("directory", type=_FOLDER)
+@shared_options
+def folder(directory: Path, **options: Any) -> int:
+    """Calibrate your own images/, clouds/ and calibration.yaml.
+
+    Without --range and --miscalibrate the calibration.yaml is what is to be corrected; with them it
+    is the reference.
+    """
+    from calibnet.datasets import open_sequence
+
+    as_is = options["bounds"] is None and options["given"] is None
+    return calibrate(open_sequence("folder", directory), as_is=as_is, **options)
+
+
+@click.command()
+@click.option("--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Frames to drive.")
+@shared_options
+def demo(length: int, **options: Any) -> int:
+    """Calibrate a drive through the synthetic world: needs no data.
+
+    The recording is kept in recordings/demo.rrd.
+    """
+    from calibnet.datasets.synthetic import SyntheticSequence
+
+    options["save"] = options["save"] or RECORDINGS / "demo.rrd"
+    return calibrate(SyntheticSequence(seed=options["seed"], length=length), **options)
+
+
+def require_root(root: Path | None, part: str) -> Path:
+    """The dataset's folder, or a usage error that says how to get one."""
+    if root is None:
+        raise click.UsageError(
+            f"No KITTI folder: give --root DIR or set KITTI_ROOT to where KITTI {part} is unpacked "
+            "(from cvlibs.net/datasets/kitti); `calib-inspect demo` needs none."
+        )
+    return root
+
+
+def calibrate(
+    sequence: Sequence,
+    *,
+    frames: str,
+    bounds: MiscalibrationRange | None,
+    given: Matrix | None,
+    per_frame: bool,
+    seed: int,
+    stages: tuple[int, ...] | None,
+    preset: str,
+    detail: str,
+    save: Path | None,
+    headless: bool,
+    serve: bool,
+    bind: str,
+    connect: str | None,
+    camera: int | None = None,
+    as_is: bool = False,
+) -> int:
+    """Run the cascade on a sequence as the options say; returns the exit code."""
+    from rich.console import Console
+
+    from calibnet.cascade import Cascade
+    from calibnet.datasets import select_frames
+    from calibnet.geometry import MiscalibrationRange
+    from inspector.observation import Detail
+    from inspector.recording import RecordingLostError, RunDescription
+    from inspector.session import Session
+    from inspector.start import Start
+
+    if bounds is not None and given is not None:
+        raise click.UsageError("Give --range or --miscalibrate, not both.")
+    if given is not None and per_frame:
+        raise click.UsageError("--per-frame draws from --range; --miscalibrate is the same for all frames.")
+    positions = select_frames(sequence, frames)
+    outputs = choose_outputs(sequence.name, save, headless, serve, bind, connect)
+    outputs.check()
+    start = Start(bounds or MiscalibrationRange.parse(DEFAULT_RANGE), seed, per_frame, given, as_is)
+    cascade = Cascade.load(preset, stages or start.stages)
+    console = Console(stderr=True, highlight=False)
+    announce(console, sequence, start, cascade)
+    identity = {
+        "sequence": sequence.name,
+        "rig": sequence.rig,
+        "frames": frames,
+        "camera": "" if camera is None else str(camera),
+        "start": describe(start),
+        "seed": seed,
+        "stages": ",".join(str(stage.number) for stage in cascade.stages),
+        "preset": preset,
+        "detail": detail,
+    }
+    description = RunDescription(f"{sequence.name}, {describe(start)}", identity)
+    session = Session(sequence, positions, cascade, start, outputs, description, Detail(detail), console)
+    try:
+        summary = session.run()
+        return finish(summary, outputs)
+    except RecordingLostError as error:
+        os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
+    finally:
+        outputs.close()
+
+
+def choose_outputs(
+    name: str, save: Path | None, headless: bool, serve: bool, bind: str, connect: str | None
+) -> Outputs:
+    """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows."""
+    from inspector.outputs import Outputs, has_display
+
+    viewer = has_display() and not (headless or serve or connect)
+    if save is None and not (viewer or serve or connect):
+        save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.rrd"
+    return Outputs(save, viewer, serve, connect, bind)
+
+
+def announce(console: Console, sequence: Sequence, start: Start, cascade: Any) -> None:
+    """Say what is about to run, and which stages cannot."""
+    numbers = ", ".join(str(stage.number) for stage in cascade.stages)
+    console.print(f"{sequence.name} ({sequence.rig}), {describe(start)}, stages {numbers}", markup=False)
+    for stage in cascade.skipped:
+        console.print(f"Skipped: {stage.reason}", style="yellow", markup=False)
+
+
+def describe(start: Start) -> str:
+    """Where the calibration starts, in words."""
+    if start.as_is:
+        return "from the calibration as it is"
+    if start.given is not None:
+        return "miscalibrated as given"
+    return f"miscalibrated within {start.bounds}{', anew every frame' if start.per_frame else ''}, seed {start.seed}"
+
+
+def finish(summary: Summary, outputs: Outputs) -> int:
+    """Print the result and where it is; serve until Ctrl-C where that was asked for."""
+    from inspector.outputs import open_command
+
+    for line in summary.lines():
+        click.echo(line)
+    if outputs.file is not None and summary.frames:
+        size = outputs.file.stat().st_size
+        click.echo(f"Saved {outputs.file} ({size / 1e6:.1f} MB, {size / summary.frames / 1e6:.2f} MB a frame).")
+        click.echo(f"Open it with: {open_command(outputs.file)}")
+    if summary.interrupted:
+        click.echo("Interrupted: the frames above are all that was recorded.", err=True)
+        return ExitCode.INTERRUPTED
+    if outputs.page is not None:
+        click.echo(f"Serving at {outputs.page} until Ctrl-C.")
+        try:
+            outputs.wait_while_serving()
+        except KeyboardInterrupt:
+            click.echo("Stopped serving.", err=True)
+    return ExitCode.OK

@@ -1,0 +1,125 @@
+"""The main loop: frames in, cascade, recording out, with progress and an orderly end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Positions
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+from calibnet.datasets.frame import Frame, Sequence
+from calibnet.errors import CalibnetError
+from calibnet.trace import CascadeTrace
+from inspector.interruption import StopRequest
+from inspector.observation import Detail, Layout, Observation, Skipped
+from inspector.outputs import Outputs
+from inspector.recording import Recording, RunDescription
+from inspector.start import Start
+from inspector.summary import Summary
+
+
+class Calibrator(Protocol):
+    """What the loop needs of a cascade."""
+
+    @property
+    def skipped(self) -> Positions[Skipped]:
+        """Stages that were asked for and have no weights."""
+        ...
+
+    def calibrate(self, frame: Frame, initial: NDArray[np.float64], detail: bool = False) -> CascadeTrace:
+        """Run the stages on one frame."""
+        ...
+
+
+@dataclass(frozen=True)
+class Session:
+    """Everything a run needs; `run` does it.
+
+    Attributes:
+        sequence: where frames come from.
+        positions: which of them, in order.
+        cascade: what calibrates them.
+        start: where each calibration starts.
+        outputs: where the recording goes.
+        description: what the recording says about itself.
+        detail: how much is logged.
+        console: where progress is shown.
+    """
+
+    sequence: Sequence
+    positions: Positions[int]
+    cascade: Calibrator
+    start: Start
+    outputs: Outputs
+    description: RunDescription
+    detail: Detail
+    console: Console
+
+    def run(self) -> Summary:
+        """Calibrate and record every frame; stop at the first that cannot be read.
+
+        Returns:
+            The summary; `Summary.interrupted` after Ctrl-C or SIGTERM.
+
+        Raises:
+            CalibnetError: a frame cannot be read or calibrated, or the disk is full. What was
+                recorded before is closed properly, and the message says so.
+        """
+        summary = Summary()
+        recording: Recording | None = None
+        try:
+            with StopRequest() as stop, _progress(self.console) as progress:
+                for position in progress.track(self.positions, description=self.sequence.name):
+                    if stop.requested:
+                        summary.interrupted = True
+                        break
+                    observation = self._observe(position)
+                    if recording is None:
+                        layout = Layout.of(observation, self.detail)
+                        recording = Recording(self.outputs.open(), self.description, layout)
+                    self.outputs.check_space()
+                    recording.log(observation)
+                    summary.add(observation)
+        except KeyboardInterrupt:
+            summary.interrupted = True
+        except CalibnetError as error:
+            raise type(error)(f"{error}{self._what_is_kept(summary)}") from error
+        finally:
+            if recording is not None:
+                recording.close()
+        return summary
+
+    def _observe(self, position: int) -> Observation:
+        frame = self.sequence[position]
+        trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=True)
+        return Observation(frame, trace, self.start.reference(frame), tuple(self.cascade.skipped))
+
+    def _what_is_kept(self, summary: Summary) -> str:
+        if summary.frames == 0 or self.outputs.file is None:
+            return ""
+        return (
+            f" What was recorded before ({summary.frames} of {len(self.positions)} frames) is in {self.outputs.file}."
+        )
+
+
+class _FramesPerSecond(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:.1f} frames/s")
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _FramesPerSecond())
+    return Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, speed_estimate_period=10.0)
