@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 )
 @click.option("--camera", type=click.IntRange(0, 3), help="Camera of the KITTI datasets.  [default: 2]")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
-@click.option("--range", "bounds", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
+@click.option("--range", "bounds", type=RANGE, default="5/0.5", show_default=True, help="Of the miscalibrations.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
@@ -66,6 +66,8 @@ def evaluate(
     from calibnet.geometry import stages_within
 
     cascade = Cascade.load(preset, stages=stages or stages_within(bounds))
+    for skipped in cascade.skipped:
+        click.echo(skipped.reason, err=True)
     console = console_beside(json_file)
     with progress_bar(total) as advance:
         evaluation = runner.evaluate(cascade, opened, bounds, repeats, seed, observer=advance, frames=frames)

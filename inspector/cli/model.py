@@ -25,13 +25,15 @@ def info(preset: str, json_file: str | None) -> None:
     """
     import torch
 
-    from calibnet.network import CalibrationNetwork, load_preset
+    from calibnet.geometry import RANGES
+    from calibnet.network.config import load_preset
     from calibnet.network.counting import count
+    from calibnet.network.network import CalibrationNetwork
 
     prepare_json(json_file)
-    config = load_preset(preset)
-    with torch.no_grad():
-        costs = count(CalibrationNetwork(config).eval(), HEIGHT, WIDTH)
+    with torch.device("meta"):  # shapes suffice
+        network = CalibrationNetwork(load_preset(preset), RANGES[0])
+    costs = count(network, HEIGHT, WIDTH)
     modules = [
         {"name": cost.name, "parameters": cost.parameters, "multiply_adds": cost.multiply_adds} for cost in costs
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import cv2
@@ -27,6 +27,7 @@ class KnownCascade:
     """Every stage that was asked for ends 1 degree of yaw beside the reference."""
 
     loaded: dict[str, Any]
+    skipped = (SimpleNamespace(reason="Stage 1 has no weights."),)
 
     @classmethod
     def load(cls, preset: str, stages: tuple[int, ...] | None = None) -> KnownCascade:
@@ -83,7 +84,8 @@ def test_folder_to_table_and_json(rig: Path, tmp_path: Path, capsys: pytest.Capt
     assert [stage["range"] for stage in content["stages"]] == ["5/0.5", "2/0.2", "1/0.1"]
     assert content["stages"][0]["rotation_deg"]["yaw"] == pytest.approx(1.0)
     assert KnownCascade.loaded == {"preset": "compact", "stages": (3, 4, 5)}
-    printed = capsys.readouterr().out
+    printed, said = capsys.readouterr()
+    assert "Stage 1 has no weights." in said
     rows = [line.split()[:2] for line in printed.splitlines() if line.strip().startswith(("initial", "stage"))]
     assert [row[0] for row in rows[:4]] == ["initial", "stage", "stage", "stage"]
     assert "100.0%" in printed  # within 2 degrees and 5 cm
