@@ -25,16 +25,20 @@ _BUILDERS = {
 _CAR_COLOURS = np.array(
     [
         [0.75, 0.75, 0.76],
-        [0.5, 0.52, 0.54],
-        [0.2, 0.21, 0.23],
+        [0.62, 0.62, 0.62],
+        [0.38, 0.40, 0.42],
+        [0.20, 0.21, 0.23],
+        [0.10, 0.105, 0.11],
         [0.02, 0.02, 0.025],
-        [0.02, 0.05, 0.2],
+        [0.02, 0.02, 0.022],
+        [0.90, 0.90, 0.90],
+        [0.02, 0.04, 0.14],
+        [0.06, 0.14, 0.35],
         [0.35, 0.02, 0.02],
-        [0.9, 0.9, 0.9],
-        [0.05, 0.15, 0.08],
-        [0.4, 0.3, 0.2],
-        [0.7, 0.5, 0.02],
-        [0.1, 0.3, 0.6],
+        [0.14, 0.01, 0.02],
+        [0.04, 0.10, 0.06],
+        [0.30, 0.25, 0.18],
+        [0.65, 0.48, 0.03],
     ]
 )
 
@@ -96,7 +100,7 @@ def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: 
             shape = (
                 library.pick(scene.fence_kind, generator, near) if scene.fence_kind != "fence" else scene.fence(side)
             )
-            lateral = side * (style.edge + style.pavement + 0.4)
+            lateral = side * max(style.edge + style.pavement + 0.4, 5.0)
             parts += [
                 _stand(scene, shape, s, lateral, colour=scene.leaf_colour)
                 for s in np.arange(station - 0.5 * width + 2.0, station + 0.5 * width, 4.0)
@@ -165,7 +169,7 @@ def _roadside(scene: Scene, generator: Generator, start: float, stop: float, sid
         lateral = side * (style.edge + generator.uniform(0.4, max(style.pavement, 1.5)))
         if generator.random() < 0.12:
             lateral = side * generator.uniform(0.6, 1.0) * style.edge
-        figure, shirt = library.pick("person", generator), generator.uniform(0.02, 0.8, 3)
+        figure, shirt = library.pick("person", generator), 0.7 * generator.uniform(0.1, 1.0, 3) ** 2
         parts.append(
             _stand(scene, figure, generator.uniform(start, stop), lateral, generator.uniform(0, 6.3), colour=shirt)
         )
@@ -208,7 +212,7 @@ def _nature(scene: Scene, generator: Generator, start: float, stop: float, side:
     scatter("bush", (4.0 if wild else 1.5) * style.bushes, verge + 1.0, verge + (14.0 if wild else 5.0), (0.5, 1.4))
     room = style.setback if style.buildings > 0.4 else 12.0
     if room > 4.0 and generator.random() < style.thickets:
-        lateral = side * (verge + generator.uniform(2.0, min(room, 7.0)))
+        lateral = side * (max(verge + 2.0, 6.0) + generator.uniform(0.0, min(room - 2.0, 5.0)))
         for station in (start + 5.0, stop - 5.0):
             grow("thicket", station, lateral, generator.normal(0.0, 0.1), generator.uniform(0.7, 1.2))
     if wild or style.verge.texture in atlas().groups["grass"]:

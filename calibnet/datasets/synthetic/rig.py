@@ -157,7 +157,7 @@ def sample_rig(generator: Generator, pixels: int = 128_000, maximum_width: int =
     elif side < 0.82:
         yaw = np.pi + generator.normal(0.0, np.radians(4.0))
     else:
-        yaw = generator.choice([-1.0, 1.0]) * np.radians(generator.choice([30.0, 55.0, 90.0, 110.0]))
+        yaw = generator.choice([-1.0, 1.0]) * np.radians(generator.choice([30.0, 55.0, 55.0, 80.0, 110.0]))
         yaw += generator.normal(0.0, np.radians(5.0))
     lidar_height = generator.uniform(1.4, 2.2)
     spread = np.array([0.4, 0.35, 0.3])

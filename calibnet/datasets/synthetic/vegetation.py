@@ -33,13 +33,13 @@ def leaf_cloud(
 
     A ``detail`` below 1 takes fewer and larger leaves, for trees that are seen from afar.
     """
-    count, size = int(count * detail), size / np.sqrt(detail)
+    count, size = int(count * detail), size * min(detail**-0.4, 1.7)
     which = generator.integers(len(centers), size=count)
     direction = generator.normal(size=(count, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    distance = generator.uniform(0.75, 1.15, (count, 1))
+    distance = generator.uniform(0.8, 1.05, (count, 1))
     middle = centers[which] + direction * distance * radii[which]
-    corners = middle[:, None] + size * generator.normal(0.0, 0.6, (count, 3, 3))
+    corners = middle[:, None] + size * generator.uniform(-1.0, 1.0, (count, 3, 3))
     uv = generator.uniform(0.0, 2.0, (count, 1, 2)) + size * generator.uniform(-1.0, 1.0, (count, 3, 2))
     return triangles(corners, uv, material)
 
@@ -57,13 +57,17 @@ def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     spread = 0.25 * height * generator.uniform(0.8, 1.2)
     centers = fork + np.stack(
         [
-            generator.normal(0.0, 0.6 * spread, count),
-            generator.normal(0.0, 0.6 * spread, count),
+            generator.normal(0.0, 0.45 * spread, count),
+            generator.normal(0.0, 0.45 * spread, count),
             generator.uniform(0.1, 0.85, count) * (height - stem),
         ],
         axis=1,
     )
     radii = generator.uniform(0.5, 0.9, (count, 1)) * spread * np.array([1.0, 1.0, 0.8])
+    centers[0], radii[0] = (
+        np.array([fork[0], fork[1], 0.5 * (height + stem)]),
+        (1.1 * spread, 1.1 * spread, 0.4 * (height - stem)),
+    )
     parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
     parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
     parts += [
