@@ -8,6 +8,7 @@ scales are fused where they speak of the same displacement.
 
 from __future__ import annotations
 
+import itertools
 from functools import lru_cache
 
 import torch
@@ -88,26 +89,31 @@ def refine_window(volume: Tensor, window: int) -> Tensor:
 class Hourglass(nn.Module):
     """Down through the scales and up again, with a skip at each."""
 
-    def __init__(self, config: NetworkConfig) -> None:
+    def __init__(self, config: NetworkConfig, blocks: int) -> None:
         super().__init__()
-        channels, window = config.volume_channels, config.window
+        channels, window = config.channels_at_scales, config.window
         self.window, self.fuse = window, config.hierarchical_fusion
-        scales = len(config.volume_scales)
 
-        def stack(count: int) -> nn.Sequential:
-            return nn.Sequential(*(VolumeBlock(channels, window) for _ in range(count)))
-
-        # the finest scale holds nearly all the work: it is convolved only on the way up
-        self.down_blocks = nn.ModuleList(stack(config.hourglass_blocks if scale else 0) for scale in range(scales))
-        self.up_blocks = nn.ModuleList(stack(config.hourglass_blocks) for _ in range(scales))
-        if self.fuse:
-            self.down = nn.ModuleList(
-                nn.Conv3d(channels, channels, (1, 3, 3), (1, 2, 2), (0, 1, 1)) for _ in range(scales - 1)
+        def stacks(counts: list[int]) -> nn.ModuleList:
+            return nn.ModuleList(
+                nn.Sequential(*(VolumeBlock(width, window) for _ in range(number)))
+                for width, number in zip(channels, counts, strict=True)
             )
-            self.up = nn.ModuleList(nn.Conv3d(channels, channels, 1) for _ in range(scales - 1))
+
+        # the finest scale holds nearly all the work: it is convolved only on the way up; and where
+        # scales are not fused there is no way down
+        coarser = len(channels) - 1
+        self.down_blocks = stacks([0] + [blocks if self.fuse else 0] * coarser)
+        self.up_blocks = stacks([blocks] * (coarser + 1))
+        if self.fuse:
+            steps = list(itertools.pairwise(channels))
+            self.down = nn.ModuleList(
+                nn.Conv3d(fine, coarse, (1, 3, 3), (1, 2, 2), (0, 1, 1)) for fine, coarse in steps
+            )
+            self.up = nn.ModuleList(nn.Conv3d(coarse, fine, 1) for fine, coarse in steps)
 
     def forward(self, volumes: list[Tensor]) -> list[Tensor]:
-        """Volumes ``[B, C, D, h_s, w_s]``, fine to coarse, to the same shapes."""
+        """Volumes ``[B, C_s, D, h_s, w_s]``, fine to coarse, to the same shapes."""
         entered: list[Tensor] = []
         for scale, volume in enumerate(volumes):
             if scale and self.fuse:
@@ -129,20 +135,18 @@ class Aggregation(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         inputs = config.groups + 2 * config.concat_channels
-        channels = config.volume_channels
-        scales = config.volume_scales
         self.enter = nn.ModuleList(
-            nn.Sequential(nn.Conv3d(inputs, channels, 1), nn.ReLU(inplace=True)) for _ in scales
+            nn.Sequential(nn.Conv3d(inputs, channels, 1), nn.ReLU(inplace=True))
+            for channels in config.channels_at_scales
         )
-        count = config.hourglasses if config.aggregation else 0
-        self.hourglasses = nn.ModuleList(Hourglass(config) for _ in range(count))
-        self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for _ in scales)
+        self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
+        self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for channels in config.channels_at_scales)
 
     def forward(self, volumes: list[Tensor]) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]``, fine to coarse.
 
         Returns:
-            Activations before and after the hourglass, ``[B, C, D, h_s, w_s]``, and logits
+            Activations before and after the hourglasses, ``[B, C_s, D, h_s, w_s]``, and logits
             ``[B, D, h_s, w_s]`` over the window.
         """
         before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]

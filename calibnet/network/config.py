@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from dataclasses import dataclass, fields
 from importlib import resources
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from calibnet.errors import ConfigError
+
+Head = Literal["geometric", "regression"]
+Normalization = Literal["group", "batch"]
 
 
 @dataclass(frozen=True)
@@ -25,16 +29,16 @@ class NetworkConfig:
     widths: tuple[int, ...]  # channels at 1/2, 1/4, 1/8, 1/16, 1/32
     blocks: tuple[int, ...]  # residual blocks at each of these
     feature_channels: int  # channels of the features that are matched
-    normalization: Literal["group", "batch"]
+    normalization: Normalization
     scales: tuple[int, ...]  # strides of the cost volumes, fine to coarse, each twice the one before
     radius: int  # of the search window, in cells, the same at every scale
     groups: int  # of the group-wise correlation
     concat_channels: int  # of each branch in the concatenation volume
-    volume_channels: int  # of the 3-D hourglass
-    hourglass_blocks: int  # pairs of 3-D convolutions at each scale, on the way down and up
+    volume_channels: int | tuple[int, ...]  # of the 3-D hourglasses: the same at all scales, or one a scale
+    hourglass_blocks: int | tuple[int, ...]  # pairs of 3-D convolutions at each scale: the same, or one a hourglass
     hourglasses: int  # one after the other
     context_channels: int  # of the 2-D network that turns volumes into displacements
-    head: Literal["geometric", "regression"]
+    head: Head
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -42,14 +46,36 @@ class NetworkConfig:
     hybrid_loss: bool = True
 
     def __post_init__(self) -> None:
-        if len(self.widths) != len(self.blocks):
-            raise ConfigError(f"Preset {self.name!r}: widths and blocks must have the same length.")
-        if any(coarse != 2 * fine for fine, coarse in zip(self.scales, self.scales[1:], strict=False)):
-            raise ConfigError(f"Preset {self.name!r}: each scale must be twice the one before.")
-        if self.scales[-1] > 2 ** len(self.widths):
-            raise ConfigError(f"Preset {self.name!r}: scale {self.scales[-1]} needs more widths.")
-        if self.radius % 2:
-            raise ConfigError(f"Preset {self.name!r}: the radius must be even, so that windows align across scales.")
+        for wrong, message in (
+            (len(self.widths) != len(self.blocks), "widths and blocks must have the same length"),
+            (not self.scales, "there must be a scale"),
+            (
+                any(coarse != 2 * fine for fine, coarse in itertools.pairwise(self.scales)),
+                "each scale must be twice the one before",
+            ),
+            (
+                not set(self.scales) <= {2 ** (level + 1) for level in range(len(self.widths))},
+                f"scales must be powers of two, of 2 to {2 ** len(self.widths)} for {len(self.widths)} widths",
+            ),
+            (
+                self.radius < 2 or self.radius % 2 != 0,
+                "the radius must be even and at least 2, so that windows align across scales",
+            ),
+            (self.feature_channels % self.groups != 0, "groups must divide feature_channels"),
+            (self.hourglasses < 1, "there must be a hourglass; switch `aggregation` off instead"),
+            (len(_each(self.volume_channels, len(self.scales))) != len(self.scales), "volume_channels has one a scale"),
+            (
+                len(_each(self.hourglass_blocks, self.hourglasses)) != self.hourglasses,
+                "hourglass_blocks has one a hourglass",
+            ),
+            (self.head not in get_args(Head), f"head must be one of {', '.join(get_args(Head))}"),
+            (
+                self.normalization not in get_args(Normalization),
+                f"normalization must be one of {', '.join(get_args(Normalization))}",
+            ),
+        ):
+            if wrong:
+                raise ConfigError(f"Preset {self.name!r}: {message}.")
 
     @property
     def volume_scales(self) -> tuple[int, ...]:
@@ -57,9 +83,23 @@ class NetworkConfig:
         return self.scales if self.multi_scale_volumes else self.scales[:1]
 
     @property
+    def channels_at_scales(self) -> tuple[int, ...]:
+        """Channels of the hourglasses at each of ``volume_scales``."""
+        return _each(self.volume_channels, len(self.scales))[: len(self.volume_scales)]
+
+    @property
+    def blocks_of_hourglasses(self) -> tuple[int, ...]:
+        """Blocks of each hourglass; the paper's row without aggregation goes without the last one."""
+        return _each(self.hourglass_blocks, self.hourglasses)[: self.hourglasses - (not self.aggregation)]
+
+    @property
     def window(self) -> int:
         """Side of the search window, in cells."""
         return 2 * self.radius + 1
+
+
+def _each(value: int | tuple[int, ...], number: int) -> tuple[int, ...]:
+    return (value,) * number if isinstance(value, int) else value
 
 
 def parse_config(values: dict[str, Any], origin: str) -> NetworkConfig:
@@ -67,8 +107,9 @@ def parse_config(values: dict[str, Any], origin: str) -> NetworkConfig:
     names = {f.name for f in fields(NetworkConfig)}
     if unknown := sorted(set(values) - names):
         raise ConfigError(f"{origin} has unknown keys: {', '.join(unknown)}.")
+    arguments: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in values.items()}
     try:
-        return NetworkConfig(**{key: tuple(v) if isinstance(v, list) else v for key, v in values.items()})
+        return NetworkConfig(**arguments)
     except TypeError as error:
         raise ConfigError(f"{origin} is not a complete network: {error}.") from None
 

@@ -40,28 +40,29 @@ class Trunk(nn.Module):
         super().__init__()
         self.config = config
         norm, widths = config.normalization, config.widths
+        strides = [2 ** (level + 1) for level in range(len(widths))]
+        self.levels = [strides.index(scale) for scale in config.scales]
+        deepest = self.levels[-1] if config.multi_scale_features else self.levels[0]
         self.encoder = nn.ModuleList(
             nn.Sequential(
                 *([ConvBlock(widths[level - 1], width, norm, stride=2)] if level else []),
                 *(ResidualBlock(width, norm) for _ in range(blocks)),
             )
             for level, (width, blocks) in enumerate(zip(widths, config.blocks, strict=True))
+            if level <= deepest
         )
         channels = config.feature_channels
-        strides = [2 ** (level + 1) for level in range(len(widths))]
-        self.levels = [strides.index(scale) for scale in config.scales]
         if config.multi_scale_features:
             self.lateral = nn.ModuleList(nn.Conv2d(widths[level], channels, 1) for level in self.levels)
             self.smooth = nn.ModuleList(ConvBlock(channels, channels, norm) for _ in self.levels)
         else:
             self.lateral = nn.ModuleList([nn.Conv2d(widths[self.levels[0]], channels, 1)])
-        self.project = nn.ModuleList(nn.Conv2d(channels, channels, 1) for _ in self.levels)
+        self.project = nn.ModuleList(nn.Conv2d(channels, channels, 1) for _ in config.volume_scales)
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """``[B, widths[0], H/2, W/2]`` to features ``[B, C, H/s, W/s]``, one per scale, fine to coarse."""
+        """``[B, widths[0], H/2, W/2]`` to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""
         encoded = []
-        last = self.levels[-1] if self.config.multi_scale_features else self.levels[0]
-        for stage in self.encoder[: last + 1]:
+        for stage in self.encoder:
             x = stage(x)
             encoded.append(x)
         if not self.config.multi_scale_features:
@@ -76,7 +77,7 @@ class Trunk(nn.Module):
             if features:
                 merged = merged + F.interpolate(features[0], scale_factor=2.0, mode="nearest")
             features.insert(0, self.smooth[position](merged))
-        return [project(feature) for project, feature in zip(self.project, features, strict=True)]
+        return [project(feature) for project, feature in zip(self.project, features, strict=False)]
 
 
 class FeatureExtractor(nn.Module):

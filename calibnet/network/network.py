@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import torch
 from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
@@ -32,6 +33,11 @@ class NetworkInputs(NamedTuple):
     lidar: Tensor
     intrinsics: Tensor
     cells: list[Tensor]
+
+    def to(self, device: torch.device) -> NetworkInputs:
+        """The batch on another device."""
+        cells = [part.to(device) for part in self.cells]
+        return NetworkInputs(self.image.to(device), self.lidar.to(device), self.intrinsics.to(device), cells)
 
 
 class Activations(NamedTuple):
@@ -96,12 +102,13 @@ class CalibrationNetwork(nn.Module):
             clock("image_features")
         lidar_features = self.features.lidar(inputs.lidar)
         clock("lidar_features")
-        pairs = zip(self.cost_volumes, lidar_features, image_features, strict=False)
+        pairs = zip(self.cost_volumes, lidar_features, image_features, strict=True)
         volumes, scores = map(list, zip(*(build(lidar, image) for build, lidar, image in pairs), strict=True))
         clock("cost_volumes")
         before, after, logits = self.aggregation(volumes)
         clock("hourglass")
         field = self.displacement(logits, lidar_features[0], inputs.cells[0])
+        clock("displacement")
         pose = self.pose(field, inputs.cells[0], inputs.intrinsics)
         clock("pose")
         return NetworkOutput(pose, field, scores, logits, Activations(before, after) if keep_activations else None)

@@ -1,0 +1,73 @@
+"""What a network costs: parameters and multiply-adds per box of the paper's figure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import nn
+from torch.utils.flop_counter import FlopCounterMode
+
+from calibnet.network.network import CalibrationNetwork, NetworkInputs
+
+
+class ModuleCost(NamedTuple):
+    """One box of the figure.
+
+    Attributes:
+        name: ``"image features"`` to ``"pose"``, in the order they run.
+        parameters: its own; what two boxes share is counted in the first.
+        multiply_adds: of its convolutions and matrix products, for one sample.
+    """
+
+    name: str
+    parameters: int
+    multiply_adds: int
+
+
+def count(network: CalibrationNetwork, height: int, width: int) -> list[ModuleCost]:
+    """Count a forward pass of one image and scan of ``height`` x ``width`` pixels, by running it.
+
+    Not counted is what the figures of this field leave out too: normalisation, activations,
+    interpolation and the pose solver's 6x6 systems.
+    """
+    features = network.features
+    modules: dict[str, list[nn.Module]] = {
+        "image_features": [features.image_stem, features.image_trunk],
+        "lidar_features": [features.lidar_stem, features.lidar_trunk],
+        "cost_volumes": [network.cost_volumes],
+        "hourglass": [network.aggregation],
+        "displacement": [network.displacement],
+        "pose": [network.pose],
+    }
+    flops = dict.fromkeys(modules, 0)
+    with torch.no_grad(), FlopCounterMode(display=False) as counter:
+
+        def clock(part: str) -> None:
+            flops[part] += counter.get_total_flops() - sum(flops.values())
+
+        network(empty_inputs(network, height, width), clock=clock)
+    parameters = own_parameters(modules)
+    return [ModuleCost(part.replace("_", " "), parameters[part], flops[part] // 2) for part in modules]
+
+
+def own_parameters(modules: dict[str, list[nn.Module]]) -> dict[str, int]:
+    """Numbers of parameters by part, each parameter counted in the first part that has it."""
+    counted: set[nn.Parameter] = set()
+    numbers = {}
+    for part, members in modules.items():
+        own = {parameter for module in members for parameter in module.parameters()} - counted
+        numbers[part] = sum(parameter.numel() for parameter in own)
+        counted |= own
+    return numbers
+
+
+def empty_inputs(network: CalibrationNetwork, height: int, width: int) -> NetworkInputs:
+    """Inputs of one sample without a single LiDAR point: the cost does not depend on them."""
+    device = next(network.parameters()).device
+    return NetworkInputs(
+        image=torch.zeros(1, 3, height, width, device=device),
+        lidar=torch.zeros(1, 2, height, width, device=device),
+        intrinsics=torch.eye(3, device=device)[None],
+        cells=[torch.zeros(1, 3, height // s, width // s, device=device) for s in network.config.volume_scales],
+    )
