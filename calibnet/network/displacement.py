@@ -56,6 +56,7 @@ class DisplacementDecoder(nn.Module):
         self.log_scale = nn.Conv2d(width, 2, 3, padding=1)
         nn.init.zeros_(self.residual.weight)
         nn.init.zeros_(self.log_scale.weight)
+        assert self.log_scale.bias is not None
         nn.init.constant_(self.log_scale.bias, 2.0)  # start unsure: about 7 px
 
     def forward(self, logits: list[Tensor], lidar_features: Tensor, cells: Tensor) -> DisplacementField:

@@ -43,7 +43,8 @@ def resize_image(image: NDArray[np.uint8], camera: PinholeCamera) -> NDArray[np.
 
     size = (camera.width, camera.height)
     shrinks = camera.width <= image.shape[1] and camera.height <= image.shape[0]
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return resized.astype(np.uint8, copy=False)
 
 
 def lidar_input(

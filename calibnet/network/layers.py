@@ -45,6 +45,6 @@ def channels_last(module: nn.Module) -> None:
     """Lay out the weights of 2-D and 3-D convolutions channels last: 2-3 times faster in bf16 on a CPU."""
     for layer in module.modules():
         if isinstance(layer, nn.Conv2d):
-            layer.to(memory_format=torch.channels_last)
+            layer.weight.data = layer.weight.data.contiguous(memory_format=torch.channels_last)
         elif isinstance(layer, nn.Conv3d):
-            layer.to(memory_format=torch.channels_last_3d)
+            layer.weight.data = layer.weight.data.contiguous(memory_format=torch.channels_last_3d)

@@ -93,7 +93,9 @@ class RegressionHead(nn.Module):
         translation = self.translation(hidden).float() * self.bounds.translation_m
         half_angle = torch.deg2rad(torch.tensor(self.bounds.rotation_deg / 2))
         vector = self.quaternion(hidden).float()
-        quaternion = torch.cat([torch.ones_like(vector[:, :1]) + 0.1 * vector[:, :1], vector[:, 1:] * half_angle], dim=1)
+        quaternion = torch.cat(
+            [torch.ones_like(vector[:, :1]) + 0.1 * vector[:, :1], vector[:, 1:] * half_angle], dim=1
+        )
         return Pose(rigid(rotation_from_quaternion(quaternion), translation), None)
 
 
@@ -106,10 +108,13 @@ class GeometricHead(nn.Module):
     """
 
     ITERATIONS = 5
+    prior: Tensor
 
     def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
         super().__init__()
-        sigma = [bounds.translation_m / 3**0.5] * 3 + [float(torch.deg2rad(torch.tensor(bounds.rotation_deg))) / 3**0.5] * 3
+        sigma = [bounds.translation_m / 3**0.5] * 3 + [
+            float(torch.deg2rad(torch.tensor(bounds.rotation_deg))) / 3**0.5
+        ] * 3
         self.register_buffer("prior", torch.tensor(sigma).clamp(min=1e-4) ** -2, persistent=False)
 
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:

@@ -58,7 +58,7 @@ def virtual_camera(frame: Frame, height: int, width: int, generator: Generator) 
     warped = cv2.warpPerspective(image, homography, (width, height), flags=cv2.INTER_LINEAR)
     return replace(
         frame,
-        image=warped,
+        image=warped.astype(np.uint8, copy=False),
         camera=PinholeCamera(width, height, matrix),
         camera_from_lidar=transform(turn, np.zeros(3)) @ frame.camera_from_lidar,
     )
@@ -109,6 +109,4 @@ def augment(frame: Frame, height: int, width: int, generator: Generator) -> Fram
     if generator.random() < 0.5:
         frame = mirror(frame)
     frame = virtual_camera(frame, height, width, generator)
-    return replace(
-        frame, image=photometric(frame.image, generator), points=thin_scan(frame.points, generator)
-    )
+    return replace(frame, image=photometric(frame.image, generator), points=thin_scan(frame.points, generator))

@@ -58,9 +58,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return tensors, state
 
 
-def restore(
-    tensors: dict[str, Tensor], model: nn.Module, average: nn.Module, optimizer: torch.optim.Optimizer
-) -> None:
+def restore(tensors: dict[str, Tensor], model: nn.Module, average: nn.Module, optimizer: torch.optim.Optimizer) -> None:
     """Put a checkpoint's tensors back into the three."""
 
     def part(prefix: str) -> dict[str, Tensor]:

@@ -29,14 +29,17 @@ def open_data(spec: str) -> list[Sequence]:
     root_text, _, name = rest.partition(":")
     if dataset not in dataset_names() or not root_text:
         raise ConfigError(
-            f"Data {spec!r} is not of the form DATASET:FOLDER[:SEQUENCE] with DATASET one of {', '.join(dataset_names())}."
+            f"Data {spec!r} is not of the form DATASET:FOLDER[:SEQUENCE] with DATASET one of "
+            f"{', '.join(dataset_names())}."
         )
     root = Path(root_text)
     if not root.is_dir():
         raise DatasetError(f"There is no folder {root}; {spec!r} names it as training data.")
     found = list(FINDERS[dataset](root, name))
     if not found:
-        raise DatasetError(f"Nothing of dataset {dataset} is found for {spec!r}; check the folder and the sequence's name.")
+        raise DatasetError(
+            f"Nothing of dataset {dataset} is found for {spec!r}; check the folder and the sequence's name."
+        )
     return found
 
 
@@ -146,5 +149,3 @@ def training_sources(
     if not sources:
         raise ConfigError("There is nothing to train on: give --data, or a --synthetic share above 0.")
     return sources, validation
-
-

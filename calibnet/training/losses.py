@@ -99,8 +99,14 @@ def quaternion_angle(rotation: Tensor) -> Tensor:
     return torch.atan2(sine, 0.5 * (rotation.diagonal(dim1=1, dim2=2).sum(-1) - 1))
 
 
-def hybrid_loss(output: NetworkOutput, inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Losses:
-    """All terms of one batch; only the pose's without ``config.hybrid_loss`` (the paper's ablation)."""
+def hybrid_loss(
+    output: NetworkOutput, inputs: NetworkInputs, target: Target, config: NetworkConfig, pose_share: float = 1.0
+) -> Losses:
+    """All terms of one batch; only the pose's without ``config.hybrid_loss`` (the paper's ablation).
+
+    ``pose_share`` scales the terms of the pose: until the features match anything, their gradient is
+    noise that keeps the features from learning to.
+    """
     estimate, truth = output.pose.correction, target.correction
     difference = estimate @ torch.linalg.inv(truth)
     angle = quaternion_angle(difference[:, :3, :3])
@@ -123,11 +129,11 @@ def hybrid_loss(output: NetworkOutput, inputs: NetworkInputs, target: Target, co
     # a few hopeless samples of a batch must not drown the rest
     offset_cost = torch.where(offset < 1, offset, 1 + (offset.clamp(min=1)).log())
     return Losses(
-        matching=0.5 * matching,
+        matching=2.0 * matching,
         displacement=0.3 * field,
-        pose=2.0 * offset_cost.mean(),
-        quaternion=15.0 * angle.mean(),
-        points=0.5 * torch.log1p(points),
+        pose=2.0 * pose_share * offset_cost.mean(),
+        quaternion=15.0 * pose_share * angle.mean(),
+        points=0.5 * pose_share * torch.log1p(points),
         rotation_deg=torch.rad2deg(angle.detach()).mean(),
         translation_cm=100 * offset.detach().mean(),
     )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import signal
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import torch
 from lightning_fabric import Fabric
@@ -98,6 +99,7 @@ class Trainer:
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP, FINAL_RATE = 0.03, 0.02
+    POSE_RAMP = 0.08  # shares of the budget: no pose loss for one, then rising over another
 
     def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:
         """Prepare data, network and optimizer; with ``resume``, continue from the output folder."""
@@ -111,6 +113,7 @@ class Trainer:
         self.folder = Path(options.output)
         self.network = CalibrationNetwork(load_preset(options.preset), self.bounds)
         config = self.network.config
+        self.from_scratch = options.initialize is None
         if options.initialize:
             self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
             if config.share_image_branch:
@@ -132,7 +135,9 @@ class Trainer:
         if resume and self.checkpoint.exists():
             self._resume()
         elif self.checkpoint.exists():
-            raise ConfigError(f"{self.checkpoint} is there from an earlier run: add --resume, or remove it to start again.")
+            raise ConfigError(
+                f"{self.checkpoint} is there from an earlier run: add --resume, or remove it to start again."
+            )
 
     @property
     def checkpoint(self) -> Path:
@@ -166,20 +171,24 @@ class Trainer:
         reported = checkpointed = validated = self.seconds
         steps_reported, means = self.steps, Means()
         self.model.train()
-        while self.share < 1.0:
-            inputs, target = next(batches)
-            means.add(self._step(inputs, target))
-            self.seconds = started + time.monotonic()
-            if self.seconds - reported > self.REPORT_SECONDS:
-                rate = (self.steps - steps_reported) * self.options.batch / (self.seconds - reported)
-                self.observer.progressed(self._progress(rate, means.take()))
-                reported, steps_reported = self.seconds, self.steps
-            if self.seconds - checkpointed > self.CHECKPOINT_SECONDS:
-                self._save_checkpoint()
-                checkpointed = self.seconds
-            if self.seconds - validated > self.VALIDATION_SECONDS:
-                self._validate()
-                validated = self.seconds
+        with StopOnSignal() as stop:
+            while self.share < 1.0 and not stop.requested:
+                inputs, target = next(batches)
+                means.add(self._step(inputs, target))
+                self.seconds = started + time.monotonic()
+                if self.seconds - reported > self.REPORT_SECONDS:
+                    rate = (self.steps - steps_reported) * self.options.batch / (self.seconds - reported)
+                    self.observer.progressed(self._progress(rate, means.take()))
+                    reported, steps_reported = self.seconds, self.steps
+                if self.seconds - checkpointed > self.CHECKPOINT_SECONDS:
+                    self._save_checkpoint()
+                    checkpointed = self.seconds
+                if self.seconds - validated > self.VALIDATION_SECONDS:
+                    self._validate()
+                    validated = self.seconds
+        if stop.requested:
+            self._save_checkpoint()
+            raise KeyboardInterrupt
         figures = self._validate()
         self._save_checkpoint()
         return self._save_weights(figures)
@@ -190,10 +199,12 @@ class Trainer:
         for group in self.optimizer.param_groups:
             group["lr"] = rate * (self.FINAL_RATE + (1 - self.FINAL_RATE) * cosine)
         output: NetworkOutput = self.model(inputs)
-        losses = hybrid_loss(output, inputs, target, self.network.config)
+        pose_share = min(1.0, max(0.0, self.share / self.POSE_RAMP - 1.0)) if self.from_scratch else 1.0
+        losses = hybrid_loss(output, inputs, target, self.network.config, pose_share)
         if not torch.isfinite(losses.total):
             raise CalibrationError(
-                f"The loss became {losses.total.item()} after {self.samples} samples; resume from {self.checkpoint} with a lower --learning-rate."
+                f"The loss became {losses.total.item()} after {self.samples} samples; resume from {self.checkpoint} "
+                "with a lower --learning-rate."
             )
         self.optimizer.zero_grad(set_to_none=True)
         self.fabric.backward(losses.total)
@@ -209,7 +220,7 @@ class Trainer:
     def _validate(self) -> ValidationFigures | None:
         if self.validation is None:
             return None
-        figures = self.validation(self.average.module)
+        figures = self.validation(cast(CalibrationNetwork, self.average.module))
         self.observer.validated(self._progress(0.0, {}), figures)
         return figures
 
@@ -233,6 +244,26 @@ class Trainer:
         if self.fabric.is_global_zero:
             save_network(path, self.network, self.average.module.state_dict(), record)
         return path
+
+
+class StopOnSignal:
+    """Turns Ctrl-C and SIGTERM into a request to stop after the current step, so that no step is cut in half."""
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self) -> None:
+        self.requested = False
+
+    def __enter__(self) -> StopOnSignal:
+        self.previous = {number: signal.signal(number, self._request) for number in self.SIGNALS}
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for number, handler in self.previous.items():
+            signal.signal(number, handler)
+
+    def _request(self, number: int, frame: object) -> None:
+        self.requested = True
 
 
 class Means:

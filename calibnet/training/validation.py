@@ -48,10 +48,7 @@ class Validation:
         with torch.inference_mode(), torch.autocast(device.type, torch.bfloat16):
             for sample in self.samples:
                 inputs, _ = collate([sample])
-                moved = type(inputs)(
-                    *(part.to(device) for part in inputs[:3]), [part.to(device) for part in inputs.cells]
-                )
-                estimate = network(moved).pose.correction[0].double().cpu().numpy()
+                estimate = network(inputs.to(device)).pose.correction[0].double().cpu().numpy()
                 truth = sample.correction.astype(np.float64)
                 before.append(pose_error(np.eye(4), truth))
                 after.append(pose_error(estimate, truth))

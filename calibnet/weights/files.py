@@ -35,9 +35,7 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
         "range": str(bounds),
         "record": record,
     }
-    tensors = {
-        name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()
-    }
+    tensors = {name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()}
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".part")
     save_file(tensors, partial, metadata={HEADER: json.dumps(header)})

@@ -1,0 +1,183 @@
+"""The five-range cascade (paper section 3.5): project, estimate, correct, and again with the next network."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import CalibrationError, WeightsError
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
+from calibnet.network.config import load_preset
+from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
+from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.stage_detail import stage_detail
+from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.weights import load_network, weights_path
+
+MINIMUM_CELLS = 20
+"""Cells with a LiDAR point below which a pose of six parameters would be a guess."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One network of the cascade."""
+
+    number: int
+    range: MiscalibrationRange
+    network: CalibrationNetwork
+
+
+@dataclass(frozen=True)
+class SkippedStage:
+    """A stage that will not run, and why."""
+
+    number: int
+    range: MiscalibrationRange
+    reason: str
+
+
+class Clock:
+    """Wall time by part, in milliseconds."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, float] = {}
+        self.last = time.perf_counter()
+
+    def __call__(self, part: str) -> None:
+        """Everything since the last call was ``part``."""
+        now = time.perf_counter()
+        self.parts[part] = self.parts.get(part, 0.0) + 1000 * (now - self.last)
+        self.last = now
+
+
+class Cascade:
+    """The stages that have weights, coarse to fine; a stage without them is skipped, never guessed."""
+
+    def __init__(self, stages: list[Stage], skipped: list[SkippedStage] | None = None) -> None:
+        """Use ``Cascade.load`` unless the networks are already there."""
+        self.stages, self.skipped = stages, skipped or []
+        if not stages:
+            reasons = " ".join(stage.reason for stage in self.skipped)
+            raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
+        self.config = stages[0].network.config
+        self.device = next(stages[0].network.parameters()).device
+        self.shares_image_branch = all(_same_image_branch(stages[0].network, stage.network) for stage in stages[1:])
+
+    @classmethod
+    def load(
+        cls, preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Path | None = None
+    ) -> Cascade:
+        """Load the weights of a preset.
+
+        Args:
+            preset: name of a shipped preset.
+            stages: numbers 1 (coarsest) to 5 (finest); all by default.
+            folder: where the weights lie; the package's own by default.
+
+        Raises:
+            ConfigError: there is no such preset.
+            WeightsError: no stage has weights, or a file cannot be used.
+        """
+        load_preset(preset)
+        loaded, skipped = [], []
+        device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        for number in sorted(stages or range(1, len(RANGES) + 1)):
+            bounds = RANGES[number - 1]
+            path = weights_path(preset, bounds, folder)
+            if path.is_file():
+                loaded.append(Stage(number, bounds, load_network(path).to(device)))
+            else:
+                reason = (
+                    f"Stage {number} (±{bounds.rotation_deg:g}°/{bounds.translation_m:g} m) of preset {preset} has no "
+                    f"weights: train it with `calib-inspect train --preset {preset} --range {bounds}`."
+                )
+                skipped.append(SkippedStage(number, bounds, reason))
+        return cls(loaded, skipped)
+
+    def calibrate(self, frame: Frame, initial: NDArray[np.float64], detail: bool = False) -> CascadeTrace:
+        """Correct the extrinsic of one frame.
+
+        Args:
+            frame: image, scan and camera; its own extrinsic is not looked at.
+            initial: ``camera_from_lidar`` to start from, 4x4.
+            detail: keep cost volumes, activations and the rest of `StageDetail`.
+
+        Raises:
+            CalibrationError: too few LiDAR points fall into the image under ``initial``.
+        """
+        clock = Clock()
+        camera = input_camera(frame.camera, self.config.input_height, self.config.input_width, self.config.scales[-1])
+        image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
+        clock("resize")
+        features: list[Tensor] | None = None
+        extrinsic, traces = initial, []
+        with torch.inference_mode(), torch.autocast(self.device.type, torch.bfloat16):
+            if self.shares_image_branch:
+                features = self.stages[0].network.features.image(image)
+                clock("image_features")
+            for stage in self.stages:
+                trace = self._run(stage, frame, camera, image, features, extrinsic, detail)
+                extrinsic = trace.after
+                traces.append(trace)
+        return CascadeTrace(camera, initial, tuple(traces), clock.parts)
+
+    def _run(
+        self,
+        stage: Stage,
+        frame: Frame,
+        camera: PinholeCamera,
+        image: Tensor,
+        features: list[Tensor] | None,
+        before: NDArray[np.float64],
+        detail: bool,
+    ) -> StageTrace:
+        clock = Clock()
+        lidar = lidar_input(frame.points, before, camera, stage.network.config.volume_scales)
+        occupied = int((lidar.cells[0][2] > 0).sum())
+        if occupied < MINIMUM_CELLS:
+            raise CalibrationError(
+                f"Only {occupied} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before stage "
+                f"{stage.number}; check that the extrinsic maps LiDAR points (x forward, y left, z up) into the camera "
+                "(x right, y down, z forward)."
+            )
+        clock("projection")
+        output = stage.network(self._inputs(image, lidar, camera), features, keep_activations=detail, clock=clock)
+        correction = orthonormal(output.pose.correction[0].double().cpu().numpy())
+        return StageTrace(
+            stage.number,
+            stage.range,
+            before,
+            correction @ before,
+            correction,
+            clock.parts,
+            stage_detail(stage.network.config, lidar, output) if detail else None,
+        )
+
+    def _inputs(self, image: Tensor, lidar: LidarInput, camera: PinholeCamera) -> NetworkInputs:
+        def batch(array: NDArray[np.float32]) -> Tensor:
+            return torch.from_numpy(array)[None].to(self.device)
+
+        intrinsics = camera.matrix.astype(np.float32)
+        return NetworkInputs(image, batch(lidar.image), batch(intrinsics), [batch(cells) for cells in lidar.cells])
+
+
+def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Remove the rounding of single precision from the rotation of a 4x4 transform."""
+    u, _, vt = np.linalg.svd(matrix[:3, :3])
+    exact = matrix.copy()
+    exact[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return exact
+
+
+def _same_image_branch(one: CalibrationNetwork, other: CalibrationNetwork) -> bool:
+    """Whether two stages would compute the same image features: then they are computed once."""
+    theirs = other.features.state_dict()
+    mine = {name: tensor for name, tensor in one.features.state_dict().items() if name.startswith("image_")}
+    return one.config.scales == other.config.scales and all(torch.equal(t, theirs[name]) for name, t in mine.items())

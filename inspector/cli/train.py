@@ -1,0 +1,184 @@
+"""``calib-inspect train``: one stage of the cascade, within a budget of time or samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from inspector.cli.options import RANGE
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from calibnet.geometry import MiscalibrationRange
+    from calibnet.training.trainer import Observer, Progress
+    from calibnet.training.validation import ValidationFigures
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+
+
+@click.command()
+@click.option("--preset", default="compact", show_default=True, help="Network to train.")
+@click.option(
+    "--range", "bounds", type=RANGE, required=True, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1."
+)
+@click.option(
+    "--data",
+    multiple=True,
+    metavar="DATASET:DIR[:SEQ]",
+    help="Real frames, for instance kitti-raw:DIR or folder:DIR. Repeatable.",
+)
+@click.option(
+    "--validate",
+    multiple=True,
+    metavar="DATASET:DIR[:SEQ]",
+    help="Held-out frames; never trained on, also if --data covers them.",
+)
+@click.option(
+    "--synthetic",
+    type=click.FloatRange(0, 1),
+    default=0.4,
+    show_default=True,
+    help="Share of samples from the synthetic world.",
+)
+@click.option(
+    "--scenes", type=click.IntRange(1), default=4000, show_default=True, help="Synthetic scenes, each rendered once."
+)
+@click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
+@click.option(
+    "--minutes", type=click.FloatRange(0, min_open=True), help="Budget of training time, over all resumed runs."
+)
+@click.option("--samples", type=click.IntRange(1), help="Budget in samples instead: exactly repeatable.")
+@click.option("--batch", type=click.IntRange(1), default=8, show_default=True, help="Samples a step.")
+@click.option(
+    "--learning-rate",
+    type=click.FloatRange(0, min_open=True),
+    default=1e-3,
+    show_default=True,
+    help="Peak of the cosine schedule.",
+)
+@click.option("--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that prepare samples.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option(
+    "--initialize",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Weights of a neighbouring stage to start from.",
+)
+@click.option(
+    "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."
+)
+@click.option("--resume", is_flag=True, help="Continue from the checkpoint in --output.")
+@click.option(
+    "--save",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE.rrd",
+    help="Also log losses and figures to a recording.",
+)
+def train(
+    preset: str,
+    bounds: MiscalibrationRange,
+    data: tuple[str, ...],
+    validate: tuple[str, ...],
+    synthetic: float,
+    scenes: int,
+    scene_cache: Path | None,
+    minutes: float | None,
+    samples: int | None,
+    batch: int,
+    learning_rate: float,
+    workers: int,
+    seed: int,
+    initialize: Path | None,
+    output: Path,
+    resume: bool,
+    save: Path | None,
+) -> None:
+    r"""Train one stage of the cascade and write its weights.
+
+    Uses CUDA, and several GPUs, where there are any. Checkpoints every two minutes; an interrupted run
+    continues with --resume.
+
+    \b
+    calib-inspect train --range 5/0.5 --minutes 60 \\
+      --data kitti-raw:KITTI/raw --data folder:RIGS --validate kitti-raw:KITTI/raw:2011_09_26/0048
+    """
+    if (minutes is None) == (samples is None):
+        raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
+
+    from calibnet.training.trainer import Trainer, TrainingOptions
+
+    options = TrainingOptions(
+        preset=preset,
+        range=str(bounds),
+        output=str(output),
+        data=list(data),
+        validate=list(validate),
+        synthetic=synthetic,
+        scenes=scenes,
+        minutes=minutes,
+        samples=samples,
+        batch=batch,
+        learning_rate=learning_rate,
+        seed=seed,
+        workers=workers,
+        initialize=str(initialize) if initialize else None,
+        scene_cache=str(scene_cache) if scene_cache else None,
+    )
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False)
+    observers: list[Observer] = [ConsoleObserver(console)]
+    if save is not None:
+        from inspector.training_log import TrainingLog
+
+        observers.append(TrainingLog(save, f"{preset} ±{bounds}"))
+    path = Trainer(options, Observers(observers), resume).run()
+    console.print(f"Weights with their training record: {path}")
+
+
+class Observers:
+    """Several observers as one."""
+
+    def __init__(self, observers: list[Observer]) -> None:
+        self.observers = observers
+
+    def progressed(self, progress: Progress) -> None:
+        """Tell all of them."""
+        for observer in self.observers:
+            observer.progressed(progress)
+
+    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
+        """Tell all of them."""
+        for observer in self.observers:
+            observer.validated(progress, figures)
+
+
+class ConsoleObserver:
+    """One line of losses every few seconds, one of figures after each validation."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+
+    def progressed(self, progress: Progress) -> None:
+        """Print the running means."""
+        losses = progress.losses
+        terms = "  ".join(f"{name} {losses[name]:.3f}" for name in losses if not name.endswith(("_deg", "_cm")))
+        self.console.print(
+            f"{progress.share:4.0%}  {progress.minutes:6.1f} min  {progress.samples:8,d} samples  "
+            f"{progress.samples_per_second:5.1f}/s  {terms}  "
+            f"rotation {losses['rotation_deg']:.2f}°  translation {losses['translation_cm']:.1f} cm",
+            soft_wrap=True,
+        )
+
+    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
+        """Print the figures beside the initial ones."""
+        self.console.print(
+            f"validation after {progress.samples:,d} samples, {figures.samples} single shots, medians: "
+            f"rotation {figures.initial_rotation_deg:.2f}° -> {figures.rotation_deg:.2f}° "
+            f"(p95 {figures.rotation_p95_deg:.2f}°), "
+            f"translation {figures.initial_translation_cm:.1f} -> {figures.translation_cm:.1f} cm",
+            style="bold",
+            soft_wrap=True,
+        )

@@ -1,0 +1,65 @@
+"""A training run as a Rerun recording: losses and validation figures over samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from inspector import entities
+
+if TYPE_CHECKING:
+    from calibnet.training.trainer import Progress
+    from calibnet.training.validation import ValidationFigures
+
+
+class TrainingLog:
+    """Observes a `Trainer`; every line of progress becomes a row, flushed at once."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.recording = rr.RecordingStream(entities.TRAINING_APPLICATION_ID)
+        self.recording.save(path, default_blueprint=training_blueprint())
+        self.recording.send_recording_name(name)
+
+    def progressed(self, progress: Progress) -> None:
+        """Log the running means of the losses."""
+        self._at(progress)
+        for loss, value in progress.losses.items():
+            self.recording.log(f"{entities.TRAINING}/{loss}", rr.Scalars(value))
+        self.recording.flush()
+
+    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
+        """Log the figures of the held-out frames."""
+        self._at(progress)
+        for figure, value in figures._asdict().items():
+            self.recording.log(f"{entities.VALIDATION}/{figure}", rr.Scalars(value))
+        self.recording.flush()
+
+    def _at(self, progress: Progress) -> None:
+        self.recording.set_time("samples", sequence=progress.samples)
+        self.recording.set_time("training time", duration=60 * progress.minutes)
+
+
+def training_blueprint() -> rrb.Blueprint:
+    """Losses above, errors in degrees and centimetres below."""
+
+    def plot(name: str, *contents: str) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(name=name, contents=list(contents))
+
+    training, held_out = f"/{entities.TRAINING}", f"/{entities.VALIDATION}"
+    rotation = [f"{training}/rotation_deg"]
+    rotation += [f"{held_out}/{name}_deg" for name in ("rotation", "rotation_p95", "initial_rotation")]
+    translation = [f"{training}/translation_cm"]
+    translation += [f"{held_out}/{name}_cm" for name in ("translation", "initial_translation")]
+    losses = [f"{training}/**", f"- {training}/rotation_deg", f"- {training}/translation_cm"]
+    return rrb.Blueprint(
+        rrb.Vertical(
+            plot("Losses (weighted)", *losses),
+            rrb.Horizontal(plot("Rotation error, degrees", *rotation), plot("Translation error, cm", *translation)),
+        ),
+        rrb.TimePanel(timeline="samples"),
+        collapse_panels=True,
+    )
