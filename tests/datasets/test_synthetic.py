@@ -165,6 +165,48 @@ def test_most_points_are_at_driving_distances():
     assert 25.0 < high < 90.0
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_ground_has_no_holes(kind):
+    """A plumb line dropped anywhere near the road meets the swept ground."""
+    from calibnet.datasets.synthetic.ground import cross_section
+
+    scene = next(
+        scene
+        for scene in (build_scene(np.random.default_rng(seed)) for seed in range(300))
+        if scene.style.kind == kind and scene.style.rough > 0.02
+    )
+    vertices = np.concatenate(
+        [part.corners for k in range(5) for part in cross_section(scene, 20.0 * k, 20.0 * k + 20.0)]
+    )
+    caster = o3d.t.geometry.RaycastingScene()
+    triangles = np.arange(vertices.size // 3, dtype=np.uint32).reshape(-1, 3)
+    caster.add_triangles(o3d.core.Tensor(vertices.reshape(-1, 3)), o3d.core.Tensor(triangles))
+    generator = np.random.default_rng(0)
+    start = scene.line.place(generator.uniform(5, 95, 4000), generator.uniform(-45, 45, 4000), 30.0)
+    down = np.broadcast_to([0.0, 0.0, -1.0], start.shape)
+    drop = caster.cast_rays(o3d.core.Tensor(np.hstack([start, down]).astype(np.float32)))["t_hit"].numpy()
+    assert np.isfinite(drop).all()
+    # Strips meet without a step: along a line across the road the ground nowhere jumps by more than a kerb.
+    lateral = np.arange(-40.0, 40.0, 0.05)
+    across = scene.line.place(np.full(len(lateral), 51.0), lateral, 30.0)
+    down = np.broadcast_to([0.0, 0.0, -1.0], across.shape)
+    profile = caster.cast_rays(o3d.core.Tensor(np.hstack([across, down]).astype(np.float32)))["t_hit"].numpy()
+    assert np.abs(np.diff(profile)).max() < 0.22
+
+
+def test_prototypes_stand_on_the_ground():
+    from calibnet.datasets.synthetic.library import library
+
+    for name, variants in library().items():
+        for near, far in variants:
+            for mesh in (near, far):
+                low, high = mesh.corners.min(axis=(0, 1)), mesh.corners.max(axis=(0, 1))
+                assert np.isfinite(mesh.corners).all(), name
+                assert -1.1 <= low[2] <= 0.12, name
+                assert 0.3 < high[2] < 20.0, name
+            assert len(far) <= len(near), name
+
+
 def test_lane_paint_returns_more_than_asphalt():
     from calibnet.datasets.synthetic.textures import atlas
 

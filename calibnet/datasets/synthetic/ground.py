@@ -25,17 +25,16 @@ def cross_section(scene: Scene, start: float, stop: float) -> list[Mesh]:
     for side in (-1.0, 1.0):
         a, b, c = side * style.edge, side * (style.edge + style.pavement), side * (style.front + 1.0)
         far, lift = side * (style.front + 75.0), style.kerb
-        rough = style.rough if style.kind in ("off-road", "park") else 0.0
-        strips.append(road.Strip(0.0, a, 0.0, -CAMBER, style.road, 0.1 * rough))
+        strips.append(road.Strip(0.0, a, 0.0, -CAMBER, style.road))
         if style.kerb:
             strips.append(road.Strip(a, a + 0.02 * side, -CAMBER, lift, kerb))
             strips.append(road.Strip(a + 0.02 * side, a + 0.16 * side, lift, lift, kerb))
         if style.pavement:
             strips.append(road.Strip(a + 0.16 * side if style.kerb else a, b, lift, lift + 0.03, style.walk))
-        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -CAMBER), lift + 0.05, style.verge, rough))
+        strips.append(road.Strip(b, c, lift + (0.03 if style.pavement else -CAMBER), lift + 0.05, style.verge))
         bank = scene.banks[0 if side < 0 else 1]
-        strips.append(road.Strip(c, far, lift + 0.05, lift + 0.05 + bank, style.field, style.rough))
-    return road.sweep(scene.line, tuple(strips), start, stop, 2.5)
+        strips.append(road.Strip(c, far, lift + 0.05, lift + 0.05 + bank, style.field))
+    return road.sweep(scene.line, strips, scene.relief, start, stop, 2.5)
 
 
 def markings(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:

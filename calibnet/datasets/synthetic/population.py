@@ -81,9 +81,9 @@ def _stand(
     colour: object = None,
 ) -> Mesh:
     """Place a prototype on the ground at a station; ``turn`` is relative to the road's direction."""
-    heading = float(scene.line.heading(station)) + turn
-    position = scene.line.place(station, lateral, lift + scene.lift(lateral))
-    return mesh.placed(position, heading, scale, colour)  # type: ignore[arg-type]
+    position, heading = scene.line.stand(float(station), float(lateral), lift + scene.lift(lateral))
+    position[2] += scene.relief.height(position, lateral)
+    return mesh.placed(position, heading + turn, scale, colour)  # type: ignore[arg-type]
 
 
 def _plots(scene: Scene, generator: Generator, start: float, stop: float, side: float, near: bool) -> list[Mesh]:

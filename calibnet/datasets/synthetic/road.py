@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,6 +63,14 @@ class CentreLine:
         parts = np.broadcast_arrays(x - sin * lateral, y + cos * lateral, z + lift)
         return np.stack(parts, axis=-1)
 
+    def stand(self, station: float, lateral: float, lift: float) -> tuple[Vector, float]:
+        """One world position ``[3]`` and the heading there: ``place`` for single objects, much quicker."""
+        row = station - _FIRST
+        index = int(row)
+        first, share = self._table[index], row - index
+        x, y, z, cos, sin = (first + share * (self._table[index + 1] - first)).tolist()
+        return np.array([x - sin * lateral, y + cos * lateral, z + lift]), math.atan2(sin, cos)
+
     def nearest_station(self, position: ArrayLike) -> float:
         """Station of the tabulated point closest to a world position."""
         gap = self._table[:, :2] - np.asarray(position, dtype=np.float64)[:2]
@@ -72,8 +81,7 @@ class CentreLine:
 class Strip:
     """One strip of the ground's cross-section, from ``inner`` to ``outer`` (metres from the centre).
 
-    ``inner_lift`` and ``outer_lift`` are heights above the centre line; ``rough`` is the amplitude
-    of its bumps in metres.
+    ``inner_lift`` and ``outer_lift`` are heights above the centre line.
     """
 
     inner: float
@@ -81,31 +89,43 @@ class Strip:
     inner_lift: float
     outer_lift: float
     material: Material
-    rough: float = 0.0
 
 
-def bumps(position: Vector) -> Vector:
-    """Smooth pseudo-random height field, about -1..1, of world positions ``[..., >=2]``."""
-    x, y = position[..., 0], position[..., 1]
-    wide = np.sin(0.31 * x + 0.7 * np.sin(0.23 * y)) * np.cos(0.27 * y + 0.5 * np.sin(0.19 * x))
-    fine = np.sin(1.3 * x + 1.1 * np.sin(0.9 * y)) * np.cos(1.1 * y + 0.8 * np.sin(1.4 * x))
-    return np.asarray(0.7 * wide + 0.3 * fine)
+@dataclass(frozen=True)
+class Relief:
+    """Bumps of the open land, which rise over 4 m from ``start`` metres beside the centre line on.
+
+    Attributes:
+        amplitude: their height, metres.
+        start: where the road, with its pavements, ends.
+    """
+
+    amplitude: float
+    start: float
+
+    def height(self, position: Vector, lateral: Vector | float) -> Vector:
+        """Metres to add at world positions ``[..., 3]``, ``lateral`` metres from the centre line."""
+        x, y = position[..., 0], position[..., 1]
+        wide = np.sin(0.31 * x + 0.7 * np.sin(0.23 * y)) * np.cos(0.27 * y + 0.5 * np.sin(0.19 * x))
+        fine = np.sin(1.3 * x + 1.1 * np.sin(0.9 * y)) * np.cos(1.1 * y + 0.8 * np.sin(1.4 * x))
+        fade = np.clip((np.abs(lateral) - self.start) / 4.0, 0.0, 1.0)
+        return np.asarray(self.amplitude * fade * (0.7 * wide + 0.3 * fine))
 
 
-def sweep(line: CentreLine, strips: tuple[Strip, ...], start: float, stop: float, step: float) -> list[Mesh]:
+def sweep(line: CentreLine, strips: list[Strip], relief: Relief, start: float, stop: float, step: float) -> list[Mesh]:
     """Extrude strips along the centre line between two stations."""
     stations = np.linspace(start, stop, max(round((stop - start) / step), 1) + 1)
     meshes = []
     for strip in strips:
         width = abs(strip.outer - strip.inner)
-        pieces = int(np.clip(width / 2.5, 1, 10)) if strip.rough else 1
+        bumpy = relief.amplitude > 0.0 and abs(strip.outer) > relief.start
+        pieces = int(np.clip(width / 2.5, 1, 10)) if bumpy else 1
         share = np.linspace(0.0, 1.0, pieces + 1)
         lateral = strip.inner + share * (strip.outer - strip.inner)
         lift = strip.inner_lift + share * (strip.outer_lift - strip.inner_lift)
         grid = line.place(stations[:, None], lateral[None], lift[None])
-        if strip.rough:
-            fade = np.minimum(np.abs(lateral - strip.inner) / 4.0, 1.0)  # join the neighbour without a gap
-            grid[..., 2] += strip.rough * fade * bumps(grid)
+        if bumpy:
+            grid[..., 2] += relief.height(grid, lateral)
         side = np.hypot(lateral - lateral[0], lift - lift[0])
         uv = np.stack(np.broadcast_arrays(stations[:, None], side[None] + strip.inner), axis=-1)
         meshes.append(quads(_patches(grid), _patches(uv), strip.material))

@@ -37,12 +37,12 @@ def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahe
                 kind = "lorry" if heavy and generator.random() < 0.5 else "van" if heavy else "car"
                 mesh, colour = vehicle(kind, generator)
                 lateral = style.lane_center(lane, own) + generator.normal(0.0, 0.15)
-                position = scene.line.place(place, lateral)
+                position, heading = scene.line.stand(place, lateral, 0.0)
                 distance = float(np.linalg.norm(position - ego))
                 clear = 9.0 if own and lane == 0 else 4.5
                 if distance < clear + (6.0 if kind == "lorry" else 0.0):
                     continue
-                turn = float(scene.line.heading(place)) + (0.0 if own else np.pi)
+                turn = heading + (0.0 if own else np.pi)
                 parts.append(mesh.placed(position - (0, 0, 0.02), turn, 1.0, colour))
     return parts
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.synthetic import library
 from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate
 from calibnet.datasets.synthetic.population import CHUNK, populate
-from calibnet.datasets.synthetic.road import CentreLine
+from calibnet.datasets.synthetic.road import CentreLine, Relief
 from calibnet.datasets.synthetic.style import Style, sample_style
 from calibnet.datasets.synthetic.surroundings import horizon, moving_traffic
 from calibnet.datasets.synthetic.textures import atlas
@@ -53,6 +53,12 @@ class Scene:
     park_on_pavement: bool
     _chunks: OrderedDict[tuple[int, bool], Mesh] = field(default_factory=OrderedDict, repr=False)
 
+    @property
+    def relief(self) -> Relief:
+        """Bumps of the land beside the road: right beside a track, behind the plots of a street."""
+        open_land = self.style.kind in ("park", "off-road")
+        return Relief(self.style.rough, self.style.edge if open_land else self.style.front + 1.0)
+
     def lift(self, lateral: float) -> float:
         """Height of the smooth ground above the centre line."""
         beyond = abs(lateral) - self.style.front - 1.0
@@ -77,7 +83,8 @@ class Scene:
         station = self.line.nearest_station(world_from_vehicle[:3, 3])
         first, last = int((station - behind) // CHUNK), int((station + ahead) // CHUNK)
         here = int(station // CHUNK)
-        parts = [self._chunk(index, abs(index - here) <= 1) for index in range(first, last + 1)]
+        close = range(here - (behind > CHUNK), here + (ahead > CHUNK) + 1)
+        parts = [self._chunk(index, index in close) for index in range(first, last + 1)]
         parts += moving_traffic(self, station, time, behind, ahead, world_from_vehicle[:3, 3])
         parts.append(horizon(self, world_from_vehicle[:3, 3]))
         return concatenate(parts)
