@@ -80,7 +80,7 @@ class Outputs:
                 raise ConfigError(f"{self.file} cannot be written: {error}.") from None
         if self.viewer:
             port = _free_port()
-            _start([_rerun(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
+            _start([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
             sinks.append(rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy"))
         if self.serve:
             sinks.append(rr.GrpcSink(self._serve()))
@@ -102,7 +102,7 @@ class Outputs:
     def _serve(self) -> str:
         port, web_port = _free_port(), _free_port()
         ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
-        self._server = _start([_rerun(), "--serve-web", "--bind", self.bind, *ports], port)
+        self._server = _start([rerun_binary(), "--serve-web", "--bind", self.bind, *ports], port)
         host = LOCALHOST if self.bind in ("0.0.0.0", LOCALHOST) else self.bind
         url = f"rerun+http://{host}:{port}/proxy"
         self.page = f"http://{host}:{web_port}/?url={quote(url, safe='')}"
@@ -132,16 +132,7 @@ def has_display() -> bool:
     return True
 
 
-def open_command(file: Path) -> str:
-    """What to type to look at a recording."""
-    program = "rerun"
-    if shutil.which(program) is None:
-        beside = Path(sys.executable).with_name(program)
-        program = os.path.relpath(beside) if Path.cwd() in beside.parents else str(beside)
-    return f"{program} {file}"
-
-
-def _rerun() -> str:
+def rerun_binary() -> str:
     """The viewer's own binary: the `rerun` on PATH is a script that would outlive its signals."""
     package = importlib.util.find_spec("rerun_cli")
     binary = Path(package.origin if package and package.origin else "").with_name(
@@ -150,6 +141,15 @@ def _rerun() -> str:
     if not binary.is_file():
         raise ConfigError("The Rerun viewer is not installed; reinstall rerun-sdk, or use --save and --headless.")
     return str(binary)
+
+
+def open_command(file: Path) -> str:
+    """What to type to look at a recording."""
+    program = "rerun"
+    if shutil.which(program) is None:
+        beside = Path(sys.executable).with_name(program)
+        program = os.path.relpath(beside) if Path.cwd() in beside.parents else str(beside)
+    return f"{program} {file}"
 
 
 def _start(command: list[str], port: int) -> subprocess.Popen[bytes]:

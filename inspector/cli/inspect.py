@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.options import FRAMES, MISCALIBRATION, RANGE, STAGES
 
@@ -154,9 +155,9 @@ def demo(length: int, **options: Any) -> int:
 
 
 def require_root(root: Path | None, part: str) -> Path:
-    """The dataset's folder, or a usage error that says how to get one."""
+    """The dataset's folder, or one sentence that says how to get one."""
     if root is None:
-        raise click.UsageError(
+        raise ConfigError(
             f"No KITTI folder: give --root DIR or set KITTI_ROOT to where KITTI {part} is unpacked "
             "(from cvlibs.net/datasets/kitti); `calib-inspect demo` needs none."
         )
@@ -241,9 +242,11 @@ def choose_outputs(
 def announce(console: Console, sequence: Sequence, start: Start, cascade: Any) -> None:
     """Say what is about to run, and which stages cannot."""
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
-    console.print(f"{sequence.name} ({sequence.rig}), {describe(start)}, stages {numbers}", markup=False)
+    console.print(
+        f"{sequence.name} ({sequence.rig}), {describe(start)}, stages {numbers}", markup=False, soft_wrap=True
+    )
     for stage in cascade.skipped:
-        console.print(f"Skipped: {stage.reason}", style="yellow", markup=False)
+        console.print(f"Skipped: {stage.reason}", style="yellow", markup=False, soft_wrap=True)
 
 
 def describe(start: Start) -> str:

@@ -57,6 +57,11 @@ class SkippedStage:
     reason: str
 
 
+@dataclass(frozen=True)
+class FakeStage:
+    number: int
+
+
 class FakeSequence:
     """Frames numbered ``first``, ``first + 1`` and so on."""
 
@@ -64,13 +69,13 @@ class FakeSequence:
     rig = "a fake car"
 
     def __init__(self, length: int = 3, first: int = 0) -> None:
-        self._frames = [make_frame(first + position) for position in range(length)]
+        self._length, self._first = length, first
 
     def __len__(self) -> int:
-        return len(self._frames)
+        return self._length
 
     def __getitem__(self, position: int) -> Frame:
-        return self._frames[position]
+        return make_frame(self._first + position)
 
 
 class FakeCascade:
@@ -85,14 +90,16 @@ class FakeCascade:
         radius: int = 4,
         size: tuple[int, int] = (512, 160),
     ) -> None:
-        self.stages, self.strides, self.radius, self.size = stages, strides, radius, size
+        self.stages = [FakeStage(number) for number in stages]
+        self.strides, self.radius, self.size = strides, radius, size
 
     def calibrate(self, frame: Frame, initial: NDArray[np.float64], detail: bool = True) -> CascadeTrace:
         """A trace whose every array has the shape and meaning of the contract."""
         camera = frame.camera.resized(*self.size)
         stages = []
         current = initial
-        for number in self.stages:
+        for stage in self.stages:
+            number = stage.number
             before, current = current, _towards(current, frame.camera_from_lidar, LEFTOVER)
             details = self._detail(frame, camera, before, number) if detail else None
             correction = current @ invert(before)

@@ -1,0 +1,88 @@
+"""Recordings of the fake cascade, made once a session, and how to read them back."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+
+def _fakes() -> ModuleType:
+    """`fakes.py` under a name of its own: test folders are no packages (importlib mode)."""
+    if "inspector_fakes" not in sys.modules:
+        spec = importlib.util.spec_from_file_location("inspector_fakes", Path(__file__).with_name("fakes.py"))
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["inspector_fakes"] = module
+        spec.loader.exec_module(module)
+    return sys.modules["inspector_fakes"]
+
+
+@pytest.fixture(scope="session")
+def fakes() -> ModuleType:
+    return _fakes()
+
+
+@pytest.fixture(scope="session")
+def record() -> Callable[..., None]:
+    """Record the fake sequence: ``record(file, length=3, detail="full", as_is=False, seed=1, **cascade)``."""
+    from rich.console import Console
+
+    from calibnet.geometry import MiscalibrationRange
+    from inspector.observation import Detail
+    from inspector.outputs import Outputs
+    from inspector.recording import RunDescription
+    from inspector.session import Session
+    from inspector.start import Start
+
+    def make(
+        file: Path,
+        length: int = 3,
+        detail: str = "full",
+        as_is: bool = False,
+        seed: int = 1,
+        sequence: Any = None,
+        per_frame: bool = False,
+        **cascade: Any,
+    ) -> Any:
+        session = Session(
+            sequence or _fakes().FakeSequence(length),
+            range(length),
+            _fakes().FakeCascade(**cascade),
+            Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
+            Outputs(file),
+            RunDescription("fake/00", {"seed": seed, "detail": detail}),
+            Detail(detail),
+            Console(quiet=True),
+        )
+        return session.run()
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def full_recording(record: Callable[..., None], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("full") / "full.rrd"
+    record(file)
+    return file
+
+
+@pytest.fixture(scope="session")
+def read() -> Callable[..., list[tuple[Any, Any]]]:
+    """``read(file, entity, component, timeline="frame")`` gives ``[(time, values)]`` in order."""
+    from rerun.chunk import RrdReader
+
+    def column(file: Path, entity: str, component: str, timeline: str = "frame") -> list[tuple[Any, Any]]:
+        rows: list[tuple[Any, Any]] = []
+        for chunk in RrdReader(file).store().stream().filter(content=f"/{entity}", components=component):
+            batch = chunk.to_record_batch()
+            if timeline in batch.schema.names and component in batch.schema.names:
+                rows += zip(batch[timeline].to_pylist(), batch[component], strict=True)
+        return sorted(rows, key=lambda row: row[0])
+
+    return column
