@@ -1,0 +1,86 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from math import prod
+
+import pytest
+import torch
+from torch import nn
+
+from calibnet.geometry import RANGES
+from calibnet.network.config import load_preset
+from calibnet.network.counting import ModuleCost, count
+from calibnet.network.network import CalibrationNetwork
+from tests.network.tiny import random_inputs, tiny_network
+
+HEIGHT, WIDTH = 64, 128
+
+
+def convolutions(network: CalibrationNetwork) -> dict[str, int]:
+    """Multiply-adds of the layers, from the shapes of their outputs; by the network's attribute."""
+    costs: dict[str, int] = {}
+
+    def hook(name: str) -> object:
+        def add(layer: nn.Module, inputs: tuple[torch.Tensor], output: torch.Tensor) -> None:
+            weight = layer.weight
+            assert isinstance(weight, torch.Tensor)
+            places = prod(output.shape[2:]) * output.shape[0] if output.dim() > 2 else output.shape[0]
+            costs[name] = costs.get(name, 0) + weight.numel() * places
+
+        return add
+
+    for name, layer in network.named_modules():
+        if isinstance(layer, nn.Conv2d | nn.Conv3d | nn.Linear):
+            layer.register_forward_hook(hook(".".join(name.split(".")[: 2 if name.startswith("features") else 1])))
+    with torch.no_grad():
+        network(random_inputs(network.config, HEIGHT, WIDTH))
+    return costs
+
+
+def by_name(costs: list[ModuleCost]) -> dict[str, ModuleCost]:
+    return {cost.name: cost for cost in costs}
+
+
+def test_multiply_adds_are_those_of_layers_and_matrix_products() -> None:
+    network = tiny_network(head="regression")
+    costs = by_name(count(network, HEIGHT, WIDTH))
+    config, layers = network.config, convolutions(network)
+    assert costs["image features"].multiply_adds == layers["features.image_stem"] + layers["features.image_trunk"]
+    assert costs["lidar features"].multiply_adds == layers["features.lidar_stem"] + layers["features.lidar_trunk"]
+    sizes = [(HEIGHT // scale, WIDTH // scale) for scale in config.scales]
+    products = sum(h * w * config.window * (w + 2 * config.radius) * config.feature_channels for h, w in sizes)
+    assert costs["cost volumes"].multiply_adds == layers["cost_volumes"] + products
+    soft_argmax = sum(h * w * config.window**2 * 2 for h, w in sizes)
+    assert costs["displacement"].multiply_adds == layers["displacement"] + soft_argmax
+    assert costs["pose"].multiply_adds == layers["pose"]
+    refined = sum(
+        config.window**4 * channels * h * w
+        for channels, (h, w) in zip(config.channels_at_scales[:-1], sizes[1:], strict=True)
+    )
+    assert costs["hourglass"].multiply_adds == pytest.approx(
+        layers["aggregation"] + config.hourglasses * refined, rel=0.01
+    )
+
+
+@pytest.mark.parametrize("share", [True, False])
+def test_parameters_are_counted_once(share: bool) -> None:
+    network = tiny_network(share_extractor=share)
+    costs = by_name(count(network, HEIGHT, WIDTH))
+    assert sum(cost.parameters for cost in costs.values()) == sum(p.numel() for p in network.parameters())
+    stem = sum(p.numel() for p in network.features.lidar_stem.parameters())
+    assert (costs["lidar features"].parameters == stem) == share
+    assert costs["lidar features"].multiply_adds > 0.9 * costs["image features"].multiply_adds
+
+
+def test_paper_preset_has_the_size_of_the_paper() -> None:
+    costs = count(CalibrationNetwork(load_preset("paper"), RANGES[0]), 256, 512)
+    assert sum(cost.parameters for cost in costs) == pytest.approx(20.5e6, rel=0.01)
+    assert sum(cost.multiply_adds for cost in costs) == pytest.approx(78.3e9, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("switch", "parameters"), [("aggregation", 19.4e6), ("hierarchical_fusion", 18.8e6), ("hybrid_loss", 20.5e6)]
+)
+def test_ablated_sizes_that_fit_the_paper_s_table(switch: str, parameters: float) -> None:
+    network = CalibrationNetwork(replace(load_preset("paper"), **{switch: False}), RANGES[0])
+    assert sum(p.numel() for p in network.parameters()) == pytest.approx(parameters, rel=0.02)

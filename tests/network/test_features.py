@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from calibnet.network.features import FeatureExtractor, lidar_channels
+from calibnet.network.layers import group_count, norm2d
+from tests.network.tiny import TINY
+
+
+def test_groups_of_the_normalisation_divide_the_channels() -> None:
+    assert [group_count(channels) for channels in (64, 24, 20, 6, 7, 1)] == [8, 8, 4, 2, 1, 1]
+    assert isinstance(norm2d("group", 20), torch.nn.GroupNorm)
+    assert isinstance(norm2d("batch", 20), torch.nn.BatchNorm2d)
+
+
+def test_lidar_channels_are_zero_without_points() -> None:
+    assert lidar_channels(torch.zeros(1, 2, 8, 8)).abs().max() == 0
+
+
+def test_lidar_channels_hold_inverse_depth_and_spread_the_nearest_point() -> None:
+    lidar = torch.zeros(1, 2, 16, 16)
+    lidar[0, :, 5, 5] = torch.tensor([8.0, 0.5])
+    lidar[0, :, 6, 6] = torch.tensor([2.0, 0.25])
+    inverse, logarithm, occupied, intensity, near, wide = lidar_channels(lidar)[0]
+    assert inverse[5, 5] == 0.5 and inverse[6, 6] == 2.0 and inverse.count_nonzero() == 2
+    assert logarithm[5, 5] > logarithm[6, 6]
+    assert occupied.sum() == 2 and intensity[5, 5] == 0.5
+    assert near[5, 5] == 2.0, "the nearer neighbour wins"
+    assert near[3, 4] == 0.5 and near[2, 4] == 0.0 and near[5, 3] == 0.0, "5 rows and 3 columns"
+    assert wide[6 + 2 + 3, 6 + 1 + 2] == 2.0 and wide[6 + 2 + 4, 6] == 0.0
+
+
+def test_lidar_channels_bound_points_nearer_than_a_metre() -> None:
+    lidar = torch.zeros(1, 2, 4, 4)
+    lidar[0, 0, 1, 1] = 0.05
+    assert lidar_channels(lidar)[0, 0, 1, 1] == 4.0
+
+
+@pytest.mark.parametrize("multi_scale", [True, False])
+@pytest.mark.parametrize("volumes", [True, False])
+def test_one_feature_map_per_volume(multi_scale: bool, volumes: bool) -> None:
+    config = replace(TINY, multi_scale_features=multi_scale, multi_scale_volumes=volumes)
+    extractor = FeatureExtractor(config).eval()
+    image, lidar = torch.zeros(1, 3, 64, 96), torch.zeros(1, 2, 64, 96)
+    expected = [(1, 16, 8, 12), (1, 16, 4, 6), (1, 16, 2, 3)][: 3 if volumes else 1]
+    for features in (extractor.image(image), extractor.lidar(lidar)):
+        assert [tuple(feature.shape) for feature in features] == expected
+
+
+def test_a_shared_extractor_has_one_trunk() -> None:
+    def parameters(share: bool) -> int:
+        return sum(p.numel() for p in FeatureExtractor(replace(TINY, share_extractor=share)).parameters())
+
+    trunk = sum(p.numel() for p in FeatureExtractor(TINY).image_trunk.parameters())
+    assert parameters(False) - parameters(True) == trunk
+
+
+def test_every_scale_sees_the_context_of_the_coarser_ones() -> None:
+    extractor = FeatureExtractor(TINY).eval()
+    image = torch.zeros(1, 3, 128, 128)
+    changed = image.clone()
+    changed[:, :, 120:, 120:] = 255.0
+    difference = extractor.image(image)[0] - extractor.image(changed)[0]
+    assert difference[:, :, 8, 8].abs().max() > 0, "a cell 56 px away, beyond the receptive field at 1/8"
