@@ -60,6 +60,11 @@ def concatenate(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
     return torch.cat([fixed, moved], dim=-1)
 
 
+def matching_score(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
+    """Cosine ``[B, D, h, w]`` of every LiDAR cell with its window, from features ``[B, C, h, w]``."""
+    return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups=1)[..., 0]
+
+
 class CostVolume(nn.Module):
     """The cost volume of one scale."""
 

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from calibnet.geometry import MiscalibrationRange
 from calibnet.network.aggregation import Aggregation
 from calibnet.network.config import NetworkConfig
-from calibnet.network.cost_volume import CostVolume
+from calibnet.network.cost_volume import CostVolume, matching_score
 from calibnet.network.displacement import DisplacementDecoder, DisplacementField
 from calibnet.network.features import FeatureExtractor
 from calibnet.network.layers import channels_last
@@ -81,6 +81,12 @@ class CalibrationNetwork(nn.Module):
         self.displacement = DisplacementDecoder(config)
         self.pose = HEADS[config.head](config, bounds)
         channels_last(self)
+
+    def match(self, inputs: NetworkInputs) -> list[Tensor]:
+        """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""
+        features = zip(self.features.lidar(inputs.lidar), self.features.image(inputs.image), strict=True)
+        scores = [matching_score(lidar, image, self.config.radius) for lidar, image in features]
+        return scores[: len(self.config.volume_scales)]
 
     def forward(
         self,

@@ -40,6 +40,12 @@ class Losses(NamedTuple):
     rotation_deg: Tensor
     translation_cm: Tensor
 
+    @classmethod
+    def of_features(cls, matching: Tensor) -> Losses:
+        """The matching loss alone; there is no pose yet whose error could be told."""
+        zero, unknown = torch.zeros_like(matching), torch.full_like(matching.detach(), torch.nan)
+        return cls(2.0 * matching, zero, zero, zero, zero, unknown, unknown)
+
     @property
     def total(self) -> Tensor:
         """What is minimised."""
@@ -84,6 +90,28 @@ def matching_loss(logits: Tensor, displacement: Tensor, visible: Tensor, stride:
     return (loss * inside).sum() / inside.sum().clamp(min=1)
 
 
+def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Tensor:
+    """The matching loss of one set of logits ``[B, D, h_s, w_s]``, mean over the scales."""
+    losses = [
+        matching_loss(
+            scale_logits,
+            true_displacement(cells, target.correction, inputs.intrinsics),
+            visible,
+            stride,
+            config.radius,
+        )
+        for scale_logits, cells, visible, stride in zip(
+            logits, inputs.cells, target.visible, config.volume_scales, strict=False
+        )
+    ]
+    return torch.stack(losses).mean()
+
+
+def feature_loss(scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Tensor:
+    """What the features alone are trained with at first: their cosines ``[B, D, h_s, w_s]`` as logits."""
+    return scores_loss([TEMPERATURE * score for score in scores], inputs, target, config)
+
+
 def displacement_loss(output: NetworkOutput, displacement: Tensor, visible: Tensor) -> Tensor:
     """Laplace negative log-likelihood of the field, per axis, in units of pixels."""
     error = (output.field.displacement - displacement).abs()
@@ -114,12 +142,8 @@ def hybrid_loss(
     zero = angle.new_zeros(())
     matching, field, points = zero, zero, zero
     if config.hybrid_loss:
-        matched = zip(output.scores, output.logits, inputs.cells, target.visible, config.volume_scales, strict=False)
-        for score, logits, cells, visible, stride in matched:
-            truth_here = true_displacement(cells, truth, inputs.intrinsics)
-            for scores in (TEMPERATURE * score, logits):
-                matching = matching + matching_loss(scores, truth_here, visible, stride, config.radius)
-        matching = matching / (2 * len(config.volume_scales))
+        matching = 0.5 * feature_loss(output.scores, inputs, target, config)
+        matching = matching + 0.5 * scores_loss(output.logits, inputs, target, config)
         truth_here = true_displacement(inputs.cells[0], truth, inputs.intrinsics)
         field = displacement_loss(output, truth_here, target.visible[0])
         cloud = inputs.cells[-1].flatten(2).transpose(1, 2)

@@ -19,10 +19,10 @@ from torch.utils.data import DataLoader, Sampler
 from calibnet.errors import CalibrationError, ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.network.config import load_preset
-from calibnet.network.network import CalibrationNetwork, NetworkOutput
+from calibnet.network.network import CalibrationNetwork, NetworkInputs
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
 from calibnet.training.data import training_sources
-from calibnet.training.losses import Losses, Target, hybrid_loss
+from calibnet.training.losses import Losses, Target, feature_loss, hybrid_loss
 from calibnet.training.samples import TrainingSamples, collate
 from calibnet.training.validation import Validation, ValidationFigures
 from calibnet.weights import load_network, save_network, weights_path
@@ -99,7 +99,8 @@ class Trainer:
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP, FINAL_RATE = 0.03, 0.02
-    POSE_RAMP = 0.08  # shares of the budget: no pose loss for one, then rising over another
+    FEATURE_SHARE = 0.25  # of the budget: first the features alone learn to match, at a fraction of the cost
+    POSE_RAMP = 0.05  # of the budget: then the pose's losses fade in
 
     def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:
         """Prepare data, network and optimizer; with ``resume``, continue from the output folder."""
@@ -130,6 +131,7 @@ class Trainer:
         optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)
         self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None
         self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
+        self.model.mark_forward_method("match")
         self.average.to(self.fabric.device)
         self.steps, self.seconds = 0, 0.0
         if resume and self.checkpoint.exists():
@@ -193,14 +195,12 @@ class Trainer:
         self._save_checkpoint()
         return self._save_weights(figures)
 
-    def _step(self, inputs: Any, target: Target) -> Losses:
+    def _step(self, inputs: NetworkInputs, target: Target) -> Losses:
         rate = self.options.learning_rate * min(1.0, (self.share + 1e-3) / self.WARM_UP)
         cosine = 0.5 * (1 + math.cos(math.pi * self.share))
         for group in self.optimizer.param_groups:
             group["lr"] = rate * (self.FINAL_RATE + (1 - self.FINAL_RATE) * cosine)
-        output: NetworkOutput = self.model(inputs)
-        pose_share = min(1.0, max(0.0, self.share / self.POSE_RAMP - 1.0)) if self.from_scratch else 1.0
-        losses = hybrid_loss(output, inputs, target, self.network.config, pose_share)
+        losses = self._losses(inputs, target)
         if not torch.isfinite(losses.total):
             raise CalibrationError(
                 f"The loss became {losses.total.item()} after {self.samples} samples; resume from {self.checkpoint} "
@@ -213,6 +213,15 @@ class Trainer:
         self.average.update_parameters(self.network)
         self.steps += 1
         return losses
+
+    def _losses(self, inputs: NetworkInputs, target: Target) -> Losses:
+        config = self.network.config
+        if not self.from_scratch:
+            return hybrid_loss(self.model(inputs), inputs, target, config)
+        if self.share < self.FEATURE_SHARE and config.hybrid_loss:
+            return Losses.of_features(feature_loss(self.model.match(inputs), inputs, target, config))
+        pose_share = min(1.0, (self.share - self.FEATURE_SHARE) / self.POSE_RAMP)
+        return hybrid_loss(self.model(inputs), inputs, target, config, pose_share)
 
     def _progress(self, rate: float, losses: dict[str, float]) -> Progress:
         return Progress(self.samples, self.seconds / 60, self.share, rate, losses)
