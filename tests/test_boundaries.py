@@ -14,9 +14,19 @@ ROOT = Path(__file__).resolve().parents[1]
 HEAVY = ("torch", "open3d", "rerun", "cv2", "pykitti", "lightning_fabric", "rich", "pandas", "matplotlib")
 
 
-def imported_modules(source: str, package: str = "") -> Iterator[str]:
+class RuntimeOnly(ast.NodeTransformer):
+    """Removes the bodies of ``if TYPE_CHECKING:``, which only name types."""
+
+    def visit_If(self, node: ast.If) -> ast.AST:  # noqa: N802
+        if ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
+            node.body = [ast.Pass()]
+        return self.generic_visit(node)
+
+
+def imported_modules(source: str, package: str = "", types: bool = True) -> Iterator[str]:
     """Full names of everything ``source`` imports, anywhere in it; ``package`` resolves relative imports."""
-    for node in ast.walk(ast.parse(source)):
+    tree: ast.AST = ast.parse(source)
+    for node in ast.walk(tree if types else RuntimeOnly().visit(tree)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -31,14 +41,14 @@ def imported_modules(source: str, package: str = "") -> Iterator[str]:
             yield from (arg.value for arg in node.args if isinstance(arg, ast.Constant) and isinstance(arg.value, str))
 
 
-def violations(package: str, forbidden: tuple[str, ...], exempt: tuple[str, ...] = ()) -> list[str]:
+def violations(package: str, forbidden: tuple[str, ...], exempt: tuple[str, ...] = (), types: bool = True) -> list[str]:
     """``file: module`` for every forbidden import below ``package``, outside the exempt folders."""
     found = []
     for path in sorted((ROOT / package).rglob("*.py")):
         relative = path.relative_to(ROOT)
         if any(relative.is_relative_to(folder) for folder in exempt):
             continue
-        for module in imported_modules(path.read_text(encoding="utf-8"), ".".join(relative.parent.parts)):
+        for module in imported_modules(path.read_text(encoding="utf-8"), ".".join(relative.parent.parts), types):
             if any(module == name or module.startswith(f"{name}.") for name in forbidden):
                 found.append(f"{relative}: {module}")
     return found
@@ -58,14 +68,19 @@ def test_the_scan_sees_imports_of_every_form(source: str, expected: str) -> None
     assert expected in set(imported_modules(source, "calibnet.training"))
 
 
+def test_types_alone_can_be_left_out() -> None:
+    source = "import json\nif TYPE_CHECKING:\n    import torch\nelse:\n    import rerun"
+    assert set(imported_modules(source, types=False)) == {"json", "rerun"}
+
+
 def test_calibnet_knows_no_user_interface() -> None:
     assert violations("calibnet", ("rerun", "rerun_bindings", "rerun_sdk", "click", "rich", "inspector")) == []
 
 
 def test_inspector_computes_no_calibration() -> None:
-    """It reads traces; only the commands put a cascade and a recording together."""
+    """It reads traces and names types; only the commands put a cascade and a recording together."""
     computing = ("torch", "lightning_fabric", "calibnet.network", "calibnet.cascade", "calibnet.training")
-    assert violations("inspector", computing, exempt=("inspector/cli",)) == []
+    assert violations("inspector", computing, exempt=("inspector/cli",), types=False) == []
 
 
 def loaded_by(statement: str) -> set[str]:
