@@ -6,13 +6,16 @@ through `Layout.stages`.
 
 from __future__ import annotations
 
+import math
+
 import rerun as rr
 import rerun.blueprint as rrb
 
 from inspector import entities
 from inspector.legends import LEGEND_SPACING
-from inspector.observation import Detail, Grid, Layout, StageLayout
+from inspector.observation import Detail, Grid, Layout, StageLayout, Vector
 
+SCREEN_WIDTH, SCREEN_HEIGHT, LEGEND_HEIGHT = 1920.0, 980.0, 85.0
 SCENE_BACKGROUND = (44, 47, 54)
 """Grey enough that dark points of the picture stay visible."""
 
@@ -66,9 +69,15 @@ def overview_tab(layout: Layout) -> View:
         rrb.Horizontal(*overlays),
         legend("Depth of the points", entities.LEGEND_DEPTH),
         below,
-        row_shares=[4.0, 1.2, 9.0],
+        row_shares=_overview_rows(layout.aspect, len(overlays)),
         name="Overview",
     )
+
+
+def _overview_rows(aspect: float, overlays: int) -> list[float]:
+    """Heights of overlays, legend and the rest, so that the overlays fill a screen of 1920 x 1080."""
+    overlay = min(SCREEN_WIDTH / overlays / aspect + 64.0, 480.0)
+    return [overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay]
 
 
 def cascade_tab(layout: Layout) -> View:
@@ -106,9 +115,10 @@ def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
     for grid in stage.grids:
         stride = grid.stride
         score, best = entities.score(stage.number, stride), entities.best_match(stage.number, stride)
+        cell = entities.chosen_cell(stage.number, stride)
         views: list[View] = [
-            image_view(f"1/{stride}: score where points are now, bright = match", score, grid),
-            image_view(f"1/{stride}: best match, colour = direction", best, grid),
+            image_view(f"1/{stride}: score where points are now, bright = match", score, grid, cell),
+            image_view(f"1/{stride}: best match after aggregation", best, grid, cell),
             image_view(f"Red now, green found{truth}", entities.window(stage.number, stride)),
         ]
         if layout.detail is Detail.FULL:
@@ -141,8 +151,8 @@ def scene_tab(layout: Layout) -> View:
     """The cloud coloured through both extrinsics, and where each stage believes the camera to be."""
     start = "miscalibrated" if layout.has_reference else "given"
     clouds = rrb.Horizontal(
-        scene_view(f"Cloud coloured through the {start} extrinsic", entities.CLOUD_CORRECTED),
-        scene_view("Cloud coloured through the corrected extrinsic", entities.CLOUD_INITIAL),
+        scene_view(f"Cloud coloured through the {start} extrinsic", entities.CLOUD_CORRECTED, layout),
+        scene_view("Cloud coloured through the corrected extrinsic", entities.CLOUD_INITIAL, layout),
     )
     return rrb.Vertical(clouds, frustum_legend(layout), row_shares=[12.0, 1.0], name="3D")
 
@@ -152,12 +162,13 @@ def overlay_view(name: str, points: str) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(origin="/", contents=[f"/{entities.IMAGE}", f"/{points}/**"], name=name)
 
 
-def image_view(name: str, path: str, grid: Grid | None = None) -> rrb.Spatial2DView:
+def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> rrb.Spatial2DView:
     """A map and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
     if grid is None:
         return rrb.Spatial2DView(origin=f"/{path}", name=name)
     bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+    contents = ["$origin/**", *(f"/{mark}" for mark in marks)]
+    return rrb.Spatial2DView(origin=f"/{path}", contents=contents, name=name, visual_bounds=bounds)
 
 
 def legend(name: str, path: str) -> rrb.Spatial2DView:
@@ -183,19 +194,29 @@ def tensor_view(name: str, path: str) -> rrb.TensorView:
     )
 
 
-def scene_view(name: str, without: str) -> rrb.Spatial3DView:
-    """The scene seen from behind and above the LiDAR, without one of the clouds."""
+def scene_view(name: str, without: str, layout: Layout) -> rrb.Spatial3DView:
+    """The scene seen over the camera's shoulder, without one of the clouds."""
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
         contents=["$origin/**", f"- /{without}"],
         name=name,
         eye_controls=rrb.EyeControls3D(
-            position=(-6.0, 2.0, 2.8), look_target=(12.0, 0.0, -0.5), eye_up=(0.0, 0.0, 1.0)
+            position=_seen_from(layout, ahead=-6.0, left=2.0, up=2.8),
+            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-0.5),
+            eye_up=(0.0, 0.0, 1.0),
         ),
         line_grid=rrb.LineGrid3D(visible=False),
         background=SCENE_BACKGROUND,
         defaults=[rr.TransformAxes3D(0.0)],
     )
+
+
+def _seen_from(layout: Layout, ahead: float, left: float, up: float) -> Vector:
+    """A place in the LiDAR frame, given in metres from the camera along its heading."""
+    (x, y, z), (dx, dy, _) = layout.position, layout.forward
+    length = math.hypot(dx, dy) or 1.0
+    dx, dy = dx / length, dy / length
+    return x + ahead * dx - left * dy, y + ahead * dy + left * dx, z + up
 
 
 def _lower(title: str) -> str:

@@ -117,9 +117,9 @@ def window_truth(stage: int, stride: int) -> str:
     return f"{window(stage, stride)}/truth"
 
 
-def chosen_cell(parent: str) -> str:
-    """A frame around the chosen cell, drawn on the slice ``parent``."""
-    return f"{parent}/chosen_cell"
+def chosen_cell(stage: int, stride: int) -> str:
+    """A frame around the chosen cell, drawn over both slices."""
+    return f"stage_{stage}/scale_{stride}/chosen_cell"
 
 
 def hourglass_before(stage: int, stride: int) -> str:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry import PoseError, invert, pose_error
 from calibnet.trace import CascadeTrace
+
+Vector = tuple[float, float, float]
 
 
 class Skipped(Protocol):
@@ -87,11 +89,23 @@ class StageLayout:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a recording contains, known after its first frame; the blueprint shows exactly this."""
+    """What a recording contains, known after its first frame; the blueprint shows exactly this.
+
+    Attributes:
+        stages: those that ran.
+        has_reference: whether errors and a reference overlay exist.
+        detail: how much is logged.
+        aspect: width of the image over its height.
+        position: of the camera in the LiDAR frame, metres.
+        forward: its viewing direction there, of unit length.
+    """
 
     stages: tuple[StageLayout, ...]
     has_reference: bool
     detail: Detail
+    aspect: float = 3.3
+    position: Vector = (0.0, 0.0, 0.0)
+    forward: Vector = (1.0, 0.0, 0.0)
 
     @classmethod
     def of(cls, observation: Observation, detail: Detail) -> Layout:
@@ -106,4 +120,18 @@ class Layout:
             )
             for stage in observation.trace.stages
         )
-        return cls(stages, observation.reference is not None, detail)
+        camera = observation.frame.camera
+        lidar_from_camera = invert(observation.trace.corrected)
+        return cls(
+            stages,
+            observation.reference is not None,
+            detail,
+            camera.width / camera.height,
+            _vector(lidar_from_camera[:3, 3]),
+            _vector(lidar_from_camera[:3, 2]),
+        )
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

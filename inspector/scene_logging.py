@@ -15,7 +15,7 @@ from calibnet.geometry import PinholeCamera, invert, project
 from inspector import colors, entities
 from inspector.observation import Detail, Observation
 
-POINTS = {Detail.OVERVIEW: 6_000, Detail.FULL: 30_000}
+POINTS = {Detail.OVERVIEW: 5_000, Detail.FULL: 30_000}
 SEEN_SHARE = 0.8
 OUTSIDE = (70, 72, 80)
 """Points that the camera does not see."""

@@ -12,8 +12,8 @@ from inspector.matches import Match, chosen_match
 from inspector.observation import Detail, Observation
 
 CELL_FRAME: colors.Rgb = (255, 0, 200)
-ARROW_EVERY = 2
-"""Cells between two arrows of the displacement field, in both directions."""
+ARROW_SPACING = (2, 5)
+"""Fewest and most cells between two arrows of the displacement field: long arrows stand farther apart."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
 
 
@@ -44,7 +44,9 @@ def log_displacement(rec: rr.RecordingStream, number: int, results: StageDetail,
     field[~seen] = colors.EMPTY
     rec.log(entities.displacement(number), rr.Image(field))
     rows, columns = np.nonzero(seen)
-    drawn = (rows % ARROW_EVERY == 0) & (columns % ARROW_EVERY == 0)
+    lengths = np.linalg.norm(results.displacement[seen], axis=1) / stride
+    every = int(np.clip(np.median(lengths), *ARROW_SPACING)) if len(lengths) else 1
+    drawn = (rows % every == 0) & (columns % every == 0)
     rows, columns = rows[drawn], columns[drawn]
     rec.log(
         entities.displacement_arrows(number),
@@ -91,9 +93,8 @@ def _log_window(rec: rr.RecordingStream, number: int, scale: ScaleTrace, match: 
     x, y = match.cell(stride)
     height, width = scale.occupied.shape
     x, y = min(x, width - 1), min(y, height - 1)
-    for parent in (entities.score(number, stride), entities.best_match(number, stride)):
-        frame = rr.Boxes2D(mins=[[x, y]], sizes=[[1, 1]], colors=CELL_FRAME, radii=rr.Radius.ui_points(1.5))
-        rec.log(entities.chosen_cell(parent), frame)
+    frame = rr.Boxes2D(mins=[[x, y]], sizes=[[1, 1]], colors=CELL_FRAME, radii=rr.Radius.ui_points(1.5))
+    rec.log(entities.chosen_cell(number, stride), frame)
     window = scale.volume[:, :, y, x].astype(np.float32)
     rec.log(
         entities.window(number, stride), rr.Image(colors.map_colors(window, float(window.min()), float(window.max())))
