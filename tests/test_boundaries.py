@@ -17,7 +17,7 @@ HEAVY = ("torch", "open3d", "rerun", "cv2", "pykitti", "lightning_fabric", "rich
 class RuntimeOnly(ast.NodeTransformer):
     """Removes the bodies of ``if TYPE_CHECKING:``, which only name types."""
 
-    def visit_If(self, node: ast.If) -> ast.AST:  # noqa: N802
+    def visit_If(self, node: ast.If) -> ast.AST:
         if ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING"):
             node.body = [ast.Pass()]
         return self.generic_visit(node)
