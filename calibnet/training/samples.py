@@ -115,6 +115,7 @@ class TrainingSamples(Dataset[Sample]):
 
     SHAPES = ((160, 512), (192, 448), (224, 384))
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
+    EASIEST = 0.25  # strength of augmentation and share of the range that an eased-in stream starts with
 
     def __init__(
         self,
@@ -124,9 +125,14 @@ class TrainingSamples(Dataset[Sample]):
         area: int,
         batch: int,
         seed: int,
+        ease: int = 0,
     ) -> None:
+        """A stream; over its first ``ease`` samples rigs, scenes and miscalibrations become as varied as they get.
+
+        Two modalities are first matched on frames that look alike.
+        """
         self.sources, self.bounds, self.scales = list(sources), bounds, scales
-        self.batch, self.seed = batch, seed
+        self.batch, self.seed, self.ease = batch, seed, ease
         weights = np.array([source.weight for source in sources], dtype=np.float64)
         self.probability = weights / weights.sum()
         factor = (area / (160 * 512)) ** 0.5
@@ -142,21 +148,39 @@ class TrainingSamples(Dataset[Sample]):
             self.cache[source, position] = sequence[position]
         return self.cache[source, position]
 
+    def strength(self, number: int) -> float:
+        """How varied sample ``number`` may be, 0..1."""
+        return max(self.EASIEST, min(1.0, number / self.ease)) if self.ease else 1.0
+
+    def shape(self, number: int) -> tuple[int, int]:
+        """Height and width of sample ``number``: its batch's."""
+        first = number - number % self.batch
+        generator = np.random.default_rng([self.seed, 1, first])
+        varied = generator.random() < self.strength(first)
+        return self.shapes[generator.choice(len(self.shapes), p=self.SHAPE_PROBABILITY) if varied else 0]
+
     def __getitem__(self, number: int) -> Sample:
         """Draw sample ``number``."""
-        shape = np.random.default_rng([self.seed, 1, number // self.batch]).choice(3, p=self.SHAPE_PROBABILITY)
-        height, width = self.shapes[shape]
+        (height, width), strength = self.shape(number), self.strength(number)
         generator = np.random.default_rng([self.seed, 2, number])
         while True:
-            source = int(generator.choice(len(self.sources), p=self.probability))
+            source = self.draw_source(generator, strength)
             frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
-            frame = augment(frame, height, width, generator)
-            sample = make_sample(frame, self.draw(generator), self.scales)
+            frame = augment(frame, height, width, generator, strength)
+            sample = make_sample(frame, self.draw(generator, strength), self.scales)
             if sample.visible[0].sum() >= MINIMUM_CELLS:
                 return sample
 
-    def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
+    def draw_source(self, generator: np.random.Generator, strength: float) -> int:
+        """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the strength."""
+        while True:
+            source = int(generator.choice(len(self.sources), p=self.probability))
+            synthetic = getattr(self.sources[source].sequence, "caches", False) and len(self.sources) > 1
+            if not synthetic or generator.random() < strength:
+                return source
+
+    def draw(self, generator: np.random.Generator, strength: float = 1.0) -> NDArray[np.float64]:
         """A miscalibration: mostly anywhere in the range, sometimes small, as a stage must also know when to stop."""
-        share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
+        share = strength * (1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0)))
         bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
         return sample_miscalibration(bounds, generator)

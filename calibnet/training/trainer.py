@@ -47,6 +47,7 @@ class TrainingOptions:
     workers: int = 1
     initialize: str | None = None  # weights file of a neighbouring stage
     scene_cache: str | None = None
+    ease: int = 12_000  # samples over which a run from scratch goes from alike to fully varied
 
 
 @dataclass(frozen=True)
@@ -124,8 +125,9 @@ class Trainer:
             options.data, options.validate, options.synthetic, options.scenes, options.seed,
             Path(options.scene_cache) if options.scene_cache else None,
         )  # fmt: skip
+        ease = options.ease if self.from_scratch else 0
         area = config.input_height * config.input_width
-        self.data = TrainingSamples(sources, self.bounds, config.volume_scales, area, options.batch, options.seed)
+        self.data = TrainingSamples(sources, self.bounds, config.volume_scales, area, options.batch, options.seed, ease)
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.998))
         trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
         optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)
