@@ -76,7 +76,7 @@ def overview_tab(layout: Layout) -> View:
 
 def _overview_rows(aspect: float, overlays: int) -> list[float]:
     """Heights of overlays, legend and the rest, so that the overlays fill a screen of 1920 x 1080."""
-    overlay = min(SCREEN_WIDTH / overlays / aspect + 64.0, 480.0)
+    overlay = min(SCREEN_WIDTH / overlays / aspect + 64.0, 390.0)
     return [overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay]
 
 

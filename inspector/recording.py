@@ -74,6 +74,7 @@ class Recording:
         rr.set_strict_mode(True)
         self._detail: Detail = layout.detail
         self._frames = 0
+        self._sinks_gone = False
         self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
         self._rec = rr.RecordingStream(
             APPLICATION_ID,
@@ -101,7 +102,9 @@ class Recording:
             self._flush()
 
     def close(self) -> None:
-        """Flush and write the footer; more calls do nothing."""
+        """Flush and write the footer; nothing, where nothing can be written any more."""
+        if self._sinks_gone:
+            return
         self._flush()
         self._rec.disconnect()
 
@@ -115,6 +118,7 @@ class Recording:
         try:
             self._rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
+            self._sinks_gone = "timed out" in str(error) or not self._has_file
             if "timed out" in str(error):
                 raise RecordingLostError(
                     "The recording can no longer be written: the disk or a quota is full, or a viewer does not respond."

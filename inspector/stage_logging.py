@@ -12,7 +12,7 @@ from inspector.matches import Match, chosen_match
 from inspector.observation import Detail, Observation
 
 CELL_FRAME: colors.Rgb = (255, 0, 200)
-ARROW_SPACING = (2, 5)
+ARROW_SPACING = (2, 3)
 """Fewest and most cells between two arrows of the displacement field: long arrows stand farther apart."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
 
