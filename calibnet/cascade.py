@@ -149,7 +149,13 @@ class Cascade:
             )
         clock("projection")
         output = stage.network(self._inputs(image, lidar, camera), features, keep_activations=detail, clock=clock)
-        correction = orthonormal(output.pose.correction[0].double().cpu().numpy())
+        estimate = output.pose.correction[0].double().cpu().numpy()
+        if not np.isfinite(estimate).all():
+            raise CalibrationError(
+                f"Stage {stage.number} found no finite correction for frame {frame.index} ({frame.source}); "
+                "train its weights again if this happens on every frame."
+            )
+        correction = orthonormal(estimate)
         return StageTrace(
             stage.number,
             stage.range,
