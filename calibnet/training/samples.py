@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
 from calibnet.datasets.frame import Frame, Sequence
+from calibnet.errors import DatasetError
 from calibnet.geometry import (
     MiscalibrationRange,
     PinholeCamera,
@@ -58,8 +59,8 @@ def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDA
         u = camera.matrix[0, 0] * moved[:, 0] / depth + camera.matrix[0, 2]
         v = camera.matrix[1, 1] * moved[:, 1] / depth + camera.matrix[1, 2]
         inside = (flat[:, 2] > 0) & (u > 0) & (u < camera.width - 1) & (v > 0) & (v < camera.height - 1)
-        column = np.clip(u / 4, 0, front.shape[1] - 1).astype(int)
-        row = np.clip(v / 4, 0, front.shape[0] - 1).astype(int)
+        column = np.clip((u + 0.5) / 4, 0, front.shape[1] - 1).astype(int)
+        row = np.clip((v + 0.5) / 4, 0, front.shape[0] - 1).astype(int)
         seen = depth < 1.2 * front[row, column] + 1.0
         masks.append((inside & seen).reshape(cells.shape[1:]))
     return masks
@@ -115,6 +116,7 @@ class TrainingSamples(Dataset[Sample]):
 
     SHAPES = ((160, 512), (192, 448), (224, 384))
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
+    ATTEMPTS = 100
     EASIEST = 0.25  # strength of augmentation and share of the range that an eased-in stream starts with
 
     def __init__(
@@ -163,13 +165,17 @@ class TrainingSamples(Dataset[Sample]):
         """Draw sample ``number``."""
         (height, width), strength = self.shape(number), self.strength(number)
         generator = np.random.default_rng([self.seed, 2, number])
-        while True:
+        for _ in range(self.ATTEMPTS):
             source = self.draw_source(generator, strength)
             frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
             frame = augment(frame, height, width, generator, strength)
             sample = make_sample(frame, self.draw(generator, strength), self.scales)
             if sample.visible[0].sum() >= MINIMUM_CELLS:
                 return sample
+        raise DatasetError(
+            f"None of {self.ATTEMPTS} draws gave {MINIMUM_CELLS} cells with a visible LiDAR point, the last one from "
+            f"{frame.source}; check that the training data's calibration fits its scans."
+        )
 
     def draw_source(self, generator: np.random.Generator, strength: float) -> int:
         """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the strength."""
