@@ -21,11 +21,13 @@ class Target(NamedTuple):
 
     Attributes:
         correction: ``[B, 4, 4]`` that undoes the miscalibration.
+        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced besides; zero but in the warm-up.
         visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
             inside the image).
     """
 
     correction: Tensor
+    shift: Tensor
     visible: list[Tensor]
 
 
@@ -95,7 +97,7 @@ def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, con
     losses = [
         matching_loss(
             scale_logits,
-            true_displacement(cells, target.correction, inputs.intrinsics),
+            true_displacement(cells, target.correction, inputs.intrinsics) - target.shift[:, :, None, None],
             visible,
             stride,
             config.radius,

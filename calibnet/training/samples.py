@@ -38,6 +38,7 @@ class Sample:
     lidar: LidarInput
     intrinsics: NDArray[np.float32]
     correction: NDArray[np.float32]
+    shift: NDArray[np.float32]
     visible: list[NDArray[np.bool_]]
 
 
@@ -66,12 +67,31 @@ def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDA
     return masks
 
 
-def make_sample(frame: Frame, delta: NDArray[np.float64], scales: tuple[int, ...]) -> Sample:
-    """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``."""
-    lidar = lidar_input(frame.points, delta @ frame.camera_from_lidar, frame.camera, scales)
+def make_sample(
+    frame: Frame,
+    delta: NDArray[np.float64],
+    scales: tuple[int, ...],
+    shift: NDArray[np.float64] | tuple[float, float] = (0.0, 0.0),
+) -> Sample:
+    """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
+
+    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: for the features' warm-up only,
+    since no pose explains it.
+    """
+    displaced = frame.camera.matrix.copy()
+    displaced[:2, 2] += shift
+    camera = PinholeCamera(frame.camera.width, frame.camera.height, displaced)
+    lidar = lidar_input(frame.points, delta @ frame.camera_from_lidar, camera, scales)
     correction = invert(delta)
     visible = visible_cells(lidar, frame.points, frame.camera_from_lidar, frame.camera, correction)
-    return Sample(frame.image, lidar, frame.camera.matrix.astype(np.float32), correction.astype(np.float32), visible)
+    return Sample(
+        frame.image,
+        lidar,
+        frame.camera.matrix.astype(np.float32),
+        correction.astype(np.float32),
+        np.asarray(shift, np.float32),
+        visible,
+    )
 
 
 def plain(frame: Frame, height: int, width: int, coarsest: int) -> Frame:
@@ -96,7 +116,8 @@ def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
         [stack([s.lidar.cells[scale] for s in samples]) for scale in scales],
     )
     truth = stack([s.correction for s in samples])
-    return inputs, Target(truth, [stack([s.visible[scale] for s in samples]) for scale in scales])
+    shift = stack([s.shift for s in samples])
+    return inputs, Target(truth, shift, [stack([s.visible[scale] for s in samples]) for scale in scales])
 
 
 @dataclass(frozen=True)
@@ -117,7 +138,8 @@ class TrainingSamples(Dataset[Sample]):
     SHAPES = ((160, 512), (192, 448), (224, 384))
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
-    EASIEST = 0.25  # strength of augmentation and share of the range that an eased-in stream starts with
+    EASIEST = 0.25  # strength of augmentation that the warm-up starts with
+    LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
     def __init__(
         self,
@@ -127,14 +149,16 @@ class TrainingSamples(Dataset[Sample]):
         area: int,
         batch: int,
         seed: int,
-        ease: int = 0,
+        warm_up: int = 0,
     ) -> None:
-        """A stream; over its first ``ease`` samples rigs, scenes and miscalibrations become as varied as they get.
+        """A stream whose first ``warm_up`` samples are for the features alone.
 
-        Two modalities are first matched on frames that look alike.
+        They start with frames that look alike, and their LiDAR images are displaced at random.
+        Miscalibrations scatter around none, so "the match is where the cell is" is a good guess that
+        features pick up from the image's borders, and then stay with; the displacement makes it a bad one.
         """
         self.sources, self.bounds, self.scales = list(sources), bounds, scales
-        self.batch, self.seed, self.ease = batch, seed, ease
+        self.batch, self.seed, self.warm_up = batch, seed, warm_up
         weights = np.array([source.weight for source in sources], dtype=np.float64)
         self.probability = weights / weights.sum()
         factor = (area / (160 * 512)) ** 0.5
@@ -152,7 +176,7 @@ class TrainingSamples(Dataset[Sample]):
 
     def strength(self, number: int) -> float:
         """How varied sample ``number`` may be, 0..1."""
-        return max(self.EASIEST, min(1.0, number / self.ease)) if self.ease else 1.0
+        return max(self.EASIEST, min(1.0, number / self.warm_up)) if self.warm_up else 1.0
 
     def shape(self, number: int) -> tuple[int, int]:
         """Height and width of sample ``number``: its batch's."""
@@ -169,7 +193,8 @@ class TrainingSamples(Dataset[Sample]):
             source = self.draw_source(generator, strength)
             frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
             frame = augment(frame, height, width, generator, strength)
-            sample = make_sample(frame, self.draw(generator, strength), self.scales)
+            shift = generator.uniform(-self.LARGEST_SHIFT, self.LARGEST_SHIFT, 2) * (number < self.warm_up)
+            sample = make_sample(frame, self.draw(generator), self.scales, shift)
             if sample.visible[0].sum() >= MINIMUM_CELLS:
                 return sample
         raise DatasetError(
@@ -185,8 +210,8 @@ class TrainingSamples(Dataset[Sample]):
             if not synthetic or generator.random() < strength:
                 return source
 
-    def draw(self, generator: np.random.Generator, strength: float = 1.0) -> NDArray[np.float64]:
+    def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
         """A miscalibration: mostly anywhere in the range, sometimes small, as a stage must also know when to stop."""
-        share = strength * (1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0)))
+        share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
         bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
         return sample_miscalibration(bounds, generator)

@@ -47,7 +47,7 @@ class TrainingOptions:
     workers: int = 1
     initialize: str | None = None  # weights file of a neighbouring stage
     scene_cache: str | None = None
-    ease: int = 12_000  # samples over which a run from scratch goes from alike to fully varied
+    warm_up: int = 12_000  # samples with which a run from scratch first trains the features alone, a third of the cost
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,7 @@ class Trainer:
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP, FINAL_RATE = 0.03, 0.02
-    FEATURE_SHARE = 0.25  # of the budget: first the features alone learn to match, at a fraction of the cost
-    POSE_RAMP = 0.05  # of the budget: then the pose's losses fade in
+    POSE_RAMP = 2000  # samples over which the pose's losses fade in after the warm-up
 
     def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:
         """Prepare data, network and optimizer; with ``resume``, continue from the output folder."""
@@ -125,9 +124,11 @@ class Trainer:
             options.data, options.validate, options.synthetic, options.scenes, options.seed,
             Path(options.scene_cache) if options.scene_cache else None,
         )  # fmt: skip
-        ease = options.ease if self.from_scratch else 0
+        self.warm_up = options.warm_up if self.from_scratch and config.hybrid_loss else 0
         area = config.input_height * config.input_width
-        self.data = TrainingSamples(sources, self.bounds, config.volume_scales, area, options.batch, options.seed, ease)
+        self.data = TrainingSamples(
+            sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up
+        )
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.998))
         trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
         optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)
@@ -218,11 +219,9 @@ class Trainer:
 
     def _losses(self, inputs: NetworkInputs, target: Target) -> Losses:
         config = self.network.config
-        if not self.from_scratch:
-            return hybrid_loss(self.model(inputs), inputs, target, config)
-        if self.share < self.FEATURE_SHARE and config.hybrid_loss:
+        if self.samples < self.warm_up:
             return Losses.of_features(feature_loss(self.model.match(inputs), inputs, target, config))
-        pose_share = min(1.0, (self.share - self.FEATURE_SHARE) / self.POSE_RAMP)
+        pose_share = min(1.0, (self.samples - self.warm_up) / self.POSE_RAMP) if self.warm_up else 1.0
         return hybrid_loss(self.model(inputs), inputs, target, config, pose_share)
 
     def _progress(self, rate: float, losses: dict[str, float]) -> Progress:
