@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -94,13 +96,13 @@ class SyntheticPool:
         if path.exists():
             try:
                 return _unpack(path)
-            except (ValueError, OSError, KeyError):  # cut short by a kill: draw it again
+            except (ValueError, OSError, KeyError, EOFError, BadZipFile):  # cut short: draw it again
                 path.unlink(missing_ok=True)
         from calibnet.datasets.synthetic import sample_frame
 
         frame = sample_frame(self.seed * 1_000_000 + position)
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(".part")
+        partial = path.with_suffix(f".{os.getpid()}.part")  # several processes may draw the same scene
         partial.write_bytes(_pack(frame))
         partial.replace(path)
         return frame

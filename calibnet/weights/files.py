@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calibnet.errors import WeightsError
+from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 
 if TYPE_CHECKING:
@@ -65,7 +65,12 @@ def read_header(path: Path) -> dict[str, Any]:
         raise WeightsError(f"{path} is not a complete safetensors file ({error}); copy or train it again.") from None
     if HEADER not in metadata:
         raise WeightsError(f"{path} was not written by calib-inspect: its header has no {HEADER!r} entry.")
-    header: dict[str, Any] = json.loads(metadata[HEADER])
+    try:
+        header: dict[str, Any] = json.loads(metadata[HEADER])
+    except ValueError:
+        header = {}
+    if not header.keys() >= {"config", "range", "record"}:
+        raise WeightsError(f"The {HEADER!r} entry in the header of {path} is not complete; copy or train it again.")
     return header
 
 
@@ -87,11 +92,17 @@ def load_network(path: Path) -> CalibrationNetwork:
     from calibnet.network.network import CalibrationNetwork
 
     header = read_header(path)
-    config = parse_config(header["config"], f"The header of {path}")
-    network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))
+    try:
+        config = parse_config(header["config"], f"The header of {path}")
+        network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))
+    except ConfigError as error:
+        raise WeightsError(f"{error} Use the version of calib-inspect that wrote it, or train it again.") from None
     tensors = {name: tensor.float() for name, tensor in load_file(path).items()}
-    missing, unexpected = network.load_state_dict(tensors, strict=False)
-    shared = {name for name in missing if name.startswith("features.lidar_trunk.") and config.share_extractor}
-    if set(missing) - shared or unexpected:
-        raise WeightsError(f"{path} does not fit the network of this version; train it again.")
+    if config.share_extractor:  # stored once
+        for name in [name for name in tensors if name.startswith("features.image_trunk.")]:
+            tensors[name.replace("image_trunk", "lidar_trunk")] = tensors[name]
+    try:
+        network.load_state_dict(tensors)
+    except RuntimeError:  # lists every name and shape
+        raise WeightsError(f"{path} does not fit the network of this version; train it again.") from None
     return network.eval()
