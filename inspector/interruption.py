@@ -14,8 +14,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 class StopRequest:
     """A context in which the first signal asks to stop and the second raises KeyboardInterrupt."""
 
-    def __init__(self) -> None:
+    def __init__(self, acknowledgement: str = "") -> None:
+        """Prepare; ``acknowledgement`` is printed at the first signal."""
         self.requested = False
+        self._acknowledgement = acknowledgement
         self._previous: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> StopRequest:
@@ -32,4 +34,5 @@ class StopRequest:
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
-        sys.stderr.write("\nStopping after this frame; once more stops at once.\n")
+        if self._acknowledgement:
+            sys.stderr.write(f"\n{self._acknowledgement}\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import socket
 import subprocess
@@ -19,9 +20,11 @@ from urllib.parse import quote, urlsplit
 import rerun as rr
 
 from calibnet.errors import ConfigError
+from inspector.interruption import StopRequest
 
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
+SETTLE_S = 1.5
 RESERVE_BYTES = 32 * 1024 * 1024
 """Free disk space below which recording stops, while the footer can still be written."""
 
@@ -79,9 +82,7 @@ class Outputs:
             except RuntimeError as error:
                 raise ConfigError(f"{self.file} cannot be written: {error}.") from None
         if self.viewer:
-            port = _free_port()
-            _start([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
-            sinks.append(rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy"))
+            sinks += self._open_viewer()
         if self.serve:
             sinks.append(rr.GrpcSink(self._serve()))
         if self.connect is not None:
@@ -89,15 +90,27 @@ class Outputs:
         return sinks
 
     def wait_while_serving(self) -> None:
-        """Return when the web server ends; at once when there is none."""
-        if self._server is not None:
-            self._server.wait()
+        """Return at Ctrl-C, SIGTERM or the web server's end; at once when there is none."""
+        with StopRequest() as stop:
+            while self._server is not None and self._server.poll() is None and not stop.requested:
+                time.sleep(0.1)
 
     def close(self) -> None:
         """Stop the web server; an opened viewer stays."""
         if self._server is not None:
             self._server.terminate()
             self._server.wait()
+
+    def _open_viewer(self) -> list[Any]:
+        port = _free_port()
+        try:
+            _start([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
+        except ConfigError:
+            if self.file is None:
+                raise
+            self.viewer = False  # a screen was promised and is not there: the file is what remains
+            return []
+        return [rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy")]
 
     def _serve(self) -> str:
         port, web_port = _free_port(), _free_port()
@@ -127,9 +140,11 @@ def check_writable(file: Path) -> None:
 
 def has_display() -> bool:
     """Whether a window could open."""
-    if platform.system() == "Linux":
-        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-    return True
+    if platform.system() != "Linux" or os.environ.get("WAYLAND_DISPLAY"):
+        return True
+    display = os.environ.get("DISPLAY", "")
+    local = re.fullmatch(r":(\d+)(\.\d+)?", display)
+    return bool(display) and (local is None or Path(f"/tmp/.X11-unix/X{local[1]}").exists())
 
 
 def rerun_binary() -> str:
@@ -156,10 +171,14 @@ def _start(command: list[str], port: int) -> subprocess.Popen[bytes]:
     """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     deadline = time.monotonic() + START_TIMEOUT_S
-    while not _listening(LOCALHOST, port):
+    listening_since = None
+    # A viewer that finds no screen or graphics driver opens its port first and ends a moment later.
+    while listening_since is None or time.monotonic() < listening_since + SETTLE_S:
         if process.poll() is not None or time.monotonic() > deadline:
             process.kill()
-            raise ConfigError("The Rerun viewer did not start; use --headless with --save, and look at the file later.")
+            raise ConfigError("The Rerun viewer did not start; use --headless and look at the file later.")
+        if listening_since is None and _listening(LOCALHOST, port):
+            listening_since = time.monotonic()
         time.sleep(0.05)
     return process
 

@@ -30,6 +30,8 @@ from inspector.recording import Recording, RunDescription
 from inspector.start import Start
 from inspector.summary import Summary
 
+STOPPING = "Stopping after this frame; once more stops at once."
+
 
 class Calibrator(Protocol):
     """What the loop needs of a cascade."""
@@ -81,7 +83,7 @@ class Session:
         summary = Summary()
         recording: Recording | None = None
         try:
-            with StopRequest() as stop, _progress(self.console) as progress:
+            with StopRequest(STOPPING) as stop, _progress(self.console) as progress:
                 for position in progress.track(self.positions, description=self.sequence.name):
                     if stop.requested:
                         summary.interrupted = True

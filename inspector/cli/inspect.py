@@ -273,8 +273,5 @@ def finish(summary: Summary, outputs: Outputs) -> int:
         return ExitCode.INTERRUPTED
     if outputs.page is not None:
         click.echo(f"Serving at {outputs.page} until Ctrl-C.")
-        try:
-            outputs.wait_while_serving()
-        except KeyboardInterrupt:
-            click.echo("Stopped serving.", err=True)
+        outputs.wait_while_serving()
     return ExitCode.OK

@@ -17,7 +17,7 @@ from rerun.chunk import RrdReader
 
 from calibnet.errors import ConfigError, DatasetError
 from inspector import outputs as outputs_module
-from inspector.outputs import Outputs
+from inspector.outputs import Outputs, has_display
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -32,7 +32,7 @@ from rich.console import Console
 from calibnet.geometry import MiscalibrationRange
 from inspector.cli.inspect import finish
 from inspector.observation import Detail
-from inspector.outputs import Outputs
+from inspector.outputs import Outputs, has_display
 from inspector.recording import RunDescription
 from inspector.session import Session
 from inspector.start import Start
@@ -148,3 +148,19 @@ def test_outputs_refuse_what_cannot_be_written(tmp_path: Path) -> None:
 def test_connect_says_when_nobody_listens(url: str) -> None:
     with pytest.raises(ConfigError, match=r"No viewer listens|no address"):
         Outputs(connect=url).check()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="displays are named by DISPLAY on Linux only")
+def test_a_display_that_is_not_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", ":4711")
+    assert not has_display()
+    monkeypatch.setenv("DISPLAY", "elsewhere:10.0")
+    assert has_display()
+
+
+def test_a_viewer_that_does_not_start_leaves_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outputs_module, "rerun_binary", lambda: "false")
+    assert len(Outputs(tmp_path / "run.rrd", viewer=True).open()) == 1
+    with pytest.raises(ConfigError, match="did not start"):
+        Outputs(viewer=True).open()
