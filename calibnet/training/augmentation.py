@@ -33,7 +33,7 @@ def mirror(frame: Frame) -> Frame:
     )
 
 
-def virtual_camera(frame: Frame, height: int, width: int, generator: Generator, strength: float = 1.0) -> Frame:
+def virtual_camera(frame: Frame, height: int, width: int, generator: Generator) -> Frame:
     """The frame as seen by a turned camera with another lens, at the network's input size.
 
     One homography ``K' R K^-1``: turning a camera about its centre and changing its lens moves no
@@ -41,7 +41,7 @@ def virtual_camera(frame: Frame, height: int, width: int, generator: Generator, 
     """
     import cv2
 
-    zoom = np.exp(strength * generator.uniform(np.log(0.85), np.log(1.5)))
+    zoom = np.exp(generator.uniform(np.log(0.85), np.log(1.5)))
     scale = max(width / frame.camera.width, height / frame.camera.height) * zoom
     # averaging down first: the warp only interpolates, and would alias
     near = frame.camera.resized(round(frame.camera.width * scale), round(frame.camera.height * scale))
@@ -53,7 +53,7 @@ def virtual_camera(frame: Frame, height: int, width: int, generator: Generator, 
     matrix[:2, 2] += left, top
     turn = np.eye(3)
     if generator.random() < 0.7:
-        turn = rotation_from_euler_xyz(np.radians(strength * generator.normal(0.0, (2.0, 3.0, 2.0)).clip(-8, 8)))
+        turn = rotation_from_euler_xyz(np.radians(generator.normal(0.0, (2.0, 3.0, 2.0)).clip(-8, 8)))
     homography = matrix @ turn @ np.linalg.inv(near.matrix)
     warped = cv2.warpPerspective(image, homography, (width, height), flags=cv2.INTER_LINEAR)
     return replace(
@@ -112,11 +112,12 @@ def augment(frame: Frame, height: int, width: int, generator: Generator, strengt
         height: of the result's image, pixels.
         width: of the result's image, pixels.
         generator: of everything random.
-        strength: 0 mirrors at most, 1 varies the rig fully; thinning and colours come with this probability.
+        strength: thinning and colours come with this probability; the camera always varies, since features
+            that know where a cell is on a known rig need not look at what is in it.
     """
     if generator.random() < 0.5:
         frame = mirror(frame)
-    frame = virtual_camera(frame, height, width, generator, strength)
+    frame = virtual_camera(frame, height, width, generator)
     if generator.random() < strength:
         frame = replace(frame, points=thin_scan(frame.points, generator))
     if generator.random() < strength:

@@ -138,7 +138,7 @@ class TrainingSamples(Dataset[Sample]):
     SHAPES = ((160, 512), (192, 448), (224, 384))
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
-    EASIEST = 0.25  # strength of augmentation that the warm-up starts with
+    EASIEST = 0.5  # strength of augmentation that the warm-up starts with
     LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
     def __init__(
@@ -153,7 +153,7 @@ class TrainingSamples(Dataset[Sample]):
     ) -> None:
         """A stream whose first ``warm_up`` samples are for the features alone.
 
-        They start with frames that look alike, and their LiDAR images are displaced at random.
+        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random.
         Miscalibrations scatter around none, so "the match is where the cell is" is a good guess that
         features pick up from the image's borders, and then stay with; the displacement makes it a bad one.
         """
@@ -180,10 +180,8 @@ class TrainingSamples(Dataset[Sample]):
 
     def shape(self, number: int) -> tuple[int, int]:
         """Height and width of sample ``number``: its batch's."""
-        first = number - number % self.batch
-        generator = np.random.default_rng([self.seed, 1, first])
-        varied = generator.random() < self.strength(first)
-        return self.shapes[generator.choice(len(self.shapes), p=self.SHAPE_PROBABILITY) if varied else 0]
+        generator = np.random.default_rng([self.seed, 1, number // self.batch])
+        return self.shapes[generator.choice(len(self.shapes), p=self.SHAPE_PROBABILITY)]
 
     def __getitem__(self, number: int) -> Sample:
         """Draw sample ``number``."""
