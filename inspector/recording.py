@@ -25,11 +25,16 @@ from inspector.scene_logging import log_scene, log_scene_frame
 from inspector.stage_logging import log_stages
 
 APPLICATION_ID = "calib-inspect"
-FLUSH_EVERY = {Detail.OVERVIEW: 4, Detail.FULL: 1}
-"""Frames between flushes. Every flush writes one chunk an entity, some 3 kB each: a third of a
-small frame, nothing beside a large one. A kill loses at most this many frames."""
+FLUSH_EVERY = {Detail.OVERVIEW: (4, 32), Detail.FULL: (1, 12)}
+"""Fewest and most frames between two flushes; a kill loses at most these.
+
+A flush writes one chunk an entity. Each costs 3 kB of file, much beside a small frame, and some of
+the memory that collects the footer: 0.5 MB a flush. So the longer a run, the rarer the flushes.
+"""
+FLUSH_SHARE = 25
+"""Frames recorded for each frame that a kill may lose."""
 FLUSH_TIMEOUT_S = 60.0
-FLUSH_BYTES = 64 * 1024 * 1024
+FLUSH_BYTES = 1024 * 1024 * 1024
 """Above any batch, so that only the flushes cut chunks."""
 
 
@@ -73,7 +78,7 @@ class Recording:
         """
         rr.set_strict_mode(True)
         self._detail: Detail = layout.detail
-        self._frames = 0
+        self._frames = self._unflushed = 0
         self._sinks_gone = False
         self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
         self._rec = rr.RecordingStream(
@@ -98,7 +103,9 @@ class Recording:
         log_stages(self._rec, observation, self._detail)
         log_scene(self._rec, observation, self._detail)
         self._frames += 1
-        if self._frames % FLUSH_EVERY[self._detail] == 0:
+        self._unflushed += 1
+        fewest, most = FLUSH_EVERY[self._detail]
+        if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
             self._flush()
 
     def close(self) -> None:
@@ -115,6 +122,7 @@ class Recording:
             RecordingLostError: the file's writer has given up, for instance on a quota.
             ViewerClosedError: the viewer has gone and there is no file.
         """
+        self._unflushed = 0
         try:
             self._rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
