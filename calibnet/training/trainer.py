@@ -16,7 +16,7 @@ from lightning_fabric.plugins.precision import MixedPrecision
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from torch.utils.data import DataLoader, Sampler
 
-from calibnet.errors import CalibrationError, ConfigError
+from calibnet.errors import CalibnetError, CalibrationError, ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
@@ -69,6 +69,9 @@ class Observer(Protocol):
 
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
         """Called after each validation."""
+
+
+Batch = tuple[NetworkInputs, Target]
 
 
 class BatchNumbers(Sampler[list[int]]):
@@ -168,17 +171,17 @@ class Trainer:
             batch_sampler=BatchNumbers(self.steps, self.options.batch, self.fabric.global_rank, self.fabric.world_size),
             collate_fn=collate,
             num_workers=self.options.workers,
-            persistent_workers=self.options.workers > 0,
+            worker_init_fn=leave_interrupt_to_main,
             prefetch_factor=4 if self.options.workers else None,
         )
-        batches = iter(self.fabric.setup_dataloaders(loader, use_distributed_sampler=False))
+        batches = cast(Iterator[Batch], iter(self.fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
         started = self.seconds - time.monotonic()
         reported = checkpointed = validated = self.seconds
         steps_reported, means = self.steps, Means()
         self.model.train()
         with StopOnSignal() as stop:
             while self.share < 1.0 and not stop.requested:
-                inputs, target = next(batches)
+                inputs, target = next_batch(batches)
                 means.add(self._step(inputs, target))
                 self.seconds = started + time.monotonic()
                 if self.seconds - reported > self.REPORT_SECONDS:
@@ -256,6 +259,21 @@ class Trainer:
         return path
 
 
+def next_batch(batches: Iterator[Batch]) -> Batch:
+    """The next batch; an error from a worker comes with its traceback as text: keep the sentence."""
+    try:
+        return next(batches)
+    except CalibnetError as error:
+        kind, text = type(error), str(error)
+    raise kind(text.rpartition(f"{kind.__name__}: ")[2].strip())  # out here: nothing holds on to the worker any more
+
+
+def leave_interrupt_to_main(worker: int) -> None:
+    """Ctrl-C reaches a whole process group; a worker ends when the main process has finished its step."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 class StopOnSignal:
     """Turns Ctrl-C and SIGTERM into a request to stop after the current step, so that no step is cut in half."""
 
@@ -268,9 +286,11 @@ class StopOnSignal:
         self.previous = {number: signal.signal(number, self._request) for number in self.SIGNALS}
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         for number, handler in self.previous.items():
             signal.signal(number, handler)
+        if self.requested and isinstance(error, RuntimeError):
+            raise KeyboardInterrupt from None  # the signal ended a worker too: the last checkpoint has to do
 
     def _request(self, number: int, frame: object) -> None:
         self.requested = True
