@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from calibnet.datasets import DATASETS, Sequence, open_sequence, select_frames
-from inspector.cli.options import FRAMES, RANGE, STAGES
+from inspector.cli.options import FOLDER, FRAMES, RANGE, STAGES
 from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
+@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 def evaluate(
     dataset: str,
@@ -50,6 +51,7 @@ def evaluate(
     seed: int,
     stages: tuple[int, ...] | None,
     preset: str,
+    weights: Path | None,
     json_file: str | None,
 ) -> None:
     """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
@@ -65,7 +67,7 @@ def evaluate(
     from calibnet.evaluation import runner
     from calibnet.geometry import stages_within
 
-    cascade = Cascade.load(preset, stages=stages or stages_within(bounds))
+    cascade = Cascade.load(preset, stages or stages_within(bounds), weights)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
     console = console_beside(json_file)

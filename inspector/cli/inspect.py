@@ -12,7 +12,7 @@ import click
 
 from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
-from inspector.cli.options import FRAMES, MISCALIBRATION, RANGE, STAGES
+from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, RANGE, STAGES
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,7 +28,6 @@ DEFAULT_RANGE = "5/0.5"
 DEMO_LENGTH = 12
 RECORDINGS = Path("recordings")
 
-_FOLDER = click.Path(file_okay=False, path_type=Path)
 _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
     click.option(
@@ -42,6 +41,7 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
         "--detail",
         type=click.Choice(["overview", "full"]),
@@ -66,7 +66,7 @@ def shared_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-root_option = click.option("--root", type=_FOLDER, envvar="KITTI_ROOT", help="The dataset's folder.  [env: KITTI_ROOT]")
+root_option = click.option("--root", type=FOLDER, envvar="KITTI_ROOT", help="The dataset's folder.  [env: KITTI_ROOT]")
 camera_option = click.option(
     "--camera", type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
 )
@@ -126,7 +126,7 @@ def object_(split: str, root: Path | None, camera: int, **options: Any) -> int:
 
 
 @click.command()
-@click.argument("directory", type=_FOLDER)
+@click.argument("directory", type=FOLDER)
 @shared_options
 def folder(directory: Path, **options: Any) -> int:
     """Calibrate your own images/, clouds/ and calibration.yaml.
@@ -148,10 +148,10 @@ def demo(length: int, **options: Any) -> int:
 
     The recording is kept in recordings/demo.rrd.
     """
-    from calibnet.datasets.synthetic import SyntheticSequence
+    from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 
     options["save"] = options["save"] or RECORDINGS / "demo.rrd"
-    return calibrate(SyntheticSequence(seed=options["seed"], length=length), **options)
+    return calibrate(SyntheticSequence(seed=options["seed"], length=length, rig=KITTI_LIKE), **options)
 
 
 def require_root(root: Path | None, part: str) -> Path:
@@ -174,6 +174,7 @@ def calibrate(
     seed: int,
     stages: tuple[int, ...] | None,
     preset: str,
+    weights: Path | None,
     detail: str,
     save: Path | None,
     headless: bool,
@@ -202,7 +203,7 @@ def calibrate(
     outputs = choose_outputs(sequence.name, save, headless, serve, bind, connect)
     outputs.check()
     start = Start(bounds or MiscalibrationRange.parse(DEFAULT_RANGE), seed, per_frame, given, as_is)
-    cascade = Cascade.load(preset, stages or start.stages)
+    cascade = Cascade.load(preset, stages or start.stages, weights)
     console = Console(stderr=True, highlight=False)
     announce(console, sequence, start, cascade)
     identity = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -94,3 +95,5 @@ RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()
 MISCALIBRATION = MiscalibrationType()
+FOLDER = click.Path(file_okay=False, path_type=Path)
+"""A folder; whether it must exist is for the command to say."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from inspector.cli.options import RANGE
+from inspector.cli.options import FOLDER, RANGE
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from calibnet.geometry import MiscalibrationRange
     from calibnet.training.trainer import Observer, Progress
     from calibnet.training.validation import ValidationFigures
-
-FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @click.command()
