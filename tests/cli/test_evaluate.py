@@ -30,7 +30,7 @@ class KnownCascade:
     skipped = (SimpleNamespace(reason="Stage 1 has no weights."),)
 
     @classmethod
-    def load(cls, preset: str, stages: tuple[int, ...] | None = None) -> KnownCascade:
+    def load(cls, preset: str, stages: tuple[int, ...] | None = None, folder: Path | None = None) -> KnownCascade:
         cascade = cls()
         cls.loaded = {"preset": preset, "stages": stages}
         return cascade
