@@ -108,7 +108,7 @@ def test_ablations_make_the_network_smaller_where_the_paper_says_so(preset: str)
 def test_every_ablation_trains_every_parameter(preset: str, switch: str | None) -> None:
     network = preset_network(preset, **{switch: False} if switch else {})
     inputs = random_inputs(network.config, 32, 64)
-    target = Target(torch.eye(4)[None], [cells[:, 2] > 0 for cells in inputs.cells])
+    target = Target(torch.eye(4)[None], torch.zeros(1, 2), [cells[:, 2] > 0 for cells in inputs.cells])
     losses = hybrid_loss(network(inputs), inputs, target, network.config)
     if switch == "hybrid_loss":
         assert losses.matching == losses.displacement == losses.points == 0
