@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from calibnet.datasets.frame import Frame
-from calibnet.errors import CalibrationError, WeightsError
+from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.network.config import load_preset
 from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
@@ -46,12 +46,15 @@ class SkippedStage:
 class Clock:
     """Wall time by part, in milliseconds."""
 
-    def __init__(self) -> None:
+    def __init__(self, device: torch.device) -> None:
+        self.device = device
         self.parts: dict[str, float] = {}
         self.last = time.perf_counter()
 
     def __call__(self, part: str) -> None:
         """Everything since the last call was ``part``."""
+        if self.device.type == "cuda":
+            torch.cuda.synchronize(self.device)  # work is only queued there
         now = time.perf_counter()
         self.parts[part] = self.parts.get(part, 0.0) + 1000 * (now - self.last)
         self.last = now
@@ -82,17 +85,25 @@ class Cascade:
             folder: where the weights lie; the package's own by default.
 
         Raises:
-            ConfigError: there is no such preset.
+            ConfigError: there is no such preset or stage.
             WeightsError: no stage has weights, or a file cannot be used.
         """
         load_preset(preset)
+        numbers = sorted(stages or range(1, len(RANGES) + 1))
+        if not set(numbers) <= set(range(1, len(RANGES) + 1)):
+            raise ConfigError(f"Stages are numbered 1 to {len(RANGES)}; {', '.join(map(str, numbers))} is asked for.")
         loaded, skipped = [], []
         device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-        for number in sorted(stages or range(1, len(RANGES) + 1)):
+        for number in numbers:
             bounds = RANGES[number - 1]
             path = weights_path(preset, bounds, folder)
             if path.is_file():
-                loaded.append(Stage(number, bounds, load_network(path).to(device)))
+                network = load_network(path).to(device)
+                if network.bounds != bounds:
+                    raise WeightsError(
+                        f"{path} holds the weights of range {network.bounds}; give it its own name back."
+                    )
+                loaded.append(Stage(number, bounds, network))
             else:
                 reason = (
                     f"Stage {number} (±{bounds.rotation_deg:g}°/{bounds.translation_m:g} m) of preset {preset} has no "
@@ -112,7 +123,7 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock = Clock()
+        clock = Clock(self.device)
         camera = input_camera(frame.camera, self.config.input_height, self.config.input_width, self.config.scales[-1])
         image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
         clock("resize")
@@ -138,7 +149,7 @@ class Cascade:
         before: NDArray[np.float64],
         detail: bool,
     ) -> StageTrace:
-        clock = Clock()
+        clock = Clock(self.device)
         lidar = lidar_input(frame.points, before, camera, stage.network.config.volume_scales)
         occupied = int((lidar.cells[0][2] > 0).sum())
         if occupied < MINIMUM_CELLS:
@@ -184,6 +195,12 @@ def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _same_image_branch(one: CalibrationNetwork, other: CalibrationNetwork) -> bool:
     """Whether two stages would compute the same image features: then they are computed once."""
-    theirs = other.features.state_dict()
-    mine = {name: tensor for name, tensor in one.features.state_dict().items() if name.startswith("image_")}
-    return one.config.scales == other.config.scales and all(torch.equal(t, theirs[name]) for name, t in mine.items())
+    mine, theirs = (
+        {name: tensor for name, tensor in network.features.state_dict().items() if name.startswith("image_")}
+        for network in (one, other)
+    )
+    return (
+        one.config.volume_scales == other.config.volume_scales
+        and mine.keys() == theirs.keys()
+        and all(torch.equal(tensor, theirs[name]) for name, tensor in mine.items())
+    )

@@ -1,0 +1,253 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from calibnet.cascade import Cascade, SkippedStage, Stage, orthonormal
+from calibnet.datasets.frame import Frame
+from calibnet.errors import CalibrationError, ConfigError, WeightsError
+from calibnet.geometry import RANGES, depth_image, invert, miscalibration
+from calibnet.network.features import FeatureExtractor
+from calibnet.trace import CascadeTrace
+from calibnet.weights import save_network, weights_path
+from tests.network.tiny import TINY, tiny_network
+from tests.training.scene import REFERENCE, make_frame
+
+INITIAL = miscalibration([2.0, -1.0, 3.0], [0.2, -0.1, 0.3]) @ REFERENCE
+
+
+@pytest.fixture(scope="module")
+def frame() -> Frame:
+    return make_frame(3)
+
+
+def cascade(numbers: tuple[int, ...] = (3, 4, 5), shared: bool = True, **changes: Any) -> Cascade:
+    """Random networks; with ``shared``, all with the first one's image branch."""
+    networks = [tiny_network(seed=number, stage=number, **changes) for number in numbers]
+    if shared:
+        branch = {k: v for k, v in networks[0].features.state_dict().items() if k.startswith("image_")}
+        for network in networks[1:]:
+            network.features.load_state_dict(branch, strict=False)
+    return Cascade([Stage(number, RANGES[number - 1], net) for number, net in zip(numbers, networks, strict=True)])
+
+
+@pytest.fixture(scope="module")
+def trace(frame: Frame) -> CascadeTrace:
+    return cascade().calibrate(frame, INITIAL, detail=True)
+
+
+def test_stages_follow_one_another(trace: CascadeTrace) -> None:
+    assert [stage.number for stage in trace.stages] == [3, 4, 5]
+    assert [stage.range for stage in trace.stages] == list(RANGES[2:])
+    assert np.array_equal(trace.initial, INITIAL) and np.array_equal(trace.stages[0].before, INITIAL)
+    for one, following in zip(trace.stages, trace.stages[1:], strict=False):
+        assert np.array_equal(one.after, following.before)
+    for stage in trace.stages:
+        np.testing.assert_allclose(stage.after, stage.correction @ stage.before, atol=1e-12)
+        rotation = stage.after[:3, :3]
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+        assert not np.array_equal(stage.correction, np.eye(4))
+    assert np.array_equal(trace.corrected, trace.stages[-1].after)
+
+
+def test_detail_has_the_shapes_and_units_of_the_contract(trace: CascadeTrace, frame: Frame) -> None:
+    camera = trace.camera
+    assert camera.width % 32 == camera.height % 32 == 0
+    window = 2 * TINY.radius + 1
+    for stage in trace.stages:
+        detail = stage.detail
+        assert detail is not None
+        assert detail.depth.dtype == np.float32
+        np.testing.assert_array_equal(detail.depth, depth_image(frame.points, stage.before, camera))
+        assert [scale.stride for scale in detail.scales] == [8, 16, 32]
+        for scale, channels in zip(detail.scales, (4, 6, 8), strict=True):
+            size = (camera.height // scale.stride, camera.width // scale.stride)
+            assert scale.volume.shape == scale.probability.shape == (window, window, *size)
+            assert scale.volume.dtype == scale.probability.dtype == np.float16
+            assert np.abs(scale.volume).max() <= 1.01
+            np.testing.assert_allclose(scale.probability.astype(np.float64).sum((0, 1)), 1.0, atol=0.01)
+            assert scale.best.shape == (*size, 2) and scale.best.dtype == np.int64
+            assert scale.before.shape == scale.after.shape == (channels, *size)
+            assert scale.before.dtype == scale.after.dtype == np.float16
+            assert scale.occupied.shape == size and scale.occupied.dtype == np.bool_ and scale.occupied.any()
+        size = (camera.height // 8, camera.width // 8)
+        assert detail.displacement.shape == (*size, 2) and detail.displacement.dtype == np.float32
+        assert detail.confidence.shape == size and detail.confidence.dtype == np.float32
+        assert detail.confidence.min() >= 0 and detail.confidence.max() <= 1
+        assert np.array_equal(detail.confidence > 0, detail.scales[0].occupied)
+
+
+def test_best_match_is_the_displacement_with_the_highest_probability(trace: CascadeTrace) -> None:
+    detail = trace.stages[0].detail
+    assert detail is not None
+    for scale in detail.scales:
+        for row, column in ((0, 0), (scale.best.shape[0] - 1, 1)):
+            dx, dy = scale.best[row, column]
+            cell = scale.probability[:, :, row, column]
+            assert cell[dy + TINY.radius, dx + TINY.radius] == cell.max()
+
+
+def test_occupied_cells_hold_points(trace: CascadeTrace) -> None:
+    detail = trace.stages[1].detail
+    assert detail is not None
+    for scale in detail.scales:
+        height, width = scale.occupied.shape
+        blocks = detail.depth.reshape(height, scale.stride, width, scale.stride)
+        np.testing.assert_array_equal(scale.occupied, (blocks > 0).any(axis=(1, 3)))
+
+
+def test_detail_is_made_only_when_asked_for(frame: Frame, trace: CascadeTrace) -> None:
+    silent = cascade().calibrate(frame, INITIAL)
+    assert all(stage.detail is None for stage in silent.stages)
+    assert np.array_equal(silent.corrected, trace.corrected), "looking changes nothing"
+
+
+def test_times_are_told_by_part(trace: CascadeTrace) -> None:
+    assert trace.milliseconds.keys() == {"resize", "image_features"}
+    for stage in trace.stages:
+        parts = {"projection", "lidar_features", "cost_volumes", "hourglass", "displacement", "pose"}
+        assert stage.milliseconds.keys() == parts
+        assert all(0 <= time < 60_000 for time in stage.milliseconds.values())
+
+
+@pytest.mark.parametrize("head", ["geometric", "regression"])
+def test_the_same_frame_gives_the_same_extrinsic(frame: Frame, head: str) -> None:
+    one, again = (cascade((4,), head=head).calibrate(frame, INITIAL).corrected for _ in range(2))
+    assert np.array_equal(one, again)
+
+
+def test_the_frame_s_own_extrinsic_is_not_looked_at(frame: Frame) -> None:
+    network = cascade((5,))
+    lost = replace(frame, camera_from_lidar=np.full((4, 4), np.nan))
+    assert np.array_equal(network.calibrate(lost, INITIAL).corrected, network.calibrate(frame, INITIAL).corrected)
+
+
+def count_image_features(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    calls: list[int] = []
+    original = FeatureExtractor.image
+
+    def counted(self: FeatureExtractor, image: Tensor) -> list[Tensor]:
+        calls.append(1)
+        return original(self, image)
+
+    monkeypatch.setattr(FeatureExtractor, "image", counted)
+    return calls
+
+
+def test_image_features_are_computed_once_where_the_branch_is_shared(
+    frame: Frame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = count_image_features(monkeypatch)
+    shared = cascade()
+    assert shared.shares_image_branch
+    together = shared.calibrate(frame, INITIAL)
+    assert len(calls) == 1
+    shared.shares_image_branch = False
+    apart = shared.calibrate(frame, INITIAL)
+    assert len(calls) == 1 + 3
+    np.testing.assert_allclose(together.corrected, apart.corrected, atol=1e-9)
+
+
+def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = count_image_features(monkeypatch)
+    different = cascade(shared=False)
+    assert not different.shares_image_branch
+    assert different.calibrate(frame, INITIAL).milliseconds.keys() == {"resize"}
+    assert len(calls) == 3
+
+
+def test_networks_of_other_sizes_do_not_share() -> None:
+    wide = tiny_network(stage=4, widths=(8, 8, 16, 16, 24))
+    deep = tiny_network(stage=5, blocks=(0, 0, 2, 0, 0))
+    first = Stage(3, RANGES[2], tiny_network(stage=3))
+    assert not Cascade([first, Stage(4, RANGES[3], wide)]).shares_image_branch
+    assert not Cascade([first, Stage(5, RANGES[4], deep)]).shares_image_branch
+
+
+@pytest.mark.parametrize("detail", [True, False])
+def test_fewer_scales_and_shared_extractors_run_too(frame: Frame, detail: bool) -> None:
+    small = cascade((3, 4), shared=False, multi_scale_volumes=False, share_extractor=True)
+    stage = small.calibrate(frame, INITIAL, detail=detail).stages[0]
+    assert stage.detail is None or [scale.stride for scale in stage.detail.scales] == [8]
+
+
+def test_too_few_points_are_one_sentence(frame: Frame) -> None:
+    backwards = miscalibration([0, 0, 180.0], [0, 0, 0]) @ REFERENCE
+    empty = replace(frame, points=np.zeros((0, 4), np.float32))
+    for view, extrinsic in ((frame, backwards), (empty, REFERENCE)):
+        with pytest.raises(CalibrationError, match=r"frame 3 \(scene 3\).*x forward, y left, z up") as raised:
+            cascade().calibrate(view, extrinsic)
+        assert "\n" not in str(raised.value)
+
+
+def test_small_and_large_images_run(frame: Frame) -> None:
+    for width, height in ((90, 30), (500, 500), (700, 120)):
+        view = make_frame(0, width, height)
+        camera = cascade((5,)).calibrate(view, INITIAL).camera
+        assert camera.width * camera.height == pytest.approx(64 * 128, rel=0.5)
+
+
+# Loading
+
+
+def save(folder: Path, *numbers: int) -> None:
+    for number in numbers:
+        network = tiny_network(seed=number, stage=number)
+        save_network(weights_path("compact", RANGES[number - 1], folder), network, network.state_dict(), {})
+
+
+def test_stages_without_weights_are_skipped_and_named(tmp_path: Path, frame: Frame) -> None:
+    save(tmp_path, 5, 3)
+    loaded = Cascade.load("compact", folder=tmp_path)
+    assert [stage.number for stage in loaded.stages] == [3, 5]
+    assert [stage.number for stage in loaded.skipped] == [1, 2, 4]
+    assert "calib-inspect train --preset compact --range 2/0.2" in loaded.skipped[2].reason
+    assert [stage.number for stage in loaded.calibrate(frame, INITIAL).stages] == [3, 5]
+
+
+def test_only_the_stages_asked_for_are_loaded(tmp_path: Path) -> None:
+    save(tmp_path, 3, 4, 5)
+    loaded = Cascade.load("compact", (5, 4), tmp_path)
+    assert [stage.number for stage in loaded.stages] == [4, 5] and not loaded.skipped
+
+
+def test_a_cascade_without_any_weights_says_how_to_train_them(tmp_path: Path) -> None:
+    with pytest.raises(WeightsError, match=r"No stage.*Stage 4.*--range 2/0\.2"):
+        Cascade.load("compact", (4,), tmp_path)
+    with pytest.raises(WeightsError, match="Because"):
+        Cascade([], [SkippedStage(1, RANGES[0], "Because.")])
+
+
+@pytest.mark.parametrize("numbers", [(0,), (3, 6), (-1,)])
+def test_there_are_five_stages(tmp_path: Path, numbers: tuple[int, ...]) -> None:
+    save(tmp_path, 3, 5)
+    with pytest.raises(ConfigError, match="1 to 5"):
+        Cascade.load("compact", numbers, tmp_path)
+
+
+def test_there_must_be_such_a_preset(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="compact, paper"):
+        Cascade.load("huge", folder=tmp_path)
+
+
+def test_weights_under_another_stage_s_name_are_refused(tmp_path: Path) -> None:
+    save(tmp_path, 3)
+    weights_path("compact", RANGES[2], tmp_path).rename(weights_path("compact", RANGES[3], tmp_path))
+    with pytest.raises(WeightsError, match=r"5/0\.5"):
+        Cascade.load("compact", (4,), tmp_path)
+
+
+def test_rounding_is_removed_from_rotations() -> None:
+    exact = miscalibration([5.0, -7.0, 11.0], [0.1, 0.2, 0.3])
+    rounded = torch.from_numpy(exact).float().numpy().astype(np.float64)
+    result = orthonormal(rounded)
+    np.testing.assert_allclose(result[:3, :3] @ result[:3, :3].T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(result, exact, atol=1e-6)
+    np.testing.assert_allclose(result @ invert(result), np.eye(4), atol=1e-14)
