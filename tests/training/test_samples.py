@@ -4,11 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from calibnet.errors import DatasetError
 from calibnet.geometry import RANGES, bounds_of, invert, miscalibration
+from calibnet.network.displacement import DisplacementField
 from calibnet.network.inputs import lidar_input
+from calibnet.network.pose import GeometricHead
+from calibnet.training.losses import true_displacement
 from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, plain, visible_cells
+from tests.network.tiny import TINY
 from tests.training.scene import REFERENCE, Scenes, make_frame
 
 SCALES = (8, 16, 32)
@@ -78,6 +83,15 @@ def test_the_correction_undoes_the_miscalibration() -> None:
     np.testing.assert_allclose(sample.correction @ DELTA @ REFERENCE, REFERENCE, atol=1e-6)
     expected = lidar_input(frame.points, DELTA @ REFERENCE, frame.camera, SCALES)
     assert np.array_equal(sample.lidar.image, expected.image)
+
+
+def test_a_field_that_tells_the_truth_solves_to_the_correction() -> None:
+    """Cells, displacements and the solver must mean the same pixels and the same point."""
+    inputs, target = collate([make_sample(make_frame(), DELTA, SCALES)])
+    truth = true_displacement(inputs.cells[0], target.correction, inputs.intrinsics)
+    field = DisplacementField(truth, torch.full_like(truth, -2.0), torch.empty(0))
+    estimate = GeometricHead(TINY, RANGES[2])(field, inputs.cells[0], inputs.intrinsics).correction[0]
+    np.testing.assert_allclose(estimate.numpy(), target.correction[0].numpy(), atol=2e-3)
 
 
 def test_the_warm_up_displaces_the_lidar_image() -> None:
