@@ -20,7 +20,7 @@ from urllib.parse import quote, urlsplit
 import rerun as rr
 
 from calibnet.errors import ConfigError
-from inspector.interruption import StopRequest
+from calibnet.interruption import StopRequest
 
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0

@@ -22,8 +22,8 @@ from rich.text import Text
 
 from calibnet.datasets.frame import Frame, Sequence
 from calibnet.errors import CalibnetError
+from calibnet.interruption import StopRequest
 from calibnet.trace import CascadeTrace
-from inspector.interruption import StopRequest
 from inspector.observation import Detail, Layout, Observation, Skipped
 from inspector.outputs import Outputs
 from inspector.recording import Recording, RunDescription

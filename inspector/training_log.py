@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from inspector import entities
 
 if TYPE_CHECKING:
-    from calibnet.training.trainer import Progress
+    from calibnet.training.progress import Progress
     from calibnet.training.validation import ValidationFigures
 
 

@@ -12,7 +12,7 @@ import torch
 from calibnet.training.validation import ValidationFigures
 
 if TYPE_CHECKING:
-    from calibnet.training.trainer import TrainingOptions
+    from calibnet.training.options import TrainingOptions
 
 
 def training_record(

@@ -3,99 +3,34 @@
 from __future__ import annotations
 
 import math
-import signal
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import cast
 
 import torch
 from lightning_fabric import Fabric
-from lightning_fabric.plugins.precision import MixedPrecision
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
-from torch.utils.data import DataLoader, Sampler
+from torch.utils.data import DataLoader
 
-from calibnet.errors import CalibnetError, CalibrationError, ConfigError
+from calibnet.errors import CalibrationError, ConfigError
 from calibnet.geometry import MiscalibrationRange
+from calibnet.interruption import StopRequest
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.training.batches import Batch, BatchNumbers, FloatInputs, leave_interrupt_to_main, next_batch
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
 from calibnet.training.data import training_sources
 from calibnet.training.losses import Losses, Target, feature_loss, hybrid_loss
+from calibnet.training.options import TrainingOptions
+from calibnet.training.progress import Means, Observer, Progress
+from calibnet.training.record import training_record
 from calibnet.training.samples import TrainingSamples, collate
 from calibnet.training.validation import Validation, ValidationFigures
 from calibnet.weights import load_network, save_network, weights_path
 
-
-@dataclass(frozen=True)
-class TrainingOptions:
-    """Everything that decides a run; stored in its checkpoints and in the weights' record."""
-
-    preset: str
-    range: str
-    output: str  # folder of checkpoint and weights
-    data: list[str] = field(default_factory=list)
-    validate: list[str] = field(default_factory=list)
-    synthetic: float = 0.4  # share of the samples that come from the synthetic world
-    scenes: int = 4000  # synthetic scenes, each rendered once
-    minutes: float | None = None  # budget: of training time, over all resumed runs
-    samples: int | None = None  # budget: of samples; a run with it is exactly repeatable
-    batch: int = 8
-    learning_rate: float = 1e-3
-    seed: int = 0
-    workers: int = 1
-    initialize: str | None = None  # weights file of a neighbouring stage
-    scene_cache: str | None = None
-    warm_up: int = 12_000  # samples with which a run from scratch first trains the features alone, a third of the cost
-
-
-@dataclass(frozen=True)
-class Progress:
-    """One line of progress."""
-
-    samples: int
-    minutes: float
-    share: float  # of the budget, 0..1
-    samples_per_second: float
-    losses: dict[str, float]
-
-
-class Observer(Protocol):
-    """Watches a run; the command line prints, the inspector logs to Rerun."""
-
-    def progressed(self, progress: Progress) -> None:
-        """Called every few seconds with running means of the losses."""
-
-    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
-        """Called after each validation."""
-
-
-Batch = tuple[NetworkInputs, Target]
-
-
-class BatchNumbers(Sampler[list[int]]):
-    """Sample numbers batch by batch, from any batch on; every process of several takes its own."""
-
-    def __init__(self, first: int, batch: int, rank: int, world: int) -> None:
-        self.first, self.batch, self.rank, self.world = first, batch, rank, world
-
-    def __iter__(self) -> Iterator[list[int]]:
-        number = self.first * self.world + self.rank
-        while True:
-            yield list(range(number * self.batch, (number + 1) * self.batch))
-            number += self.world
-
-
-class FloatInputs(MixedPrecision):
-    """bf16 autocast that leaves the inputs alone: points rounded to bf16 would be off by decimetres."""
-
-    def __init__(self) -> None:
-        super().__init__("bf16-mixed", device="cuda" if torch.cuda.is_available() else "cpu")
-
-    def convert_input(self, data: Any) -> Any:
-        """Keep the inputs as they are."""
-        return data
+STOPPING = "Stopping after this step; once more stops at once."
 
 
 class Trainer:
@@ -179,7 +114,7 @@ class Trainer:
         reported = checkpointed = validated = self.seconds
         steps_reported, means = self.steps, Means()
         self.model.train()
-        with StopOnSignal() as stop:
+        with StopRequest(STOPPING) as stop:
             while self.share < 1.0 and not stop.requested:
                 inputs, target = next_batch(batches)
                 means.add(self._step(inputs, target))
@@ -250,67 +185,8 @@ class Trainer:
         self.steps, self.seconds = int(state["steps"]), float(state["seconds"])
 
     def _save_weights(self, figures: ValidationFigures | None) -> Path:
-        from calibnet.training.record import training_record
-
         record = training_record(self.options, self.samples, self.seconds / 60, self.fabric.device.type, figures)
         path = weights_path(self.options.preset, self.bounds, self.folder)
         if self.fabric.is_global_zero:
             save_network(path, self.network, self.average.module.state_dict(), record)
         return path
-
-
-def next_batch(batches: Iterator[Batch]) -> Batch:
-    """The next batch; an error from a worker comes with its traceback as text: keep the sentence."""
-    try:
-        return next(batches)
-    except CalibnetError as error:
-        kind, text = type(error), str(error)
-    raise kind(text.rpartition(f"{kind.__name__}: ")[2].strip())  # out here: nothing holds on to the worker any more
-
-
-def leave_interrupt_to_main(worker: int) -> None:
-    """Ctrl-C reaches a whole process group; a worker ends when the main process has finished its step."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-class StopOnSignal:
-    """Turns Ctrl-C and SIGTERM into a request to stop after the current step, so that no step is cut in half."""
-
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-    def __init__(self) -> None:
-        self.requested = False
-
-    def __enter__(self) -> StopOnSignal:
-        self.previous = {number: signal.signal(number, self._request) for number in self.SIGNALS}
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        for number, handler in self.previous.items():
-            signal.signal(number, handler)
-        if self.requested and isinstance(error, RuntimeError):
-            raise KeyboardInterrupt from None  # the signal ended a worker too: the last checkpoint has to do
-
-    def _request(self, number: int, frame: object) -> None:
-        self.requested = True
-
-
-class Means:
-    """Running means of the losses between two progress lines."""
-
-    def __init__(self) -> None:
-        self.sums: dict[str, float] = {}
-        self.count = 0
-
-    def add(self, losses: Losses) -> None:
-        """Take one step's losses in."""
-        self.count += 1
-        for name, value in losses._asdict().items():
-            self.sums[name] = self.sums.get(name, 0.0) + float(value.detach())
-
-    def take(self) -> dict[str, float]:
-        """The means since the last call."""
-        means = {name: total / max(1, self.count) for name, total in self.sums.items()}
-        self.sums, self.count = {}, 0
-        return means

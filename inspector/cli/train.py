@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.training.trainer import Observer, Progress
+    from calibnet.training.progress import Observer, Progress
     from calibnet.training.validation import ValidationFigures
 
 
@@ -105,7 +105,8 @@ def train(
     if (minutes is None) == (samples is None):
         raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
 
-    from calibnet.training.trainer import Trainer, TrainingOptions
+    from calibnet.training.options import TrainingOptions
+    from calibnet.training.trainer import Trainer
 
     options = TrainingOptions(
         preset=preset,

@@ -4,8 +4,8 @@ import json
 import re
 from pathlib import Path
 
+from calibnet.training.options import TrainingOptions
 from calibnet.training.record import training_record
-from calibnet.training.trainer import TrainingOptions
 from calibnet.training.validation import ValidationFigures
 
 FIGURES = ValidationFigures(4.7, 48.0, 1.2, 20.0, 3.0, 52)

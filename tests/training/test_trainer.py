@@ -20,8 +20,10 @@ from calibnet.geometry import RANGES, miscalibration
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training import trainer as trainer_module
 from calibnet.training.losses import feature_loss
+from calibnet.training.options import TrainingOptions
+from calibnet.training.progress import Progress
 from calibnet.training.samples import Source, collate, make_sample, plain
-from calibnet.training.trainer import Progress, Trainer, TrainingOptions
+from calibnet.training.trainer import Trainer
 from calibnet.training.validation import ValidationFigures
 from calibnet.weights import load_network, read_record
 from tests.network.tiny import TINY

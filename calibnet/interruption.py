@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request to stop between two frames, so that a recording ends whole."""
+"""Ctrl-C and SIGTERM as a request to stop between two frames or steps, so that nothing ends half done."""
 
 from __future__ import annotations
 

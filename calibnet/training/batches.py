@@ -1,0 +1,56 @@
+"""Endless batches for the loop: which samples, from which processes, at which precision."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import torch
+from lightning_fabric.plugins.precision import MixedPrecision
+from torch.utils.data import Sampler
+
+from calibnet.errors import CalibnetError
+from calibnet.network.network import NetworkInputs
+from calibnet.training.losses import Target
+
+Batch = tuple[NetworkInputs, Target]
+
+
+class BatchNumbers(Sampler[list[int]]):
+    """Sample numbers batch by batch, from any batch on; every process of several takes its own."""
+
+    def __init__(self, first: int, batch: int, rank: int, world: int) -> None:
+        self.first, self.batch, self.rank, self.world = first, batch, rank, world
+
+    def __iter__(self) -> Iterator[list[int]]:
+        number = self.first * self.world + self.rank
+        while True:
+            yield list(range(number * self.batch, (number + 1) * self.batch))
+            number += self.world
+
+
+class FloatInputs(MixedPrecision):
+    """bf16 autocast that leaves the inputs alone: points rounded to bf16 would be off by decimetres."""
+
+    def __init__(self) -> None:
+        super().__init__("bf16-mixed", device="cuda" if torch.cuda.is_available() else "cpu")
+
+    def convert_input(self, data: Any) -> Any:
+        """Keep the inputs as they are."""
+        return data
+
+
+def next_batch(batches: Iterator[Batch]) -> Batch:
+    """The next batch; an error from a worker comes with its traceback as text: keep the sentence."""
+    try:
+        return next(batches)
+    except CalibnetError as error:
+        kind, text = type(error), str(error)
+    raise kind(text.rpartition(f"{kind.__name__}: ")[2].strip())  # out here: nothing holds on to the worker any more
+
+
+def leave_interrupt_to_main(worker: int) -> None:
+    """Ctrl-C reaches a whole process group; a worker ends when the main process has finished its step."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,0 +1,27 @@
+"""What decides a training run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class TrainingOptions:
+    """Everything that decides a run; stored in its checkpoints and in the weights' record."""
+
+    preset: str
+    range: str
+    output: str  # folder of checkpoint and weights
+    data: list[str] = field(default_factory=list)
+    validate: list[str] = field(default_factory=list)
+    synthetic: float = 0.4  # share of the samples that come from the synthetic world
+    scenes: int = 4000  # synthetic scenes, each rendered once
+    minutes: float | None = None  # budget: of training time, over all resumed runs
+    samples: int | None = None  # budget: of samples; a run with it is exactly repeatable
+    batch: int = 8
+    learning_rate: float = 1e-3
+    seed: int = 0
+    workers: int = 1
+    initialize: str | None = None  # weights file of a neighbouring stage
+    scene_cache: str | None = None
+    warm_up: int = 12_000  # samples with which a run from scratch first trains the features alone, a third of the cost
