@@ -46,7 +46,9 @@ class Trainer:
             raise ConfigError("Training needs a budget: give --minutes or --samples.")
         self.options, self.observer = options, observer
         torch.manual_seed(options.seed)
-        self.fabric = Fabric(accelerator="auto", devices="auto", plugins=[FloatInputs()])
+        # the warm-up leaves most of the network out, and later stages freeze the image branch
+        strategy = "ddp_find_unused_parameters_true" if torch.cuda.device_count() > 1 else "auto"
+        self.fabric = Fabric(accelerator="auto", devices="auto", strategy=strategy, plugins=[FloatInputs()])
         self.fabric.launch()
         self.bounds = MiscalibrationRange.parse(options.range)
         self.folder = Path(options.output)
@@ -110,31 +112,42 @@ class Trainer:
             prefetch_factor=4 if self.options.workers else None,
         )
         batches = cast(Iterator[Batch], iter(self.fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
-        started = self.seconds - time.monotonic()
-        reported = checkpointed = validated = self.seconds
-        steps_reported, means = self.steps, Means()
         self.model.train()
         with StopRequest(STOPPING) as stop:
-            while self.share < 1.0 and not stop.requested:
-                inputs, target = next_batch(batches)
-                means.add(self._step(inputs, target))
-                self.seconds = started + time.monotonic()
-                if self.seconds - reported > self.REPORT_SECONDS:
-                    rate = (self.steps - steps_reported) * self.options.batch / (self.seconds - reported)
-                    self.observer.progressed(self._progress(rate, means.take()))
-                    reported, steps_reported = self.seconds, self.steps
-                if self.seconds - checkpointed > self.CHECKPOINT_SECONDS:
-                    self._save_checkpoint()
-                    checkpointed = self.seconds
-                if self.seconds - validated > self.VALIDATION_SECONDS:
-                    self._validate()
-                    validated = self.seconds
-        if stop.requested:
+            try:
+                finished = self._loop(batches, stop)
+            except RuntimeError:
+                if not stop.requested:
+                    raise
+                raise KeyboardInterrupt from None  # the signal ended a worker too: the last checkpoint has to do
+        if not finished:
             self._save_checkpoint()
             raise KeyboardInterrupt
         figures = self._validate()
         self._save_checkpoint()
         return self._save_weights(figures)
+
+    def _loop(self, batches: Iterator[Batch], stop: StopRequest) -> bool:
+        """Step until the budget is used (True) or a stop is requested (False)."""
+        started = self.seconds - time.monotonic()
+        reported = checkpointed = validated = self.seconds
+        steps_reported, means, stopping = self.steps, Means(), False
+        while self.share < 1.0 and not stopping:
+            inputs, target = next_batch(batches)
+            means.add(self._step(inputs, target))
+            # all processes must take the same steps, at the same learning rate
+            self.seconds, stopping = self.fabric.broadcast((started + time.monotonic(), stop.requested))
+            if self.seconds - reported > self.REPORT_SECONDS:
+                rate = (self.steps - steps_reported) * self.options.batch / (self.seconds - reported)
+                self.observer.progressed(self._progress(rate, means.take()))
+                reported, steps_reported = self.seconds, self.steps
+            if self.seconds - checkpointed > self.CHECKPOINT_SECONDS:
+                self._save_checkpoint()
+                checkpointed = self.seconds
+            if self.seconds - validated > self.VALIDATION_SECONDS:
+                self._validate()
+                validated = self.seconds
+        return not stopping
 
     def _step(self, inputs: NetworkInputs, target: Target) -> Losses:
         rate = self.options.learning_rate * min(1.0, (self.share + 1e-3) / self.WARM_UP)
