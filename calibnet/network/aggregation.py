@@ -74,9 +74,10 @@ def coarsen_window(volume: Tensor, window: int) -> Tensor:
 @lru_cache(maxsize=8)
 def refinement(window: int) -> Tensor:
     """Linear map ``[window, window]`` that samples a coarse window's centre at half-cell steps."""
-    radius = window // 2
-    position = torch.arange(-radius, radius + 1) / 2 + radius
-    return (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
+    with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
+        radius = window // 2
+        position = torch.arange(-radius, radius + 1) / 2 + radius
+        return (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
 
 
 def refine_window(volume: Tensor, window: int) -> Tensor:

@@ -46,9 +46,10 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
 @lru_cache(maxsize=32)
 def band_index(width: int, radius: int) -> Tensor:
     """``[w, D]``: where cell ``x``'s window lies in a row of ``Dy`` padded image rows laid end to end."""
-    offset = torch.arange(2 * radius + 1)
-    start = offset[:, None] * (width + 2 * radius) + offset  # [Dy, Dx]
-    return torch.arange(width)[:, None] + start.flatten()
+    with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
+        offset = torch.arange(2 * radius + 1)
+        start = offset[:, None] * (width + 2 * radius) + offset  # [Dy, Dx]
+        return torch.arange(width)[:, None] + start.flatten()
 
 
 def concatenate(lidar: Tensor, image: Tensor, radius: int) -> Tensor:

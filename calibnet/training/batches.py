@@ -11,6 +11,7 @@ from lightning_fabric.plugins.precision import MixedPrecision
 from torch.utils.data import Sampler
 
 from calibnet.errors import CalibnetError
+from calibnet.interruption import SIGNALS
 from calibnet.network.network import NetworkInputs
 from calibnet.training.losses import Target
 
@@ -50,7 +51,7 @@ def next_batch(batches: Iterator[Batch]) -> Batch:
     raise kind(text.rpartition(f"{kind.__name__}: ")[2].strip())  # out here: nothing holds on to the worker any more
 
 
-def leave_interrupt_to_main(worker: int) -> None:
-    """Ctrl-C reaches a whole process group; a worker ends when the main process has finished its step."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+def leave_signals_to_main(worker: int) -> None:
+    """A signal may reach the whole process group; a worker ends when the main process has finished its step."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)

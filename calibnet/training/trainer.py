@@ -19,7 +19,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.interruption import StopRequest
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
-from calibnet.training.batches import Batch, BatchNumbers, FloatInputs, leave_interrupt_to_main, next_batch
+from calibnet.training.batches import Batch, BatchNumbers, FloatInputs, leave_signals_to_main, next_batch
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
 from calibnet.training.data import training_sources
 from calibnet.training.losses import Losses, Target, feature_loss, hybrid_loss
@@ -108,7 +108,7 @@ class Trainer:
             batch_sampler=BatchNumbers(self.steps, self.options.batch, self.fabric.global_rank, self.fabric.world_size),
             collate_fn=collate,
             num_workers=self.options.workers,
-            worker_init_fn=leave_interrupt_to_main,
+            worker_init_fn=leave_signals_to_main,
             prefetch_factor=4 if self.options.workers else None,
         )
         batches = cast(Iterator[Batch], iter(self.fabric.setup_dataloaders(loader, use_distributed_sampler=False)))

@@ -77,3 +77,12 @@ def test_score_is_a_cosine_whatever_the_features_length() -> None:
     assert volume.shape == (1, TINY.groups + 2 * TINY.concat_channels, 25, 4, 6)
     assert score.abs().max() <= 1 + 1e-5
     torch.testing.assert_close(score[:, 12], torch.ones(1, 4, 6))  # the centre of the window: itself
+
+
+def test_what_inference_leaves_behind_can_be_trained_with() -> None:
+    features = torch.randn(1, 4, 3, 13)
+    with torch.inference_mode():
+        correlate(features, features, 2, 2)
+    lidar = features.clone().requires_grad_()
+    correlate(lidar, features, 2, 2).sum().backward()
+    assert lidar.grad is not None
