@@ -6,7 +6,9 @@ import pytest
 import torch
 
 from calibnet.geometry import RANGES
+from calibnet.network.aggregation import refinement
 from calibnet.network.config import load_preset
+from calibnet.network.cost_volume import band_index
 from calibnet.network.counting import count
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training.losses import Target, hybrid_loss
@@ -62,6 +64,17 @@ def test_a_sample_does_not_depend_on_its_batch() -> None:
     with torch.no_grad():
         together, alone = network(inputs).pose.correction[1], network(second).pose.correction[0]
     torch.testing.assert_close(together, alone, atol=1e-4, rtol=1e-4)
+
+
+def test_training_may_follow_inference_at_the_same_size() -> None:
+    """As in a run whose first batch has the size of the validation frames: nothing kept in between may spoil it."""
+    band_index.cache_clear()
+    refinement.cache_clear()
+    network = tiny_network()
+    inputs = random_inputs(network.config, 64, 160)
+    with torch.inference_mode():
+        network(inputs)
+    network(inputs).pose.correction.square().sum().backward()
 
 
 def test_every_input_matters() -> None:
