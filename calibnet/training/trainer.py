@@ -65,6 +65,8 @@ class Trainer:
             Path(options.scene_cache) if options.scene_cache else None,
         )  # fmt: skip
         self.warm_up = options.warm_up if self.from_scratch and config.hybrid_loss else 0
+        if options.samples:
+            self.warm_up = min(self.warm_up, options.samples // 3)
         area = config.input_height * config.input_width
         self.data = TrainingSamples(
             sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up
@@ -123,9 +125,13 @@ class Trainer:
         if not finished:
             self._save_checkpoint()
             raise KeyboardInterrupt
-        figures = self._validate()
         self._save_checkpoint()
-        return self._save_weights(figures)
+        if self.samples < self.warm_up:
+            raise ConfigError(
+                f"The budget ended after {self.samples} samples, within the warm-up of {self.warm_up}: no pose is "
+                "trained yet, and no weights are written. Continue with --resume and more --minutes."
+            )
+        return self._save_weights(self._validate())
 
     def _loop(self, batches: Iterator[Batch], stop: StopRequest) -> bool:
         """Step until the budget is used (True) or a stop is requested (False)."""

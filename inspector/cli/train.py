@@ -57,6 +57,13 @@ if TYPE_CHECKING:
     show_default=True,
     help="Peak of the cosine schedule.",
 )
+@click.option(
+    "--warm-up",
+    type=click.IntRange(0),
+    default=12_000,
+    show_default=True,
+    help="Samples with which a run from scratch first trains its features alone; a third of --samples at most.",
+)
 @click.option("--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that prepare samples.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
 @click.option(
@@ -86,6 +93,7 @@ def train(
     samples: int | None,
     batch: int,
     learning_rate: float,
+    warm_up: int,
     workers: int,
     seed: int,
     initialize: Path | None,
@@ -120,6 +128,7 @@ def train(
         samples=samples,
         batch=batch,
         learning_rate=learning_rate,
+        warm_up=warm_up,
         seed=seed,
         workers=workers,
         initialize=str(initialize) if initialize else None,

@@ -226,3 +226,11 @@ def test_without_the_hybrid_loss_the_pose_is_learned_from_the_start(
     monkeypatch.setattr(trainer_module, "hybrid_loss", watched)
     Trainer(options(tmp_path, batches=3), Watcher()).run()
     assert shares == [1.0, 1.0, 1.0]
+
+
+def test_a_budget_that_ends_within_the_warm_up_writes_no_weights(tiny_world: Scenes, tmp_path: Path) -> None:
+    short = replace(options(tmp_path), samples=None, minutes=1e-6, warm_up=1000)
+    with pytest.raises(ConfigError, match=r"within the warm-up of 1000.*--resume"):
+        Trainer(short, Watcher()).run()
+    assert not list(tmp_path.glob("*.safetensors"))
+    assert list(tmp_path.glob("*.checkpoint"))
