@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ class TrainingLog:
         """Log the running means of the losses."""
         self._at(progress)
         for loss, value in progress.losses.items():
+            if not math.isfinite(value):  # the warm-up has no pose whose error could be plotted
+                continue
             self.recording.log(f"{entities.TRAINING}/{loss}", rr.Scalars(value))
         self.recording.flush()
 

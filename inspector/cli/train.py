@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -172,11 +173,13 @@ class ConsoleObserver:
     def progressed(self, progress: Progress) -> None:
         """Print the running means."""
         losses = progress.losses
+        pose = "warm-up, no pose yet"
+        if math.isfinite(losses["rotation_deg"]):
+            pose = f"rotation {losses['rotation_deg']:.2f}°  translation {losses['translation_cm']:.1f} cm"
         terms = "  ".join(f"{name} {losses[name]:.3f}" for name in losses if not name.endswith(("_deg", "_cm")))
         self.console.print(
             f"{progress.share:4.0%}  {progress.minutes:6.1f} min  {progress.samples:8,d} samples  "
-            f"{progress.samples_per_second:5.1f}/s  {terms}  "
-            f"rotation {losses['rotation_deg']:.2f}°  translation {losses['translation_cm']:.1f} cm",
+            f"{progress.samples_per_second:5.1f}/s  {terms}  " + pose,
             soft_wrap=True,
         )
 
