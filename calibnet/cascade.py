@@ -17,6 +17,7 @@ from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.network.config import load_preset
 from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.precision import autocast
 from calibnet.stage_detail import stage_detail
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.weights import load_network, weights_path
@@ -129,7 +130,7 @@ class Cascade:
         clock("resize")
         features: list[Tensor] | None = None
         extrinsic, traces = initial, []
-        with torch.inference_mode(), torch.autocast(self.device.type, torch.bfloat16):
+        with torch.inference_mode(), autocast(self.device):
             if self.shares_image_branch:
                 features = self.stages[0].network.features.image(image)
                 clock("image_features")

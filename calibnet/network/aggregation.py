@@ -16,6 +16,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
+from calibnet.network.cost_volume import TEMPERATURE
 
 
 class WindowConv(nn.Module):
@@ -101,11 +102,11 @@ class Hourglass(nn.Module):
                 for width, number in zip(channels, counts, strict=True)
             )
 
-        # the finest scale holds nearly all the work: it is convolved only on the way up; and where
+        # the finest scale holds nearly all the work: it is convolved on the way up at most; and where
         # scales are not fused there is no way down
         coarser = len(channels) - 1
         self.down_blocks = stacks([0] + [blocks if self.fuse else 0] * coarser)
-        self.up_blocks = stacks([blocks] * (coarser + 1))
+        self.up_blocks = stacks([blocks if config.convolve_finest else 0] + [blocks] * coarser)
         if self.fuse:
             steps = list(itertools.pairwise(channels))
             self.down = nn.ModuleList(
@@ -143,16 +144,22 @@ class Aggregation(nn.Module):
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for channels in config.channels_at_scales)
 
-    def forward(self, volumes: list[Tensor]) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
-        """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]``, fine to coarse.
+    def forward(
+        self, volumes: list[Tensor], scores: list[Tensor]
+    ) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+        """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]`` and raw scores ``[B, D, h_s, w_s]``, fine to coarse.
 
         Returns:
             Activations before and after the hourglasses, ``[B, C_s, D, h_s, w_s]``, and logits
-            ``[B, D, h_s, w_s]`` over the window.
+            ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by itself, and
+            what the hourglass adds to it.
         """
         before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]
         after = before
         for hourglass in self.hourglasses:
             after = hourglass(after)
-        logits = [score(volume).squeeze(1) for score, volume in zip(self.score, after, strict=True)]
+        logits = [
+            TEMPERATURE * raw + score(volume).squeeze(1)
+            for raw, score, volume in zip(scores, self.score, after, strict=True)
+        ]
         return before, after, logits

@@ -37,6 +37,7 @@ class NetworkConfig:
     volume_channels: int | tuple[int, ...]  # of the 3-D hourglasses: the same at all scales, or one a scale
     hourglass_blocks: int | tuple[int, ...]  # pairs of 3-D convolutions at each scale: the same, or one a hourglass
     hourglasses: int  # one after the other
+    convolve_finest: bool  # 3-D convolutions at the finest scale as well, which holds most of their work
     context_channels: int  # of the 2-D network that turns volumes into displacements
     head: Head
     multi_scale_features: bool = True

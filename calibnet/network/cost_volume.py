@@ -15,6 +15,9 @@ from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
 
+TEMPERATURE = 14.0
+"""Cosines of unit-norm features become logits times this."""
+
 
 def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """Group-wise correlation of every LiDAR cell with the window of image cells around it.

@@ -54,7 +54,8 @@ class NetworkOutput(NamedTuple):
         pose: the correction.
         field: the displacement field it was read from.
         scores: per scale the raw matching score ``[B, D, h_s, w_s]``, a cosine.
-        logits: per scale the aggregated score ``[B, D, h_s, w_s]``, a softmax away from a probability.
+        logits: per scale the aggregated score ``[B, D, h_s, w_s]``, a softmax away from a probability: what the
+            raw score says, corrected by the hourglass.
         activations: only when asked for.
     """
 
@@ -111,7 +112,7 @@ class CalibrationNetwork(nn.Module):
         pairs = zip(self.cost_volumes, lidar_features, image_features, strict=True)
         volumes, scores = map(list, zip(*(build(lidar, image) for build, lidar, image in pairs), strict=True))
         clock("cost_volumes")
-        before, after, logits = self.aggregation(volumes)
+        before, after, logits = self.aggregation(volumes, scores)
         clock("hourglass")
         field = self.displacement(logits, lidar_features[0], inputs.cells[0])
         clock("displacement")

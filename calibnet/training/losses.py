@@ -9,12 +9,9 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from calibnet.network.config import NetworkConfig
+from calibnet.network.cost_volume import TEMPERATURE
 from calibnet.network.network import NetworkInputs, NetworkOutput
 from calibnet.network.pose import project_points
-
-TEMPERATURE = 14.0
-"""Cosines of unit-norm features become logits times this."""
-
 
 class Target(NamedTuple):
     """The truth of a batch.

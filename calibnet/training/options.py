@@ -23,5 +23,7 @@ class TrainingOptions:
     seed: int = 0
     workers: int = 1
     initialize: str | None = None  # weights file of a neighbouring stage
+    train_image_branch: bool = False  # of an initialised stage; frozen, all stages share it, computed once a frame
+    after: str | None = None  # folder of the stages before, whose errors are half of the miscalibrations drawn
     scene_cache: str | None = None
     warm_up: int = 12_000  # samples with which a run from scratch first trains the features alone, a third of the cost

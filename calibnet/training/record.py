@@ -22,8 +22,9 @@ def training_record(
     described = asdict(options) | {"output": None, "scene_cache": None}
     for key in ("data", "validate"):  # datasets are named, the machine's folders are not
         described[key] = [_without_folder(spec) for spec in described[key]]
-    if options.initialize:
-        described["initialize"] = Path(options.initialize).name
+    for key in ("initialize", "after"):
+        if described[key]:
+            described[key] = Path(described[key]).name
     return {
         "options": {key: value for key, value in described.items() if value is not None},
         "samples": samples,

@@ -139,6 +139,7 @@ class TrainingSamples(Dataset[Sample]):
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
+    RESIDUAL_SHARE = 0.5  # of the miscalibrations, when the errors of the stages before are known
     LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
     def __init__(
@@ -163,6 +164,7 @@ class TrainingSamples(Dataset[Sample]):
         self.probability = weights / weights.sum()
         factor = (area / (160 * 512)) ** 0.5
         self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
+        self.residuals: list[NDArray[np.float64]] = []
         self.cache: dict[tuple[int, int], Frame] = {}
 
     def read(self, source: int, position: int) -> Frame:
@@ -185,12 +187,10 @@ class TrainingSamples(Dataset[Sample]):
 
     def __getitem__(self, number: int) -> Sample:
         """Draw sample ``number``."""
-        (height, width), strength = self.shape(number), self.strength(number)
+        strength = self.strength(number)
         generator = np.random.default_rng([self.seed, 2, number])
         for _ in range(self.ATTEMPTS):
-            source = self.draw_source(generator, strength)
-            frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
-            frame = augment(frame, height, width, generator, strength)
+            frame = self.draw_frame(number, generator, strength)
             shift = generator.uniform(-self.LARGEST_SHIFT, self.LARGEST_SHIFT, 2) * (number < self.warm_up)
             sample = make_sample(frame, self.draw(generator), self.scales, shift)
             if sample.visible[0].sum() >= MINIMUM_CELLS:
@@ -199,6 +199,12 @@ class TrainingSamples(Dataset[Sample]):
             f"None of {self.ATTEMPTS} draws gave {MINIMUM_CELLS} cells with a visible LiDAR point, the last one from "
             f"{frame.source}; check that the training data's calibration fits its scans."
         )
+
+    def draw_frame(self, number: int, generator: np.random.Generator, strength: float) -> Frame:
+        """An augmented frame at the size of sample ``number``."""
+        source = self.draw_source(generator, strength)
+        frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
+        return augment(frame, *self.shape(number), generator, strength)
 
     def draw_source(self, generator: np.random.Generator, strength: float) -> int:
         """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the strength."""
@@ -209,7 +215,12 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
-        """A miscalibration: mostly anywhere in the range, sometimes small, as a stage must also know when to stop."""
+        """A miscalibration: one that the stages before leave behind or anywhere in the range, half and half.
+
+        Sometimes a small one, as a stage must also know when to stop.
+        """
+        if self.residuals and generator.random() < self.RESIDUAL_SHARE:
+            return self.residuals[generator.integers(len(self.residuals))]
         share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
         bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
         return sample_miscalibration(bounds, generator)

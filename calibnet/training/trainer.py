@@ -26,6 +26,7 @@ from calibnet.training.losses import Losses, Target, feature_loss, hybrid_loss
 from calibnet.training.options import TrainingOptions
 from calibnet.training.progress import Means, Observer, Progress
 from calibnet.training.record import training_record
+from calibnet.training.residuals import residual_errors, stages_before
 from calibnet.training.samples import TrainingSamples, collate
 from calibnet.training.validation import Validation, ValidationFigures
 from calibnet.weights import load_network, save_network, weights_path
@@ -38,6 +39,7 @@ class Trainer:
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP, FINAL_RATE = 0.03, 0.02
+    RESIDUALS = 400  # errors of the stages before, measured when the run starts
     POSE_RAMP = 2000  # samples over which the pose's losses fade in after the warm-up
 
     def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:
@@ -57,7 +59,7 @@ class Trainer:
         self.from_scratch = options.initialize is None
         if options.initialize:
             self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
-            if config.share_image_branch:
+            if config.share_image_branch and not options.train_image_branch:
                 for name, parameter in self.network.features.named_parameters():
                     parameter.requires_grad_(not name.startswith("image_"))
         sources, held_out = training_sources(
@@ -71,6 +73,10 @@ class Trainer:
         self.data = TrainingSamples(
             sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up
         )
+        if options.after:
+            before = stages_before(options.preset, self.bounds, Path(options.after))
+            if before:
+                self.data.residuals = residual_errors(before, self.data, self.bounds, self.RESIDUALS)
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.998))
         trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
         optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)

@@ -10,6 +10,7 @@ import torch
 from calibnet.datasets import Sequence
 from calibnet.geometry import pose_error, sample_miscalibration
 from calibnet.network.network import CalibrationNetwork
+from calibnet.precision import autocast
 from calibnet.training.samples import Sample, collate, make_sample, plain
 
 
@@ -45,7 +46,7 @@ class Validation:
         before, after = [], []
         training = network.training
         network.eval()
-        with torch.inference_mode(), torch.autocast(device.type, torch.bfloat16):
+        with torch.inference_mode(), autocast(device):
             for sample in self.samples:
                 inputs, _ = collate([sample])
                 estimate = network(inputs.to(device)).pose.correction[0].double().cpu().numpy()

@@ -39,6 +39,7 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".part")
     save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
+    partial.chmod(0o644)  # safetensors keeps its files to their owner, which a package must not
     partial.replace(path)
 
 

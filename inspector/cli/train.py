@@ -73,6 +73,14 @@ if TYPE_CHECKING:
     help="Weights of a neighbouring stage to start from.",
 )
 @click.option(
+    "--train-image-branch",
+    is_flag=True,
+    help="Also train the image branch of an initialised stage.  [default: frozen, as all stages share it]",
+)
+@click.option(
+    "--after", type=FOLDER, help="Folder of the stages before: half of the miscalibrations are what they leave behind."
+)
+@click.option(
     "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."
 )
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint in --output.")
@@ -98,6 +106,8 @@ def train(
     workers: int,
     seed: int,
     initialize: Path | None,
+    train_image_branch: bool,
+    after: Path | None,
     output: Path,
     resume: bool,
     save: Path | None,
@@ -133,6 +143,8 @@ def train(
         seed=seed,
         workers=workers,
         initialize=str(initialize) if initialize else None,
+        train_image_branch=train_image_branch,
+        after=str(after) if after else None,
         scene_cache=str(scene_cache) if scene_cache else None,
     )
     from rich.console import Console

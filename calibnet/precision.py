@@ -1,0 +1,22 @@
+"""The fastest precision of convolutions on a device: bf16 where the hardware has it, else single."""
+
+from __future__ import annotations
+
+import torch
+
+
+def has_fast_bf16(device: torch.device) -> bool:
+    """Whether convolutions in bf16 are faster than in single precision.
+
+    A CPU without bf16 instructions (AVX2 laptops among them) emulates them, ten times slower than float32.
+    """
+    if device.type == "cuda":
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    if device.type == "cpu":
+        return torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported()
+    return False
+
+
+def autocast(device: torch.device) -> torch.autocast:
+    """Autocast to bf16 where that is faster, and nothing elsewhere."""
+    return torch.autocast(device.type, torch.bfloat16, enabled=has_fast_bf16(device))

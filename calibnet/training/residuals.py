@@ -1,0 +1,60 @@
+"""What the stages before leave behind: the errors, tails included, that the next stage is trained to correct."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from calibnet.geometry import RANGES, MiscalibrationRange, sample_miscalibration
+from calibnet.geometry.miscalibration import bounds_of
+from calibnet.network.network import CalibrationNetwork
+from calibnet.precision import autocast
+from calibnet.training.samples import TrainingSamples, collate, make_sample
+from calibnet.weights import load_network, weights_path
+
+LARGEST = 1.5
+"""Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them."""
+
+
+def stages_before(preset: str, bounds: MiscalibrationRange, folder: Path) -> list[CalibrationNetwork]:
+    """The networks of wider ranges in ``folder``, coarse to fine; those without weights are left out."""
+    wider = RANGES[: RANGES.index(bounds)] if bounds in RANGES else ()
+    paths = [weights_path(preset, stage, folder) for stage in wider]
+    return [load_network(path) for path in paths if path.is_file()]
+
+
+def residual_errors(
+    networks: list[CalibrationNetwork], data: TrainingSamples, bounds: MiscalibrationRange, count: int
+) -> list[NDArray[np.float64]]:
+    """Errors ``correction @ delta`` (4x4) that the networks leave on ``count`` augmented training frames.
+
+    Args:
+        networks: run one after the other, each from where the one before arrived.
+        data: where frames come from.
+        bounds: of the stage to be trained.
+        count: frames to run; what is lost altogether is left out of the result.
+    """
+    generator = np.random.default_rng([data.seed, 4])
+    residuals = []
+    for number in range(count):
+        frame = data.draw_frame(number, generator, 1.0)
+        delta = sample_miscalibration(networks[0].bounds, generator)
+        for network in networks:
+            inputs, _ = collate([make_sample(frame, delta, network.config.volume_scales)])
+            device = next(network.parameters()).device
+            with torch.inference_mode(), autocast(device):
+                delta = network(inputs.to(device)).pose.correction[0].double().cpu().numpy() @ delta
+        if within(delta, bounds):
+            residuals.append(delta)
+    return residuals
+
+
+def within(delta: NDArray[np.float64], bounds: MiscalibrationRange) -> bool:
+    """Whether an error is near enough to be corrected by a stage of these bounds."""
+    if not np.isfinite(delta).all():
+        return False
+    error = bounds_of(delta)
+    return error.rotation_deg < LARGEST * bounds.rotation_deg and error.translation_m < 2 * LARGEST * bounds.translation_m
