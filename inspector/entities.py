@@ -14,6 +14,11 @@ STEP = "step"
 """Timeline: ``frame * 6 + stage``; stage 0 is the miscalibrated frame, 5 the last stage."""
 STEPS_PER_FRAME = 6
 
+RUN = "run"
+"""Property: the options that identify the run."""
+PROVENANCE = "provenance"
+"""Property: what a reader needs besides, see `inspector.recording.Recording`."""
+
 IMAGE = "image"
 TABLE = "table"
 
@@ -29,6 +34,13 @@ CLOUD_CORRECTED = "world/cloud/corrected"
 LIDAR = "world/lidar"
 CAMERA_INITIAL = "world/camera/initial"
 CAMERA_REFERENCE = "world/camera/reference"
+
+EXTRINSIC_INITIAL = "extrinsic/initial"
+EXTRINSIC_REFERENCE = "extrinsic/reference"
+CAMERA = "extrinsic/camera"
+"""The frame's own camera: ``width``, ``height``, ``camera_matrix`` row by row, and ``source``, its image's name."""
+MATRIX = "camera_from_lidar"
+"""Component of the extrinsics: 16 float64 row by row, exactly what the run computed."""
 
 LEGEND_DEPTH = "legend/depth"
 LEGEND_DISPLACEMENT = "legend/displacement"
@@ -50,6 +62,11 @@ def overlay_stage(number: int) -> str:
 def camera_stage(number: int) -> str:
     """The camera's frustum in the LiDAR frame after a stage."""
     return f"world/camera/stage_{number}"
+
+
+def extrinsic_stage(number: int) -> str:
+    """The extrinsic after a stage, as numbers."""
+    return f"extrinsic/stage_{number}"
 
 
 def error_initial(kind: str) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -17,7 +19,7 @@ THINNING = {Detail.OVERVIEW: Thinning(cells_across=140, pixel=1.0), Detail.FULL:
 
 
 def log_frame(rec: rr.RecordingStream, observation: Observation, detail: Detail) -> None:
-    """Log the image, all overlays, the errors and the table of one frame.
+    """Log the image, all overlays, the errors, the extrinsics and the table of one frame.
 
     The timelines ``frame`` and ``time`` must be set; ``step`` is set here: everything belongs to
     the frame's step 0, except `entities.OVERLAY_CURRENT`, which has one row a stage.
@@ -28,6 +30,7 @@ def log_frame(rec: rr.RecordingStream, observation: Observation, detail: Detail)
     rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
     rec.log(entities.TABLE, rr.TextDocument(stage_table(observation), media_type=rr.MediaType.MARKDOWN))
     _log_errors(rec, observation)
+    _log_extrinsics(rec, observation)
 
     def overlay(camera_from_lidar: NDArray[np.float64]) -> Overlay:
         return make_overlay(frame, camera_from_lidar, THINNING[detail])
@@ -75,6 +78,24 @@ def _log_errors(rec: rr.RecordingStream, observation: Observation) -> None:
             error = observation.error(camera_from_lidar)
             if error is not None:
                 rec.log(path, rr.Scalars(error.rotation_deg if kind == "rotation" else error.translation_cm))
+
+
+def _log_extrinsics(rec: rr.RecordingStream, observation: Observation) -> None:
+    """Every extrinsic as numbers in full precision, and the camera: what a report or an export needs."""
+    frame, trace = observation.frame, observation.trace
+    extrinsics = {entities.EXTRINSIC_INITIAL: trace.initial}
+    extrinsics |= {entities.extrinsic_stage(stage.number): stage.after for stage in trace.stages}
+    if observation.reference is not None:
+        extrinsics[entities.EXTRINSIC_REFERENCE] = observation.reference
+    for path, camera_from_lidar in extrinsics.items():
+        rec.log(path, rr.AnyValues(camera_from_lidar=camera_from_lidar.astype(np.float64).ravel()))
+    camera = rr.AnyValues(
+        width=frame.camera.width,
+        height=frame.camera.height,
+        camera_matrix=frame.camera.matrix.astype(np.float64).ravel(),
+        source=Path(frame.source).name,  # not its folder, which is this machine's business
+    )
+    rec.log(entities.CAMERA, camera)
 
 
 def log_curve_styles(rec: rr.RecordingStream, layout: Layout) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any
 
@@ -53,10 +53,12 @@ class RunDescription:
     Attributes:
         title: for the viewer's list of recordings, for instance ``"kitti-odometry/04"``.
         options: everything that changes the data, such as seed, range and preset.
+        provenance: what else a reader may ask for, such as versions; does not change the identity.
     """
 
     title: str
     options: dict[str, Any]
+    provenance: dict[str, Any] = field(default_factory=dict)
 
     @property
     def recording_id(self) -> str:
@@ -89,10 +91,12 @@ class Recording:
         self._rec.set_sinks(*sinks, default_blueprint=make_blueprint(layout))
         self._rec.set_log_time_enabled(False)
         self._rec.send_recording_name(description.title)
-        self._rec.send_property("run", rr.AnyValues(**description.options))
+        self._rec.send_property(entities.RUN, rr.AnyValues(**description.options))
+        self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_contents(layout)))
         log_scene_frame(self._rec)
         log_legends(self._rec, layout)
         log_curve_styles(self._rec, layout)
+        self._flush()  # a recording that is cut off anywhere later can still be read
 
     def log(self, observation: Observation) -> None:
         """Log everything about one frame and hand it to the sinks."""
@@ -141,3 +145,15 @@ class Recording:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _contents(layout: Layout) -> dict[str, Any]:
+    """What the recording contains, for readers that have no layout.
+
+    Names are not those of any option: Rerun keeps one type a name in a process.
+    """
+    return {
+        "stage_numbers": [stage.number for stage in layout.stages],
+        "stage_ranges": [stage.range for stage in layout.stages],
+        "has_reference": layout.has_reference,
+    }

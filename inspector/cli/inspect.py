@@ -217,7 +217,8 @@ def calibrate(
         "preset": preset,
         "detail": detail,
     }
-    description = RunDescription(f"{sequence.name}, {describe(start)}", identity)
+    provenance = describe_provenance(preset, [stage.number for stage in cascade.stages], weights)
+    description = RunDescription(f"{sequence.name}, {describe(start)}", identity, provenance)
     session = Session(sequence, positions, cascade, start, outputs, description, Detail(detail), console)
     try:
         summary = session.run()
@@ -257,6 +258,21 @@ def describe(start: Start) -> str:
     if start.given is not None:
         return "miscalibrated as given"
     return f"miscalibrated within {start.bounds}{', anew every frame' if start.per_frame else ''}, seed {start.seed}"
+
+
+def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:
+    """Versions, and as JSON the training record of every stage's weights by its number."""
+    import json
+    from importlib.metadata import version
+
+    from calibnet import __version__
+    from calibnet.geometry import RANGES
+    from calibnet.weights import read_record, weights_path
+
+    files = {number: weights_path(preset, RANGES[number - 1], folder) for number in stages}
+    records = {number: read_record(file) for number, file in files.items() if file.is_file()}
+    versions = {"torch": version("torch"), "rerun": version("rerun-sdk")}
+    return {"calib_inspect": __version__, **versions, "weights": json.dumps(records)}
 
 
 def finish(summary: Summary, outputs: Outputs) -> int:

@@ -48,6 +48,7 @@ def record() -> Callable[..., None]:
         seed: int = 1,
         sequence: Any = None,
         per_frame: bool = False,
+        provenance: dict[str, Any] | None = None,
         **cascade: Any,
     ) -> Any:
         session = Session(
@@ -56,7 +57,7 @@ def record() -> Callable[..., None]:
             _fakes().FakeCascade(**cascade),
             Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
             Outputs(file),
-            RunDescription("fake/00", {"seed": seed, "detail": detail}),
+            RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),
             Detail(detail),
             Console(quiet=True),
         )
