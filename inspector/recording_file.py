@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import tempfile
 import warnings
@@ -66,16 +67,18 @@ class RecordingFile:
         """The file's reader and what the file holds; of a copy where the file ends within a chunk."""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            try:
+            with contextlib.suppress(RuntimeError, ValueError):
                 opened = _listed(self.path)
                 self.cut = any("no footer" in str(warning.message) for warning in caught)
-            except (RuntimeError, ValueError):
+                return opened
+            with contextlib.suppress(RuntimeError, ValueError):
                 opened = _listed(self._repaired_copy())
                 self.cut = True
-        return opened
+                return opened
+        raise self._unreadable()
 
     def _repaired_copy(self) -> Path:
-        """Everything that precedes the cut, in a file that the reader accepts; nothing, of a foreign file."""
+        """Everything that precedes the cut, in a file that the reader accepts; of a foreign file, no such file."""
         self._copy = tempfile.TemporaryDirectory(prefix="calib-inspect-")
         copy = Path(self._copy.name) / "repaired.rrd"
         command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self.path), "-o", str(copy)]
@@ -87,14 +90,17 @@ class RecordingFile:
             if entry.application_id == APPLICATION_ID:
                 return entry
         if not entries:
-            raise RecordingError(
-                f"{self.path} is not a Rerun recording, or so much of it is missing that nothing can be read; "
-                "copy it again or record it again."
-            )
+            raise self._unreadable()
         others = ", ".join(sorted({repr(entry.application_id) for entry in entries}))
         raise RecordingError(
             f"{self.path} was recorded by {others}, not by calib-inspect seq, raw, object, folder or demo; "
             "give a recording that one of these made."
+        )
+
+    def _unreadable(self) -> RecordingError:
+        return RecordingError(
+            f"{self.path} is not a Rerun recording, or so much of it is missing that nothing can be read; "
+            "copy it again or record it again."
         )
 
 
