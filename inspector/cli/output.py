@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from inspector.whole_file import write_whole
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -36,11 +38,4 @@ def write_json(json_file: str | None, content: dict[str, Any]) -> None:
     if json_file == "-":
         click.echo(text)
         return
-    path = Path(json_file)
-    partial = path.with_name(f"{path.name}.partial")
-    try:
-        partial.write_text(f"{text}\n", encoding="utf-8")
-        partial.replace(path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
+    write_whole(Path(json_file), f"{text}\n".encode())

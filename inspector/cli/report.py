@@ -1,0 +1,67 @@
+"""``calib-inspect report``: a recording as a folder that a browser shows and a ticket takes."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import webbrowser
+from pathlib import Path
+
+import click
+
+from inspector.cli.options import FOLDER
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path), metavar="RUN.rrd")
+@click.option("--out", type=FOLDER, required=True, metavar="DIR", help="Folder of the report; created if need be.")
+@click.option(
+    "--open",
+    "serve",
+    is_flag=True,
+    help="Serve it with the embedded viewer on this machine, until Ctrl-C, and open it.",
+)
+@click.option(
+    "--with-viewer", is_flag=True, help="Put the embedded viewer (43 MB) into the folder, for any web server to serve."
+)
+def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
+    """Write a report of a run from its recording: index.html, pictures, metrics.json, the recording.
+
+    The page works from disk and without a network; only its embedded viewer needs a web server, which
+    is what --open starts. Files of other names in the folder stay as they are.
+    """
+    write_report_of(recording, out)
+    if with_viewer:
+        from inspector.report.serve import fetch_viewer
+        from inspector.report.write import VIEWER
+
+        fetch_viewer(out / VIEWER)
+    if serve:
+        serve_report(out)
+
+
+def write_report_of(recording: Path, out: Path) -> None:
+    """Make the report and say where it is."""
+    from inspector.recorded_run import read_run
+    from inspector.report.write import write_report
+
+    run = read_run(recording)
+    if run.warning:
+        click.echo(run.warning, err=True)
+    click.echo(f"Report: {write_report(run, out)}")
+
+
+def serve_report(folder: Path) -> None:
+    """Serve a report and the viewer until Ctrl-C or SIGTERM; open the browser where there is a display."""
+    from calibnet.interruption import StopRequest
+    from inspector.outputs import has_display
+    from inspector.report.serve import ReportServer, fetch_viewer, served_files
+
+    with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
+        fetch_viewer(Path(viewer))
+        with StopRequest() as stop, ReportServer(served_files(folder, Path(viewer))) as server:
+            click.echo(f"Serving at {server.address} until Ctrl-C.")
+            if has_display():
+                webbrowser.open(server.address)
+            while not stop.requested:
+                time.sleep(0.1)

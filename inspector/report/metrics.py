@@ -1,0 +1,195 @@
+"""The figures of a report: every frame and stage against the reference or, without one, against the frames' median."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from calibnet.evaluation.metrics import Metrics
+from calibnet.geometry import PoseError, pose_error, rotation_from_vector, rotation_vector, transform
+from calibnet.geometry.se3 import Matrix
+from inspector.recorded_run import RecordedFrame, RecordedRun
+
+DISTANCE_M = 10.0
+"""Frames are ranked by how far, at most, a point at this distance is misplaced."""
+SAME_MOUNT = 1e-6
+"""References that differ by less than this are of one mount."""
+
+
+@dataclass(frozen=True)
+class State:
+    """The calibrations before the first or after one of the stages, all frames together.
+
+    Attributes:
+        name: for people.
+        number: of the stage; None before the first.
+        range: what the stage was trained for, for instance ``"5/0.5"``; None before the first.
+        errors: of every frame.
+    """
+
+    name: str
+    number: int | None
+    range: str | None
+    errors: tuple[PoseError, ...] = field(repr=False)
+
+    @property
+    def key(self) -> str:
+        """Name in ``metrics.json``."""
+        return "initial" if self.number is None else f"stage_{self.number}"
+
+    @cached_property
+    def metrics(self) -> Metrics:
+        """Statistics over the frames."""
+        return Metrics.of(self.errors)
+
+    @property
+    def rotation_deg(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """``[N]`` degrees."""
+        return np.array([error.rotation_deg for error in self.errors])
+
+    @property
+    def translation_cm(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """``[N]`` centimetres."""
+        return np.array([error.translation_cm for error in self.errors])
+
+
+@dataclass(frozen=True)
+class Figures:
+    """All that the page and ``metrics.json`` say in numbers.
+
+    Attributes:
+        run: the recording.
+        states: initial first, then every stage that ran; the last is the corrected one.
+        changes: from the initial to the corrected extrinsic, a frame each.
+        median: extrinsic in the middle of all corrected ones; None where the frames are of several mounts.
+        median_error: of that extrinsic; None without reference or median.
+    """
+
+    run: RecordedRun
+    states: tuple[State, ...]
+    changes: tuple[PoseError, ...] = field(repr=False)
+    median: Matrix | None = field(repr=False)
+    median_error: PoseError | None
+
+    @classmethod
+    def of(cls, run: RecordedRun) -> Figures:
+        """Measure a run.
+
+        Args:
+            run: with at least one frame.
+        """
+        frames = run.frames
+        corrected = [frame.corrected for frame in frames]
+        median = median_extrinsic(corrected)
+        yardsticks = [median if frame.reference is None else frame.reference for frame in frames]
+        one_mount = float(np.ptp(yardsticks, axis=0).max()) < SAME_MOUNT
+
+        def errors(extrinsics: Sequence[Matrix]) -> tuple[PoseError, ...]:
+            return tuple(pose_error(mine, other) for mine, other in zip(extrinsics, yardsticks, strict=True))
+
+        start = "miscalibrated" if run.has_reference else "start"
+        states = [State(start, None, None, errors([frame.initial for frame in frames]))]
+        for number, bounds in run.stages:
+            after = errors([frame.stages[number] for frame in frames])
+            states.append(State(f"stage {number}", number, bounds, after))
+        return cls(
+            run,
+            tuple(states),
+            tuple(pose_error(frame.corrected, frame.initial) for frame in frames),
+            median if one_mount else None,
+            pose_error(median, yardsticks[0]) if one_mount and run.has_reference else None,
+        )
+
+    @property
+    def has_reference(self) -> bool:
+        """Whether errors are against a known reference; if not they are distances to ``median``."""
+        return self.run.has_reference
+
+    @property
+    def initial(self) -> State:
+        """Before the first stage."""
+        return self.states[0]
+
+    @property
+    def corrected(self) -> State:
+        """After the last stage."""
+        return self.states[-1]
+
+    @cached_property
+    def change(self) -> Metrics:
+        """Statistics of how far the calibration was moved."""
+        return Metrics.of(self.changes)
+
+    def ranking(self) -> list[int]:
+        """Positions of the frames, best corrected first."""
+        return sorted(
+            range(len(self.run.frames)), key=lambda position: misplacement_cm(self.corrected.errors[position])
+        )
+
+    def examples(self) -> dict[str, int]:
+        """Positions of the worst, the median and the best frame; a frame appears once."""
+        order = self.ranking()
+        chosen = {order[-1]: "worst", order[(len(order) - 1) // 2]: "median", order[0]: "best"}
+        return {name: position for position, name in chosen.items()}
+
+    def as_dict(self) -> dict[str, Any]:
+        """The content of ``metrics.json``; keys carry the units, matrices are rows of metres."""
+        run = self.run
+        return {
+            "title": run.title,
+            "settings": run.settings,
+            "versions": run.provenance,
+            "weights": {str(number): record for number, record in run.weights.items()},
+            "frames": len(run.frames),
+            "measured_against": "reference" if self.has_reference else "median of the corrected extrinsics",
+            "initial": self._summary(self.initial),
+            "stages": [
+                {"number": number, "range": bounds, **self._summary(state)}
+                for (number, bounds), state in zip(run.stages, self.states[1:], strict=True)
+            ],
+            "change": _distributions(self.change),
+            "median_extrinsic": None if self.median is None else self.median.tolist(),
+            "median_extrinsic_error": None if self.median_error is None else asdict(self.median_error),
+            "examples": {name: run.frames[position].index for name, position in self.examples().items()},
+            "per_frame": [self._frame(position, frame) for position, frame in enumerate(run.frames)],
+        }
+
+    def _summary(self, state: State) -> dict[str, Any]:
+        return state.metrics.as_dict() if self.has_reference else _distributions(state.metrics)
+
+    def _frame(self, position: int, frame: RecordedFrame) -> dict[str, Any]:
+        return {
+            "frame": frame.index,
+            "seconds": frame.seconds,
+            "source": frame.source,
+            "errors": {state.key: asdict(state.errors[position]) for state in self.states},
+            "change": asdict(self.changes[position]),
+            "initial_camera_from_lidar": frame.initial.tolist(),
+            "corrected_camera_from_lidar": frame.corrected.tolist(),
+        }
+
+
+def misplacement_cm(error: PoseError) -> float:
+    """How far a point `DISTANCE_M` away is misplaced at most, in centimetres."""
+    return float(np.radians(error.rotation_deg)) * 100.0 * DISTANCE_M + error.translation_cm
+
+
+def median_extrinsic(extrinsics: Sequence[Matrix]) -> Matrix:
+    """The middle of several extrinsics, component by component: half of them may be wrong and it stays.
+
+    Rotations are compared as rotation vectors relative to the first, which is exact enough for
+    extrinsics of one mount.
+    """
+    first = extrinsics[0][:3, :3]
+    vectors = np.array([rotation_vector(extrinsic[:3, :3] @ first.T) for extrinsic in extrinsics])
+    translations = np.array([extrinsic[:3, 3] for extrinsic in extrinsics])
+    return transform(rotation_from_vector(np.median(vectors, axis=0)) @ first, np.median(translations, axis=0))
+
+
+def _distributions(metrics: Metrics) -> dict[str, Any]:
+    """The statistics without success rates, which only a reference can give."""
+    return {name: value for name, value in metrics.as_dict().items() if not name.startswith("success")}

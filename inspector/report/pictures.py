@@ -1,0 +1,74 @@
+"""The report's pictures: LiDAR points over the image, as the recording holds both."""
+
+from __future__ import annotations
+
+from html import escape
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.errors import CalibnetError
+from inspector.colors import FAR_M, NEAR_M, depth_colors
+
+PICTURE_WIDTH = 1600
+"""Pixels; all pictures are scaled to it, so that points look alike whatever the camera."""
+POINT_RADIUS = 2.3
+DIMMED = 0.75
+"""Brightness that is left of the image, so that points stand out from a bright road."""
+JPEG_QUALITY = 86
+SHIFT = 4
+"""Binary digits after the point in the positions that cv2 draws at."""
+SCALE_LABELS_M = (3, 5, 10, 20, 40, 80)
+
+
+class PictureError(CalibnetError):
+    """A picture of the recording cannot be decoded."""
+
+
+def draw_overlay(image_jpeg: bytes, pixels: NDArray[np.floating], colors: NDArray[np.uint8]) -> bytes:
+    """Draw points over an image; returns a JPEG `PICTURE_WIDTH` wide.
+
+    Args:
+        image_jpeg: the image as recorded.
+        pixels: ``[M, 2]``, ``(u, v)`` with whole numbers at pixel centres, far to near.
+        colors: ``[M, 3]`` RGB.
+
+    Raises:
+        PictureError: the image cannot be decoded.
+    """
+    image = cv2.imdecode(np.frombuffer(image_jpeg, dtype=np.uint8), cv2.IMREAD_COLOR)
+    if image is None:
+        raise PictureError("An image in the recording cannot be decoded; record the run again.")
+    scale = PICTURE_WIDTH / image.shape[1]
+    size = (PICTURE_WIDTH, round(image.shape[0] * scale))
+    canvas = cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC)
+    canvas = cv2.convertScaleAbs(canvas, alpha=DIMMED)
+    one = 1 << SHIFT
+    centers = np.rint(((pixels + 0.5) * scale - 0.5) * one).astype(int)
+    radius = round(POINT_RADIUS * one)
+    for center, color in zip(centers.tolist(), colors[:, 2::-1].tolist(), strict=True):
+        cv2.circle(canvas, center, radius, color, cv2.FILLED, cv2.LINE_AA, SHIFT)
+    encoded = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+    return encoded.tobytes()
+
+
+def depth_scale() -> str:
+    """The colours of the points as an inline SVG, with depths in metres below."""
+    width, height, steps = 320, 12, 64
+    span = np.log(FAR_M / NEAR_M)
+    depths = (NEAR_M * np.exp(span * (np.arange(steps) + 0.5) / steps)).astype(np.float32)
+    parts = [
+        f'<rect x="{index * width / steps:.2f}" width="{width / steps + 0.3:.2f}" height="{height}" '
+        f'fill="rgb({red},{green},{blue})"/>'
+        for index, (red, green, blue) in enumerate(depth_colors(depths).tolist())
+    ]
+    for metres in SCALE_LABELS_M:
+        x = width * float(np.log(metres / NEAR_M) / span)
+        anchor = {NEAR_M: "start", FAR_M: "end"}.get(metres, "middle")
+        label = escape(f"{metres} m" if metres == FAR_M else f"{metres}")
+        parts.append(f'<text class="number" x="{x:.1f}" y="{height + 14}" text-anchor="{anchor}">{label}</text>')
+    name = f"Colours of depth, red at {NEAR_M:g} metres to blue at {FAR_M:g}"
+    return (
+        f'<svg class="scale" viewBox="0 0 {width} {height + 18}" role="img" aria-label="{name}">{"".join(parts)}</svg>'
+    )

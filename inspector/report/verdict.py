@@ -1,0 +1,163 @@
+"""What the figures mean, in plain words: one sentence of result and a short verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from calibnet.evaluation.metrics import Distribution
+from inspector.report.metrics import Figures, State
+
+Grade = Literal["good", "fair", "bad", "note"]
+
+
+class Finding(NamedTuple):
+    """One sentence of the verdict and how it is to be taken."""
+
+    grade: Grade
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Rotation or translation, with the bounds of the two success rates.
+
+    Attributes:
+        name: at the start of a sentence.
+        unit: with the space before it, where there is one.
+        axis: the unit as a word, for charts.
+        good: bound of the stricter success rate.
+        fair: bound of the other.
+        decimals: digits that mean something.
+    """
+
+    name: str
+    unit: str
+    axis: str
+    good: float
+    fair: float
+    decimals: int
+
+    def say(self, value: float) -> str:
+        """A value with its unit."""
+        return f"{value:.{self.decimals}f}{self.unit}"
+
+    def bound(self, value: float) -> str:
+        """A bound with its unit, without empty decimals."""
+        return f"{value:g}{self.unit}"
+
+
+ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
+TRANSLATION = Quantity("Translation", " cm", "centimetres", 2.5, 5.0, 1)
+CLEAR_CHANGE = 2.0
+"""A change that is not so many times larger than the frames' disagreement is no evidence of anything."""
+
+
+def headline(figures: Figures) -> str:
+    """The result in one sentence."""
+    run = figures.run
+    name = run.settings.get("sequence", run.title)
+    if figures.has_reference:
+        return (
+            f"Corrected {count(len(run.frames))} of {name} from {pair(figures.initial)} to "
+            f"{pair(figures.corrected)}{_median(figures)}."
+        )
+    change = figures.change
+    moved = f"{ROTATION.say(change.rotation_deg.median)} / {TRANSLATION.say(change.translation_cm.median)}"
+    result = f"Changed the calibration of {name} by {moved}{_median(figures)}"
+    if len(run.frames) == 1:
+        return f"{result}, judged from a single frame."
+    return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected)}."
+
+
+def verdict(figures: Figures) -> list[Finding]:
+    """What is good and what is not."""
+    if not figures.run.stages:
+        return [Finding("bad", "No stage ran, so nothing was corrected.")]
+    if figures.has_reference:
+        findings = [_judge_error(quantity, figures) for quantity in (ROTATION, TRANSLATION)]
+        return findings + _together(figures)
+    return _judge_agreement(figures)
+
+
+def pair(state: State) -> str:
+    """Both medians of a state."""
+    metrics = state.metrics
+    return f"{ROTATION.say(metrics.rotation_deg.median)} / {TRANSLATION.say(metrics.translation_cm.median)}"
+
+
+def count(frames: int) -> str:
+    """A number of frames in words."""
+    return "1 frame" if frames == 1 else f"{frames:,} frames"
+
+
+def _median(figures: Figures) -> str:
+    return " (median)" if len(figures.run.frames) > 1 else ""
+
+
+def _statistics(quantity: Quantity, state: State) -> Distribution:
+    return state.metrics.rotation_deg if quantity is ROTATION else state.metrics.translation_cm
+
+
+def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
+    before, after = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
+    name, say = quantity.name, quantity.say
+    worse = _worse(quantity, figures)
+    if after.median >= before.median:
+        return Finding(
+            "bad", f"{name} is not corrected: {say(before.median)} before, {say(after.median)} after.{worse}"
+        )
+    spread = f" (95 % of the frames below {say(after.p95)})" if len(figures.run.frames) > 1 else ""
+    result = f"{say(before.median)} before, {say(after.median)} after{spread}"
+    if after.p95 < quantity.good:
+        return Finding("good", f"{name} is good: {result}.{worse}")
+    if after.median < quantity.good:
+        return Finding("fair", f"{name} is good in most frames, not in all: {result}.{worse}")
+    if after.median < quantity.fair:
+        wanted = f"{quantity.bound(quantity.good)} would be good"
+        return Finding("fair", f"{name} is roughly right: {result}; {wanted}.{worse}")
+    wanted = f"at least {quantity.bound(quantity.fair)} is needed"
+    return Finding("bad", f"{name} is not good enough: {result}; {wanted}.{worse}")
+
+
+def _worse(quantity: Quantity, figures: Figures) -> str:
+    """How many frames it made worse; nothing if none, or if there is only one."""
+    before, after = (
+        state.rotation_deg if quantity is ROTATION else state.translation_cm
+        for state in (figures.initial, figures.corrected)
+    )
+    worse, total = int(np.sum(after > before)), len(before)
+    return f" In {worse} of {count(total)} it is worse than before." if worse and total > 1 else ""
+
+
+def _together(figures: Figures) -> list[Finding]:
+    """How good the frames are when they are taken together."""
+    error = figures.median_error
+    if error is None or len(figures.run.frames) == 1:
+        return []
+    off = f"{ROTATION.say(error.rotation_deg)} / {TRANSLATION.say(error.translation_cm)}"
+    return [Finding("note", f"Taken together, the median of all frames' results is off by {off}.")]
+
+
+def _judge_agreement(figures: Figures) -> list[Finding]:
+    unknown = Finding("note", "No reference is known, so nobody can say how right the result is.")
+    if len(figures.run.frames) == 1:
+        return [unknown, Finding("bad", "A single frame has nothing to agree with: run more frames.")]
+    findings = [unknown]
+    for quantity in (ROTATION, TRANSLATION):
+        start, end = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
+        name, scatter = quantity.name, f"{quantity.say(end.median)} in the median, {quantity.say(end.p95)} at 95 %"
+        if end.p95 < quantity.good:
+            findings.append(Finding("good", f"{name}: the frames agree well ({scatter})."))
+        elif end.median < quantity.fair:
+            findings.append(Finding("fair", f"{name}: the frames agree roughly ({scatter})."))
+        else:
+            findings.append(Finding("bad", f"{name}: the frames do not agree ({scatter})."))
+        if start.median < CLEAR_CHANGE * end.median:
+            offset = f"the start lies {quantity.say(start.median)} from the frames' median"
+            doubt = "not clearly more than they disagree: it may have been right"
+            findings.append(Finding("note", f"{name}: {offset}, {doubt}."))
+    shared = "Agreement cannot show a mistake that all frames share: look at the pictures."
+    return [*findings, Finding("note", shared)]

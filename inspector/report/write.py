@@ -1,0 +1,103 @@
+"""Writing a report: pictures, figures and the recording first, the page that shows them last."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from calibnet.errors import ConfigError
+from inspector import entities
+from inspector.recorded_run import RecordedRun
+from inspector.report.metrics import Figures
+from inspector.report.page import Example, make_page
+from inspector.report.pictures import draw_overlay
+from inspector.whole_file import write_whole
+
+PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
+VIEWER = "viewer"
+"""Folder of the web viewer's files, where they are kept beside the page."""
+
+
+def check_folder(folder: Path) -> None:
+    """Create the report's folder, so that one that cannot be written is found before the work.
+
+    Raises:
+        ConfigError: it is a file, or nothing can be written into it.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"{folder} is a file, and a report is a folder; give it another path.")
+    try:
+        (folder / PICTURES).mkdir(parents=True, exist_ok=True)
+        write_whole(folder / PICTURES / "writable", b"")
+        (folder / PICTURES / "writable").unlink()
+    except OSError as error:
+        raise _cannot_write(error, folder) from None
+
+
+def write_report(run: RecordedRun, folder: Path) -> Path:
+    """Write the report of a run; of what the folder holds only files of the same names are replaced.
+
+    Args:
+        run: the recording.
+        folder: created if it does not exist.
+
+    Returns:
+        The page.
+
+    Raises:
+        ConfigError: the folder cannot be written, for instance because the disk is full.
+        CalibnetError: a picture of the recording cannot be read.
+    """
+    check_folder(folder)
+    figures = Figures.of(run)
+    try:
+        examples = [_write_pictures(run, name, position, folder) for name, position in figures.examples().items()]
+        text = json.dumps(figures.as_dict(), indent=1, allow_nan=False)
+        write_whole(folder / METRICS, f"{text}\n".encode())
+        copy_recording(run.path, folder / RECORDING)
+        page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
+        write_whole(folder / PAGE, page.encode())
+    except OSError as error:
+        raise _cannot_write(error, folder) from None
+    return folder / PAGE
+
+
+def copy_recording(source: Path, target: Path) -> None:
+    """Copy the recording beside the page, unless it lies there already.
+
+    It is no hard link: the next run that records to the same path would write into the report.
+    """
+    if not (target.exists() and target.samefile(source)):
+        write_whole(target, lambda partial: shutil.copyfile(source, partial))
+
+
+def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) -> Example:
+    """Draw one frame before and after and, where there is one, with the reference."""
+    index = run.frames[position].index
+    image = run.image(index)
+    files = {}
+    for shown, entity in _overlays(run.has_reference).items():
+        files[shown] = f"{PICTURES}/{name}_{shown}.jpg"
+        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index)))
+    return Example(name, position, files)
+
+
+def _overlays(has_reference: bool) -> Mapping[str, str]:
+    """What is shown of an example, the corrected last, and the entity that holds it."""
+    if not has_reference:
+        return {"start": entities.OVERLAY_MISCALIBRATED, "corrected": entities.OVERLAY_CORRECTED}
+    return {
+        "miscalibrated": entities.OVERLAY_MISCALIBRATED,
+        "reference": entities.OVERLAY_REFERENCE,
+        "corrected": entities.OVERLAY_CORRECTED,
+    }
+
+
+def _cannot_write(error: OSError, folder: Path) -> ConfigError:
+    reason = os.strerror(error.errno) if error.errno else str(error)
+    return ConfigError(
+        f"{error.filename or folder} cannot be written ({reason}); free some space or choose another folder."
+    )
