@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ import click
 from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, RANGE, STAGES
+from inspector.cli.viewing import RECORDINGS, choose_outputs, saved_lines, viewing_options
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 DEFAULT_RANGE = "5/0.5"
 DEMO_LENGTH = 12
-RECORDINGS = Path("recordings")
 
 _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
@@ -49,18 +48,12 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
         show_default=True,
         help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most.",
     ),
-    click.option(
-        "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording to this file."
-    ),
-    click.option("--headless", is_flag=True, help="Open no window."),
-    click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
-    click.option("--bind", default="127.0.0.1", show_default=True, help="Address that --serve listens on."),
-    click.option("--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."),
 )
 
 
 def shared_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command all options of a calibration run; it passes them on to `calibrate`."""
+    command = viewing_options(command)
     for option in reversed(_SHARED_OPTIONS):
         command = option(command)
     return command
@@ -229,18 +222,6 @@ def calibrate(
         outputs.close()
 
 
-def choose_outputs(
-    name: str, save: Path | None, headless: bool, serve: bool, bind: str, connect: str | None
-) -> Outputs:
-    """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows."""
-    from inspector.outputs import Outputs, has_display
-
-    viewer = has_display() and not (headless or serve or connect)
-    if save is None and not (viewer or serve or connect):
-        save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.rrd"
-    return Outputs(save, viewer, serve, connect, bind)
-
-
 def announce(console: Console, sequence: Sequence, start: Start, cascade: Any) -> None:
     """Say what is about to run, and which stages cannot."""
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
@@ -277,14 +258,11 @@ def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> 
 
 def finish(summary: Summary, outputs: Outputs) -> int:
     """Print the result and where it is; serve until Ctrl-C where that was asked for."""
-    from inspector.outputs import open_command
-
     for line in summary.lines():
         click.echo(line)
     if outputs.file is not None and summary.frames:
-        size = outputs.file.stat().st_size
-        click.echo(f"Saved {outputs.file} ({size / 1e6:.1f} MB, {size / summary.frames / 1e6:.2f} MB a frame).")
-        click.echo(f"Open it with: {open_command(outputs.file)}")
+        for line in saved_lines(outputs.file, summary.frames):
+            click.echo(line)
     if summary.interrupted:
         click.echo("Interrupted: the frames above are all that was recorded.", err=True)
         return ExitCode.INTERRUPTED
