@@ -6,6 +6,10 @@ scripts read them back. A new view starts with a path here.
 
 from __future__ import annotations
 
+APPLICATION_ID = "calib-inspect"
+COMPARISON_APPLICATION_ID = "calib-inspect-compare"
+"""Of another layout, which viewers keep by application."""
+
 FRAME = "frame"
 """Timeline: the frame's number in its sequence."""
 TIME = "time"

@@ -10,12 +10,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import timedelta
 from typing import Any
 
 import rerun as rr
 
-from calibnet.errors import CalibnetError
 from inspector import entities
 from inspector.blueprint import make_blueprint
 from inspector.frame_logging import log_curve_styles, log_frame
@@ -23,8 +21,8 @@ from inspector.legends import log_legends
 from inspector.observation import Detail, Layout, Observation
 from inspector.scene_logging import log_scene, log_scene_frame
 from inspector.stage_logging import log_stages
+from inspector.stream import Stream
 
-APPLICATION_ID = "calib-inspect"
 FLUSH_EVERY = {Detail.OVERVIEW: (4, 32), Detail.FULL: (1, 12)}
 """Fewest and most frames between two flushes; a kill loses at most these.
 
@@ -33,17 +31,6 @@ the memory that collects the footer: 0.5 MB a flush. So the longer a run, the ra
 """
 FLUSH_SHARE = 25
 """Frames recorded for each frame that a kill may lose."""
-FLUSH_TIMEOUT_S = 60.0
-FLUSH_BYTES = 1024 * 1024 * 1024
-"""Above any batch, so that only the flushes cut chunks."""
-
-
-class RecordingLostError(CalibnetError):
-    """Nothing can be written any more; Rerun would wait for it for ever, even when the process ends."""
-
-
-class ViewerClosedError(CalibnetError):
-    """The only place the recording went to has gone."""
 
 
 @dataclass(frozen=True)
@@ -78,25 +65,18 @@ class Recording:
             description: identifies the run.
             layout: what the recording will contain.
         """
-        rr.set_strict_mode(True)
         self._detail: Detail = layout.detail
         self._frames = self._unflushed = 0
-        self._sinks_gone = False
-        self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
-        self._rec = rr.RecordingStream(
-            APPLICATION_ID,
-            recording_id=description.recording_id,
-            batcher_config=rr.ChunkBatcherConfig(flush_tick=timedelta(days=1), flush_num_bytes=FLUSH_BYTES),
+        self._stream = Stream(
+            entities.APPLICATION_ID, description.recording_id, description.title, sinks, make_blueprint(layout)
         )
-        self._rec.set_sinks(*sinks, default_blueprint=make_blueprint(layout))
-        self._rec.set_log_time_enabled(False)
-        self._rec.send_recording_name(description.title)
+        self._rec = self._stream.rec
         self._rec.send_property(entities.RUN, rr.AnyValues(**description.options))
         self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_contents(layout)))
         log_scene_frame(self._rec)
         log_legends(self._rec, layout)
         log_curve_styles(self._rec, layout)
-        self._flush()  # a recording that is cut off anywhere later can still be read
+        self._stream.flush()  # a recording that is cut off anywhere later can still be read
 
     def log(self, observation: Observation) -> None:
         """Log everything about one frame and hand it to the sinks."""
@@ -110,35 +90,12 @@ class Recording:
         self._unflushed += 1
         fewest, most = FLUSH_EVERY[self._detail]
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
-            self._flush()
+            self._unflushed = 0
+            self._stream.flush()
 
     def close(self) -> None:
         """Flush and write the footer; nothing, where nothing can be written any more."""
-        if self._sinks_gone:
-            return
-        self._flush()
-        self._rec.disconnect()
-
-    def _flush(self) -> None:
-        """Hand all rows to the sinks.
-
-        Raises:
-            RecordingLostError: the file's writer has given up, for instance on a quota.
-            ViewerClosedError: the viewer has gone and there is no file.
-        """
-        self._unflushed = 0
-        try:
-            self._rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
-        except RuntimeError as error:
-            self._sinks_gone = "timed out" in str(error) or not self._has_file
-            if "timed out" in str(error):
-                raise RecordingLostError(
-                    "The recording can no longer be written: the disk or a quota is full, or a viewer does not respond."
-                ) from None
-            if not self._has_file:
-                raise ViewerClosedError(
-                    "The viewer has closed the connection, and there is no --save to go on with."
-                ) from None
+        self._stream.close()
 
     def __enter__(self) -> Recording:
         return self

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from rerun.chunk import RrdReader
 
 from calibnet.errors import CalibnetError
+from inspector import entities
 from inspector.outputs import rerun_binary
-from inspector.recording import APPLICATION_ID
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
@@ -47,18 +47,18 @@ class RecordingFile:
         self._reader, entries = self._open()
         self._entry = self._ours(entries)
 
-    def batches(self, *entities: str) -> Iterator[tuple[str, RecordBatch]]:
-        """Entity path (without its first slash) and Arrow rows of every chunk of ``entities``.
+    def batches(self, *paths: str) -> Iterator[tuple[str, RecordBatch]]:
+        """Entity path (without its first slash) and Arrow rows of every chunk of some entities.
 
         Args:
-            entities: paths or patterns such as ``extrinsic/**``; chunks of others are not read.
+            paths: entity paths or patterns such as ``extrinsic/**``; chunks of others are not read.
 
         Raises:
             RecordingError: a chunk is damaged.
         """
         source = self._reader.stream(store=self._entry) if self.cut else self._reader.store(store=self._entry).stream()
         try:
-            for chunk in source.filter(content=[f"/{entity}" for entity in entities]):
+            for chunk in source.filter(content=[f"/{path}" for path in paths]):
                 yield chunk.entity_path.lstrip("/"), chunk.to_record_batch()
         except RuntimeError:
             raise RecordingError(f"{self.path} is damaged in the middle; copy it again or record it again.") from None
@@ -87,7 +87,7 @@ class RecordingFile:
 
     def _ours(self, entries: list[StoreEntry]) -> StoreEntry:
         for entry in entries:
-            if entry.application_id == APPLICATION_ID:
+            if entry.application_id == entities.APPLICATION_ID:
                 return entry
         if not entries:
             raise self._unreadable()

@@ -184,9 +184,10 @@ def calibrate(
     from calibnet.datasets import select_frames
     from calibnet.geometry import MiscalibrationRange
     from inspector.observation import Detail
-    from inspector.recording import RecordingLostError, RunDescription
+    from inspector.recording import RunDescription
     from inspector.session import Session
     from inspector.start import Start
+    from inspector.stream import RecordingLostError
 
     if bounds is not None and given is not None:
         raise click.UsageError("Give --range or --miscalibrate, not both.")
