@@ -102,9 +102,9 @@ class Outputs:
             self._server.wait()
 
     def _open_viewer(self) -> list[Any]:
-        port = _free_port()
+        port = free_port()
         try:
-            _start([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
+            start_program([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
         except ConfigError:
             if self.file is None:
                 raise
@@ -113,9 +113,9 @@ class Outputs:
         return [rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy")]
 
     def _serve(self) -> str:
-        port, web_port = _free_port(), _free_port()
+        port, web_port = free_port(), free_port()
         ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
-        self._server = _start([rerun_binary(), "--serve-web", "--bind", self.bind, *ports], port)
+        self._server = start_program([rerun_binary(), "--serve-web", "--bind", self.bind, *ports], port)
         host = LOCALHOST if self.bind in ("0.0.0.0", LOCALHOST) else self.bind
         url = f"rerun+http://{host}:{port}/proxy"
         self.page = f"http://{host}:{web_port}/?url={quote(url, safe='')}"
@@ -167,7 +167,7 @@ def open_command(file: Path) -> str:
     return f"{program} {file}"
 
 
-def _start(command: list[str], port: int) -> subprocess.Popen[bytes]:
+def start_program(command: list[str], port: int) -> subprocess.Popen[bytes]:
     """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     deadline = time.monotonic() + START_TIMEOUT_S
@@ -191,7 +191,8 @@ def _listening(host: str, port: int) -> bool:
         return False
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of this machine that nothing listens on."""
     with socket.socket() as probe:
         probe.bind((LOCALHOST, 0))
         return int(probe.getsockname()[1])
