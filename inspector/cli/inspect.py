@@ -48,6 +48,9 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
         show_default=True,
         help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most.",
     ),
+    click.option(
+        "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
+    ),
 )
 
 
@@ -143,7 +146,8 @@ def demo(length: int, **options: Any) -> int:
     """
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 
-    options["save"] = options["save"] or RECORDINGS / "demo.rrd"
+    if options["report"] is None:
+        options["save"] = options["save"] or RECORDINGS / "demo.rrd"
     return calibrate(SyntheticSequence(seed=options["seed"], length=length, rig=KITTI_LIKE), **options)
 
 
@@ -169,6 +173,7 @@ def calibrate(
     preset: str,
     weights: Path | None,
     detail: str,
+    report: Path | None,
     save: Path | None,
     headless: bool,
     serve: bool,
@@ -194,6 +199,11 @@ def calibrate(
     if given is not None and per_frame:
         raise click.UsageError("--per-frame draws from --range; --miscalibrate is the same for all frames.")
     positions = select_frames(sequence, frames)
+    if report is not None:
+        from inspector.report.write import RECORDING, check_folder
+
+        check_folder(report)
+        save = save or report / RECORDING
     outputs = choose_outputs(sequence.name, save, headless, serve, bind, connect)
     outputs.check()
     start = Start(bounds or MiscalibrationRange.parse(DEFAULT_RANGE), seed, per_frame, given, as_is)
@@ -216,7 +226,7 @@ def calibrate(
     session = Session(sequence, positions, cascade, start, outputs, description, Detail(detail), console)
     try:
         summary = session.run()
-        return finish(summary, outputs)
+        return finish(summary, outputs, report)
     except RecordingLostError as error:
         os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
@@ -257,13 +267,17 @@ def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> 
     return {"calib_inspect": __version__, **versions, "weights": json.dumps(records)}
 
 
-def finish(summary: Summary, outputs: Outputs) -> int:
-    """Print the result and where it is; serve until Ctrl-C where that was asked for."""
+def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
+    """Print the result and where it is, make the report, and serve until Ctrl-C where that was asked for."""
     for line in summary.lines():
         click.echo(line)
     if outputs.file is not None and summary.frames:
         for line in saved_lines(outputs.file, summary.frames):
             click.echo(line)
+        if report is not None:
+            from inspector.cli.report import write_report_of
+
+            write_report_of(outputs.file, report)
     if summary.interrupted:
         click.echo("Interrupted: the frames above are all that was recorded.", err=True)
         return ExitCode.INTERRUPTED

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 560, 250
-LEFT, RIGHT, TOP, BOTTOM = 48, 10, 12, 40
-"""Margins of the plot: numbers on the left, the axis' name below."""
+LEFT, RIGHT, TOP, BOTTOM = 48, 10, 28, 40
+"""Margins of the plot: numbers on the left, the axes' names above and below."""
 TICKS = 5
 LINE_POINTS = 600
 """Above so many frames a line shows the extremes of neighbouring ones: the plot has no more pixels."""
@@ -62,7 +62,7 @@ class Axes:
             parts.append(_text(self.x(tick), HEIGHT - BOTTOM + 16, f"{tick:g}", "middle"))
         parts += [
             _rule(self.y(self.y_limits[0]), "axis"),
-            _text(LEFT + 4, TOP + 10, y_name, "start", "unit"),
+            _text(8, 14, y_name, "start", "unit"),
             _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 6, x_name, "middle", "unit"),
         ]
         return "".join(parts)

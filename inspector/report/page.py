@@ -18,7 +18,19 @@ from inspector.report.verdict import ROTATION, TRANSLATION, Quantity, count, hea
 
 ON_PAPER = 0.8
 """Brightness of the series' colours on white, where those of the viewer's dark background are too pale."""
-SETTING_NAMES = {"sequence": "data", "rig": "sensors", "preset": "network", "calib_inspect": "calib-inspect"}
+SETTING_NAMES = {
+    "sequence": "data",
+    "rig": "sensors",
+    "frames": "frames",
+    "camera": "camera",
+    "start": "start",
+    "seed": "seed",
+    "stages": "stages",
+    "preset": "network",
+    "detail": "recorded detail",
+    "calib_inspect": "calib-inspect",
+}
+"""What settings are called on the page, in its order; others follow under their own names."""
 SERVE_COMMAND = "calib-inspect report {recording} --out . --open"
 METHOD = (
     "Rotation: the angle of R_est · R_refᵀ in degrees. Translation: |t_est − t_ref| in centimetres, the LiDAR’s origin "
@@ -72,7 +84,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         ranking=escape(_ranking(figures)),
         examples="\n".join(_example(figures, example) for example in examples),
         depth_scale=depth_scale(),
-        stages_title="Errors after every stage" if known else "Distance from the frames’ median after every stage",
+        stages_title=f"{_what(figures)} after every stage",
         stages_table=_stages_table(figures),
         axes_table=_axes_table(figures),
         charts=_charts(figures),
@@ -119,6 +131,13 @@ def _color(state: State) -> Rgb:
     return colors.INITIAL if state.number is None else colors.STAGES[state.number]
 
 
+def _what(figures: Figures) -> str:
+    """What the figures measure."""
+    if figures.has_reference:
+        return "Error"
+    return "Distance from the result" if len(figures.run.frames) == 1 else "Distance from the frames’ median"
+
+
 def _css(state: State) -> str:
     return "initial" if state.number is None else f"stage-{state.number}"
 
@@ -130,19 +149,21 @@ def _pair(error: PoseError) -> str:
 def _ranking(figures: Figures) -> str:
     if len(figures.run.frames) == 1:
         return ""
-    far = "misplaced" if figures.has_reference else "away from where the frames’ median puts it"
-    return f"Worst and best are by how far a point {DISTANCE_M:g} m away is at most {far} after the correction."
+    far = "misplaced" if figures.has_reference else "from where the frames’ median puts it"
+    return f"Frames are ranked by how far, at most, the correction leaves a point {DISTANCE_M:g} m away {far}."
 
 
 def _example(figures: Figures, example: Example) -> str:
     frame = figures.run.frames[example.position]
+    single = len(figures.run.frames) == 1
     before, after = (state.errors[example.position] for state in (figures.initial, figures.corrected))
     if figures.has_reference:
         result = f"{_pair(before)} → {_pair(after)}"
     else:
         change = figures.changes[example.position]
-        result = f"changed by {_pair(change)}, {_pair(after)} from the frames’ median"
-    title = "" if len(figures.run.frames) == 1 else f"<b>{example.name.capitalize()}:</b> "
+        result = f"changed by {_pair(change)}"
+        result += "" if single else f", {_pair(after)} from the frames’ median"
+    title = "" if single else f"<b>{example.name.capitalize()}:</b> "
     *lefts, right = example.pictures
     return f"""<figure>
 <figcaption><span>{title}frame {frame.index} ({escape(frame.source)}), {result}</span>
@@ -217,14 +238,15 @@ def _row(state: State, cells: Iterable[str]) -> str:
 
 def _table(heads: Iterable[Iterable[str]], rows: Iterable[str]) -> str:
     head = "".join(f"<tr>{''.join(cells)}</tr>" for cells in heads)
-    return f"<table><thead>{head}</thead><tbody>{''.join(f'<tr>{row}</tr>' for row in rows)}</tbody></table>"
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    return f'<table class="figures"><thead>{head}</thead><tbody>{body}</tbody></table>'
 
 
 def _charts(figures: Figures) -> str:
     """Curves over the frames and histograms; a single frame has neither."""
     if len(figures.run.frames) == 1:
         return ""
-    what = "Error" if figures.has_reference else "Distance from the frames’ median"
+    what = _what(figures)
     ends = [figures.initial, figures.corrected] if figures.run.stages else [figures.initial]
     curves = [_curve(figures, quantity, what) for quantity in (ROTATION, TRANSLATION)]
     bars = [_bars(ends, quantity, what) for quantity in (ROTATION, TRANSLATION)]
@@ -254,25 +276,34 @@ def _series(state: State, quantity: Quantity) -> Series:
 
 
 def _legend(states: Sequence[State]) -> str:
-    items = (f'<li><i class="{_css(state)}"></i>{state.name}</li>' for state in states)
+    final = states[-1].number
+    items = (
+        f'<li><i class="{_css(state)}"></i>{state.name}{" = corrected" if final and state.number == final else ""}</li>'
+        for state in states
+    )
     return f'<ul class="legend">{"".join(items)}</ul>'
 
 
 def _settings(figures: Figures) -> str:
     run = figures.run
-    rows = {**run.settings, **run.provenance}
-    rows |= {f"weights of stage {number}": _record(record) for number, record in run.weights.items()}
+    known = {**run.settings, **run.provenance}
+    if known.get("frames") == ":":
+        known["frames"] = "all"
+    ordered = {name: known[name] for name in [*SETTING_NAMES, *known] if name in known}
+    ordered |= {f"weights of stage {number}": _record(record) for number, record in run.weights.items()}
     return "\n".join(
         f"<tr><th>{escape(SETTING_NAMES.get(name, name))}</th><td>{escape(str(value))}</td></tr>"
-        for name, value in rows.items()
+        for name, value in ordered.items()
         if str(value)
     )
 
 
 def _record(record: Mapping[str, Any]) -> str:
-    """The plain entries of a training record; ``metrics.json`` has it whole."""
-    plain = {name: value for name, value in record.items() if isinstance(value, int | float | str)}
-    plain.pop("licence_note", None)
-    return ", ".join(
-        f"{name} {value:,}" if isinstance(value, int) else f"{name} {value}" for name, value in plain.items()
-    )
+    """A training record in short; ``metrics.json`` has it whole."""
+    parts = [
+        f"{record[name]:,g} {name}" for name in ("minutes", "samples") if isinstance(record.get(name), int | float)
+    ]
+    data = (record.get("options") or {}).get("data")
+    parts += [f"on {', '.join(map(str, data))}"] if data else []
+    parts += [f"commit {record['commit']}"] if record.get("commit") else []
+    return "; ".join(parts) or "no training record"

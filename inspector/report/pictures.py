@@ -13,7 +13,10 @@ from inspector.colors import FAR_M, NEAR_M, depth_colors
 
 PICTURE_WIDTH = 1600
 """Pixels; all pictures are scaled to it, so that points look alike whatever the camera."""
-POINT_RADIUS = 2.3
+POINT_RADIUS = (2.2, 3.6)
+"""Least and most pixels: few points are drawn larger, so that they show when the picture is small."""
+POINT_SHARE = 0.22
+"""Radius as a share of the distance between points."""
 DIMMED = 0.75
 """Brightness that is left of the image, so that points stand out from a bright road."""
 JPEG_QUALITY = 86
@@ -46,7 +49,8 @@ def draw_overlay(image_jpeg: bytes, pixels: NDArray[np.floating], colors: NDArra
     canvas = cv2.convertScaleAbs(canvas, alpha=DIMMED)
     one = 1 << SHIFT
     centers = np.rint(((pixels + 0.5) * scale - 0.5) * one).astype(int)
-    radius = round(POINT_RADIUS * one)
+    spacing = np.sqrt(size[0] * size[1] / max(len(pixels), 1))
+    radius = round(float(np.clip(POINT_SHARE * spacing, *POINT_RADIUS)) * one)
     for center, color in zip(centers.tolist(), colors[:, 2::-1].tolist(), strict=True):
         cv2.circle(canvas, center, radius, color, cv2.FILLED, cv2.LINE_AA, SHIFT)
     encoded = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]

@@ -33,6 +33,10 @@ MEDIA_TYPES = {
 }
 
 
+POLICY = "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:"
+"""What pages may load: nothing from elsewhere. Rerun's viewer would send its usage to its makers."""
+
+
 class ViewerFilesError(CalibnetError):
     """The web viewer's files cannot be had from the installed Rerun."""
 
@@ -109,6 +113,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         with file.open("rb") as content:
             self.send_response(200)
             self.send_header("Content-Type", MEDIA_TYPES.get(file.suffix, "application/octet-stream"))
+            self.send_header("Content-Security-Policy", POLICY)
             self.send_header("Content-Length", str(file.stat().st_size))
             self.end_headers()
             if with_content:

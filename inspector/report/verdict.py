@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from calibnet.evaluation.metrics import Distribution
+from calibnet.evaluation.metrics import Distribution, Metrics
 from inspector.report.metrics import Figures, State
 
 Grade = Literal["good", "fair", "bad", "note"]
@@ -44,13 +44,18 @@ class Quantity:
         """A value with its unit."""
         return f"{value:.{self.decimals}f}{self.unit}"
 
+    def brief(self, value: float) -> str:
+        """The same with two or three digits, for a sentence."""
+        decimals = 2 if value < 1.0 else 1 if value < 10.0 else 0
+        return f"{value:.{decimals}f}{self.unit}"
+
     def bound(self, value: float) -> str:
         """A bound with its unit, without empty decimals."""
         return f"{value:g}{self.unit}"
 
 
 ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
-TRANSLATION = Quantity("Translation", " cm", "centimetres", 2.5, 5.0, 1)
+TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 2.5, 5.0, 1)
 CLEAR_CHANGE = 2.0
 """A change that is not so many times larger than the frames' disagreement is no evidence of anything."""
 
@@ -61,15 +66,13 @@ def headline(figures: Figures) -> str:
     name = run.settings.get("sequence", run.title)
     if figures.has_reference:
         return (
-            f"Corrected {count(len(run.frames))} of {name} from {pair(figures.initial)} to "
-            f"{pair(figures.corrected)}{_median(figures)}."
+            f"Corrected {count(len(run.frames))} of {name} from {pair(figures.initial.metrics)} to "
+            f"{pair(figures.corrected.metrics)}{_median(figures)}."
         )
-    change = figures.change
-    moved = f"{ROTATION.say(change.rotation_deg.median)} / {TRANSLATION.say(change.translation_cm.median)}"
-    result = f"Changed the calibration of {name} by {moved}{_median(figures)}"
+    result = f"Changed the calibration of {name} by {pair(figures.change)}{_median(figures)}"
     if len(run.frames) == 1:
         return f"{result}, judged from a single frame."
-    return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected)}."
+    return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected.metrics)}."
 
 
 def verdict(figures: Figures) -> list[Finding]:
@@ -82,15 +85,16 @@ def verdict(figures: Figures) -> list[Finding]:
     return _judge_agreement(figures)
 
 
-def pair(state: State) -> str:
-    """Both medians of a state."""
-    metrics = state.metrics
-    return f"{ROTATION.say(metrics.rotation_deg.median)} / {TRANSLATION.say(metrics.translation_cm.median)}"
+def pair(metrics: Metrics) -> str:
+    """Both medians, briefly."""
+    return (
+        f"{ROTATION.brief(metrics.rotation_deg.median)}\u00a0/\u00a0{TRANSLATION.brief(metrics.translation_cm.median)}"
+    )
 
 
 def count(frames: int) -> str:
     """A number of frames in words."""
-    return "1 frame" if frames == 1 else f"{frames:,} frames"
+    return "1\u00a0frame" if frames == 1 else f"{frames:,}\u00a0frames"
 
 
 def _median(figures: Figures) -> str:
@@ -116,9 +120,9 @@ def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
     if after.median < quantity.good:
         return Finding("fair", f"{name} is good in most frames, not in all: {result}.{worse}")
     if after.median < quantity.fair:
-        wanted = f"{quantity.bound(quantity.good)} would be good"
+        wanted = f"below {quantity.bound(quantity.good)} would be good"
         return Finding("fair", f"{name} is roughly right: {result}; {wanted}.{worse}")
-    wanted = f"at least {quantity.bound(quantity.fair)} is needed"
+    wanted = f"it should be below {quantity.bound(quantity.fair)}"
     return Finding("bad", f"{name} is not good enough: {result}; {wanted}.{worse}")
 
 

@@ -25,10 +25,8 @@ def check_folder(folder: Path) -> None:
     """Create the report's folder, so that one that cannot be written is found before the work.
 
     Raises:
-        ConfigError: it is a file, or nothing can be written into it.
+        ConfigError: nothing can be written into it.
     """
-    if folder.exists() and not folder.is_dir():
-        raise ConfigError(f"{folder} is a file, and a report is a folder; give it another path.")
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
         write_whole(folder / PICTURES / "writable", b"")

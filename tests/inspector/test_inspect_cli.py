@@ -149,3 +149,18 @@ def test_given_miscalibration_arrives_as_given(invoke: Invoke, own_folder: Path,
     invoke("folder", str(own_folder), "--miscalibrate", "0,0,3,0,0,0", "--save", "own.rrd")
     errors = [value.as_py()[0] for _, value in read(Path("own.rrd"), "error/rotation/initial", "Scalars:scalars")]
     np.testing.assert_allclose(errors, [3.0, 3.0], atol=1e-6)
+
+
+def test_report_keeps_the_recording_where_no_other_place_is_named(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--range", "2/0.2", "--report", "report")
+    assert code == 0, out
+    assert "Report: report/index.html" in out
+    assert not Path("recordings").exists()
+    assert {path.name for path in Path("report").iterdir()} == {
+        "index.html",
+        "metrics.json",
+        "pictures",
+        "recording.rrd",
+    }
+    invoke("folder", str(own_folder), "--range", "2/0.2", "--save", "own.rrd", "--report", "other")
+    assert Path("own.rrd").read_bytes() == Path("other/recording.rrd").read_bytes()
