@@ -87,8 +87,9 @@ def line_chart(
     for one in series:
         x, y = thinned(np.asarray(frames, dtype=np.float64), one.values)
         points = " ".join(f"{axes.x(a):.1f},{axes.y(b):.1f}" for a, b in zip(x, y, strict=True))
-        shapes.append(f'<polyline class="line {one.css}" points="{points}"/>')
-        if len(frames) <= MARKED_POINTS:
+        marked = len(frames) <= MARKED_POINTS
+        shapes.append(f'<polyline class="line {one.css}{"" if marked else " thin"}" points="{points}"/>')
+        if marked:
             shapes += [
                 f'<circle class="dot {one.css}" cx="{axes.x(a):.1f}" cy="{axes.y(b):.1f}" r="2.6">'
                 f"<title>{escape(f'frame {a:g}, {one.name}: {spoken(b)}')}</title></circle>"

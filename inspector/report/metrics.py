@@ -166,8 +166,8 @@ class Figures:
             "frame": frame.index,
             "seconds": frame.seconds,
             "source": frame.source,
-            "errors": {state.key: asdict(state.errors[position]) for state in self.states},
-            "change": asdict(self.changes[position]),
+            "errors": {state.key: _rounded(state.errors[position]) for state in self.states},
+            "change": _rounded(self.changes[position]),
             "initial_camera_from_lidar": frame.initial.tolist(),
             "corrected_camera_from_lidar": frame.corrected.tolist(),
         }
@@ -188,6 +188,11 @@ def median_extrinsic(extrinsics: Sequence[Matrix]) -> Matrix:
     vectors = np.array([rotation_vector(extrinsic[:3, :3] @ first.T) for extrinsic in extrinsics])
     translations = np.array([extrinsic[:3, 3] for extrinsic in extrinsics])
     return transform(rotation_from_vector(np.median(vectors, axis=0)) @ first, np.median(translations, axis=0))
+
+
+def _rounded(error: PoseError) -> dict[str, float]:
+    """To a millionth, which is far below what can be measured: the file of a long run stays small."""
+    return {name: round(value, 6) for name, value in asdict(error).items()}
 
 
 def _distributions(metrics: Metrics) -> dict[str, Any]:

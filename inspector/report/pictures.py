@@ -13,9 +13,9 @@ from inspector.colors import FAR_M, NEAR_M, depth_colors
 
 PICTURE_WIDTH = 1600
 """Pixels; all pictures are scaled to it, so that points look alike whatever the camera."""
-POINT_RADIUS = (2.2, 3.6)
+POINT_RADIUS = (2.2, 3.2)
 """Least and most pixels: few points are drawn larger, so that they show when the picture is small."""
-POINT_SHARE = 0.22
+POINT_SHARE = 0.2
 """Radius as a share of the distance between points."""
 DIMMED = 0.75
 """Brightness that is left of the image, so that points stand out from a bright road."""

@@ -7,6 +7,7 @@ import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from calibnet.errors import ConfigError
 from inspector import entities
@@ -53,14 +54,20 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
     figures = Figures.of(run)
     try:
         examples = [_write_pictures(run, name, position, folder) for name, position in figures.examples().items()]
-        text = json.dumps(figures.as_dict(), indent=1, allow_nan=False)
-        write_whole(folder / METRICS, f"{text}\n".encode())
+        write_whole(folder / METRICS, _json(figures.as_dict()).encode())
         copy_recording(run.path, folder / RECORDING)
         page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
         write_whole(folder / PAGE, page.encode())
     except OSError as error:
         raise _cannot_write(error, folder) from None
     return folder / PAGE
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    """Indented, but every frame in a line of its own: a long run stays readable."""
+    frames = ",\n  ".join(json.dumps(frame, allow_nan=False) for frame in content["per_frame"])
+    head = json.dumps({**content, "per_frame": []}, indent=1, allow_nan=False)
+    return head.removesuffix("[]\n}") + f"[\n  {frames}\n ]\n}}\n"
 
 
 def copy_recording(source: Path, target: Path) -> None:
