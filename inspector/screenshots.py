@@ -23,8 +23,6 @@ from inspector.outputs import LOCALHOST, free_port, rerun_binary, start_program
 PATIENCE_S: Final = 120.0
 PAUSE_S: Final = 0.3
 VULKAN_HINT: Final = "without a graphics card it needs a Vulkan driver; Debian: apt-get install -y mesa-vulkan-drivers"
-    "without a graphics card it needs a Vulkan driver, on Debian: apt-get install -y mesa-vulkan-drivers"
-)
 
 Page = tuple[str, ...]
 """Names of the tabs that lead to a page, outer first, for instance ``("Cost volumes", "Stage 3 (±5°/0.5 m)")``."""
