@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -17,11 +19,19 @@ from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.network.config import load_preset
 from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.network.pose import prior_information
 from calibnet.precision import autocast
+from calibnet.sequence_estimate import Consensus, SequenceEstimate
 from calibnet.stage_detail import stage_detail
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.weights import load_network, weights_path
 
+FRAMES_UNTIL_LAST_PASS = 24
+"""Frames, spread over the drive, that all passes but the last look at."""
+REPROJECTIONS = 2
+"""Times that the last stage corrects a sequence again on scans projected anew."""
+LONGEST_HISTORY = 200
+"""Points of the curve that shows how an estimate converges over a drive."""
 MINIMUM_CELLS = 20
 """Cells with a LiDAR point below which a pose of six parameters would be a guess."""
 
@@ -42,6 +52,18 @@ class SkippedStage:
     number: int
     range: MiscalibrationRange
     reason: str
+
+
+class Frames(Protocol):
+    """A drive: a `calibnet.datasets.Sequence`, or a list of frames."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def __getitem__(self, position: int, /) -> Frame:
+        """Read one frame."""
+        ...
 
 
 class Clock:
@@ -140,6 +162,57 @@ class Cascade:
                 traces.append(trace)
         return CascadeTrace(camera, initial, tuple(traces), clock.parts)
 
+    def calibrate_sequence(
+        self, frames: Frames, initial: NDArray[np.float64], observer: Callable[[int, int], None] | None = None
+    ) -> SequenceEstimate:
+        """Correct the one extrinsic that all frames of a drive share.
+
+        Each stage corrects what all frames together make of it, and the last one does so again on the scans
+        projected anew. Until then some frames from all over the drive are enough; the last pass sees them all.
+        No more than one frame is in memory at a time.
+
+        Args:
+            frames: of one camera and LiDAR on one mount; read once in the last pass, some of them before.
+            initial: ``camera_from_lidar`` to start from, 4x4.
+            observer: called before each frame with the number of frames read and to be read, over all passes.
+
+        Raises:
+            CalibrationError: no frame could be calibrated.
+            ValueError: there are no frames.
+        """
+        if not len(frames):
+            raise ValueError("There are no frames to calibrate.")
+        some = spread(len(frames), FRAMES_UNTIL_LAST_PASS)
+        passes = [(stage, some) for stage in self.stages] + [(self.stages[-1], some)] * (REPROJECTIONS - 1)
+        passes.append((self.stages[-1], list(range(len(frames)))))
+        total, read = sum(len(positions) for _, positions in passes), 0
+        extrinsic = initial
+        for stage, positions in passes:
+            single, failure = Cascade([stage]), None
+            consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
+            kept = set(spread(len(positions), LONGEST_HISTORY))
+            history = []
+            for count, position in enumerate(positions):
+                if observer is not None:
+                    observer(read, total)
+                read += 1
+                frame = frames[position]
+                try:
+                    trace = single.calibrate(frame, extrinsic).stages[0]
+                except CalibrationError as error:
+                    failure = error
+                    continue
+                consensus.add(trace.correction, trace.information)
+                if positions is passes[-1][1] and count in kept:
+                    history.append((frame.index, consensus.estimate()))
+            if failure is not None and not len(consensus):
+                raise failure
+            estimate = consensus.estimate()
+            extrinsic = estimate.camera_from_lidar
+        return SequenceEstimate(
+            extrinsic, estimate.covariance, estimate.frames, tuple(history), len(positions) - len(consensus)
+        )
+
     def _run(
         self,
         stage: Stage,
@@ -175,6 +248,7 @@ class Cascade:
             correction @ before,
             correction,
             clock.parts,
+            None if output.pose.information is None else output.pose.information[0].double().cpu().numpy(),
             stage_detail(stage.network.config, lidar, output) if detail else None,
         )
 
@@ -184,6 +258,12 @@ class Cascade:
 
         intrinsics = camera.matrix.astype(np.float32)
         return NetworkInputs(image, batch(lidar.image), batch(intrinsics), [batch(cells) for cells in lidar.cells])
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
+    chosen = min(count, most)
+    return [(number + 1) * count // chosen - 1 for number in range(chosen)]
 
 
 def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -67,6 +67,8 @@ class StageTrace:
         after: ``camera_from_lidar`` it arrived at, ``correction @ before``.
         correction: 4x4, in the camera frame.
         milliseconds: wall time by part, for instance ``{"projection": 2.1, "cost_volumes": 3.0}``.
+        information: ``[6, 6]`` inverse covariance of the correction's ``(translation m, rotation rad)`` as the
+            network states it, or None from a head that does not.
         detail: intermediate results, or None when they were not asked for.
     """
 
@@ -76,6 +78,7 @@ class StageTrace:
     after: NDArray[np.float64] = field(repr=False)
     correction: NDArray[np.float64] = field(repr=False)
     milliseconds: dict[str, float] = field(default_factory=dict)
+    information: NDArray[np.float64] | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
 
 

@@ -251,3 +251,40 @@ def test_rounding_is_removed_from_rotations() -> None:
     np.testing.assert_allclose(result[:3, :3] @ result[:3, :3].T, np.eye(3), atol=1e-14)
     np.testing.assert_allclose(result, exact, atol=1e-6)
     np.testing.assert_allclose(result @ invert(result), np.eye(4), atol=1e-14)
+
+
+class Drive:
+    """Frames that count how often they are read; those in ``blind`` see no point."""
+
+    def __init__(self, count: int, blind: frozenset[int] = frozenset()) -> None:
+        self.count, self.blind, self.read = count, blind, [0] * count
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, position: int) -> Frame:
+        self.read[position] += 1
+        frame = make_frame(position % 3)
+        points = frame.points[:0] if position in self.blind else frame.points
+        return replace(frame, index=10 + position, points=points)
+
+
+def test_a_drive_is_solved_by_all_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("calibnet.cascade.FRAMES_UNTIL_LAST_PASS", 2)
+    drive, told = Drive(4, blind=frozenset({1})), []
+    estimate = cascade().calibrate_sequence(drive, INITIAL, lambda *numbers: told.append(numbers))
+    assert drive.read == [1, 5, 1, 5], "two frames in the passes of three stages and one more, all in the last"
+    assert told == [(number, 12) for number in range(12)]
+    assert (estimate.frames, estimate.skipped) == (3, 1)
+    assert [frame for frame, _ in estimate.history] == [10, 12, 13]
+    np.testing.assert_array_equal(estimate.history[-1][1].covariance, estimate.covariance)
+    rotation = estimate.camera_from_lidar[:3, :3]
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
+    assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
+
+
+def test_a_drive_without_a_usable_frame_is_an_error() -> None:
+    with pytest.raises(CalibrationError, match="LiDAR point"):
+        cascade().calibrate_sequence(Drive(2, blind=frozenset({0, 1})), INITIAL)
+    with pytest.raises(ValueError, match="no frames"):
+        cascade().calibrate_sequence([], INITIAL)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sized
+from collections.abc import Iterator, Sized
 
+from calibnet.datasets.frame import Frame, Sequence
 from calibnet.errors import ConfigError, DatasetError
 
 _NUMBER = r"([+-]?\d+)"
@@ -38,3 +39,22 @@ def select_frames(sequence: Sized, text: str = ":") -> list[int]:
         name = getattr(sequence, "name", "the sequence")
         raise DatasetError(f"Frames {text!r} select nothing of {name}, which has {count} frames (0 to {count - 1}).")
     return selected
+
+
+class SelectedFrames:
+    """A `Sequence` of some positions of another."""
+
+    def __init__(self, sequence: Sequence, text: str = ":") -> None:
+        """Choose by ``text`` as `select_frames` does, with its errors."""
+        self.sequence, self.positions = sequence, select_frames(sequence, text)
+        self.name, self.rig = sequence.name, sequence.rig
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read the frame at one of the chosen positions."""
+        return self.sequence[self.positions[position]]
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[position] for position in range(len(self)))

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from calibnet.datasets import Frame, select_frames
+from calibnet.datasets import Frame
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.metrics import Metrics
@@ -73,6 +73,10 @@ class Evaluation:
         initial: errors before the first stage.
         stages: errors after each stage that ran, coarse to fine.
         runs: every single result.
+        sequence: errors of whole drives, each solved as one; None where that was not measured.
+        references: errors without a network, by name: no correction, a classical refinement.
+        audit: errors after the last stage with altered frames, by name, see `calibnet.evaluation.audit`.
+        audit_images: where the swapped images come from.
     """
 
     sequences: tuple[str, ...]
@@ -85,10 +89,19 @@ class Evaluation:
     initial: Metrics
     stages: tuple[StageMetrics, ...]
     runs: tuple[Run, ...] = field(repr=False)
+    sequence: Metrics | None = None
+    references: dict[str, Metrics] = field(default_factory=dict)
+    audit: dict[str, Metrics] = field(default_factory=dict)
+    audit_images: str = ""
+
+    @property
+    def final(self) -> Metrics:
+        """Errors after the last stage."""
+        return self.stages[-1].metrics
 
     def as_dict(self) -> dict[str, Any]:
         """The form that JSON files hold, without the single runs."""
-        return {
+        content: dict[str, Any] = {
             "sequences": list(self.sequences),
             "rig": self.rig,
             "range": str(self.bounds),
@@ -100,7 +113,13 @@ class Evaluation:
             "stages": [
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
             ],
+            "sequence": None if self.sequence is None else self.sequence.as_dict(),
+            "references": {name: metrics.as_dict() for name, metrics in self.references.items()},
         }
+        if self.audit:
+            content["audit"] = {name: metrics.as_dict() for name, metrics in self.audit.items()}
+            content["audit_images"] = self.audit_images
+        return content
 
 
 def draw_miscalibration(bounds: MiscalibrationRange, seed: int, frame: int, repeat: int) -> Matrix:
@@ -115,7 +134,6 @@ def evaluate(
     repeats: int,
     seed: int,
     observer: Observer | None = None,
-    frames: str = ":",
 ) -> Evaluation:
     """Calibrate every frame of ``sequences`` from ``repeats`` miscalibrations each.
 
@@ -126,7 +144,6 @@ def evaluate(
         repeats: miscalibrations a frame, at least 1.
         seed: of the miscalibrations.
         observer: called after every run.
-        frames: positions in every sequence, as `select_frames` reads them.
 
     Raises:
         DatasetError: when there is no frame to measure on, or one cannot be read.
@@ -136,8 +153,7 @@ def evaluate(
     ranges: dict[int, MiscalibrationRange] = {}
     failure: CalibrationError | None = None
     for sequence in sequences:
-        for position in select_frames(sequence, frames):
-            frame = sequence[position]
+        for frame in sequence:
             reference = frame.camera_from_lidar
             for repeat in range(repeats):
                 initial = draw_miscalibration(bounds, seed, frame.index, repeat) @ reference

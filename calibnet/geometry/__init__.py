@@ -17,6 +17,8 @@ from calibnet.geometry.se3 import (
     pose_error,
     rotation_angle,
     rotation_from_euler_xyz,
+    rotation_from_vector,
+    rotation_vector,
     transform,
     transform_points,
 )
@@ -36,6 +38,8 @@ __all__ = [
     "project",
     "rotation_angle",
     "rotation_from_euler_xyz",
+    "rotation_from_vector",
+    "rotation_vector",
     "sample_miscalibration",
     "stages_within",
     "transform",

@@ -43,6 +43,25 @@ def rotation_from_euler_xyz(angles: ArrayLike) -> Matrix:
     )
 
 
+def rotation_from_vector(vector: ArrayLike) -> Matrix:
+    """Rodrigues: the rotation by ``|vector|`` radians about ``vector``."""
+    axis = np.asarray(vector, dtype=np.float64)
+    angle = float(np.linalg.norm(axis))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = axis / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Matrix = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return rotation
+
+
+def rotation_vector(rotation: NDArray[np.floating]) -> Matrix:
+    """The vector, in radians, of ``rotation_from_vector`` (for angles below 180 degrees)."""
+    axis = _sine_axis(rotation)
+    sine = float(np.linalg.norm(axis))
+    return axis * (rotation_angle(rotation) / sine) if sine > 1e-12 else axis
+
+
 def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
     """The three angles, in radians, of ``rotation_from_euler_xyz`` (for |b| < 90 degrees)."""
     return np.array(
@@ -56,14 +75,18 @@ def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
 
 def rotation_angle(rotation: NDArray[np.floating]) -> float:
     """Angle of a rotation in radians; exact near zero, where arccos of the trace is not."""
-    axis = 0.5 * np.array(
+    return float(np.arctan2(np.linalg.norm(_sine_axis(rotation)), 0.5 * (np.trace(rotation) - 1.0)))
+
+
+def _sine_axis(rotation: NDArray[np.floating]) -> Matrix:
+    """The rotation's axis, as long as the sine of its angle."""
+    return 0.5 * np.array(
         [
             rotation[2, 1] - rotation[1, 2],
             rotation[0, 2] - rotation[2, 0],
             rotation[1, 0] - rotation[0, 1],
         ]
     )
-    return float(np.arctan2(np.linalg.norm(axis), 0.5 * (np.trace(rotation) - 1.0)))
 
 
 @dataclass(frozen=True)

@@ -144,9 +144,7 @@ class Aggregation(nn.Module):
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for channels in config.channels_at_scales)
 
-    def forward(
-        self, volumes: list[Tensor], scores: list[Tensor]
-    ) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+    def forward(self, volumes: list[Tensor], scores: list[Tensor]) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]`` and raw scores ``[B, D, h_s, w_s]``, fine to coarse.
 
         Returns:

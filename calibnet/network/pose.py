@@ -7,6 +7,7 @@ intrinsics and the scan's depths enter as what they are instead of being learned
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
@@ -32,6 +33,12 @@ class Pose(NamedTuple):
 
     correction: Tensor
     information: Tensor | None
+
+
+def prior_information(bounds: MiscalibrationRange) -> Tensor:
+    """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration."""
+    sigma = [bounds.translation_m / 3**0.5] * 3 + [math.radians(bounds.rotation_deg) / 3**0.5] * 3
+    return torch.tensor(sigma).clamp(min=1e-4) ** -2
 
 
 def skew(vector: Tensor) -> Tensor:
@@ -112,10 +119,7 @@ class GeometricHead(nn.Module):
 
     def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
         super().__init__()
-        sigma = [bounds.translation_m / 3**0.5] * 3 + [
-            float(torch.deg2rad(torch.tensor(bounds.rotation_deg))) / 3**0.5
-        ] * 3
-        self.register_buffer("prior", torch.tensor(sigma).clamp(min=1e-4) ** -2, persistent=False)
+        self.register_buffer("prior", prior_information(bounds), persistent=False)
 
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
         """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""

@@ -11,7 +11,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from calibnet.datasets import Frame, Sequence, dataset_names, open_sequence
+from calibnet.datasets import Frame, Sequence, dataset_names
+from calibnet.datasets.discovery import find_sequences
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.training.samples import Source
@@ -37,41 +38,12 @@ def open_data(spec: str) -> list[Sequence]:
     root = Path(root_text)
     if not root.is_dir():
         raise DatasetError(f"There is no folder {root}; {spec!r} names it as training data.")
-    found = list(FINDERS[dataset](root, name))
+    found = list(find_sequences(dataset, root, name))
     if not found:
         raise DatasetError(
             f"Nothing of dataset {dataset} is found for {spec!r}; check the folder and the sequence's name."
         )
     return found
-
-
-def _raw(root: Path, name: str) -> Iterator[Sequence]:
-    for folder in sorted(root.glob("*/*_sync")):
-        date, drive = folder.parent.name, folder.name.removesuffix("_sync").rpartition("_")[2]
-        if not name or name == f"{date}/{drive}":
-            for camera in (2, 3):
-                if (folder / f"image_{camera:02d}").is_dir():
-                    yield open_sequence("kitti-raw", root, date=date, drive=drive, camera=camera)
-
-
-def _odometry(root: Path, name: str) -> Iterator[Sequence]:
-    for folder in sorted((root / "sequences").glob(name or "*")):
-        for camera in (2, 3):
-            if (folder / f"image_{camera}").is_dir():
-                yield open_sequence("kitti-odometry", root, sequence=folder.name, camera=camera)
-
-
-def _object(root: Path, name: str) -> Iterator[Sequence]:
-    yield open_sequence("kitti-object", root, split=name or "train")
-
-
-def _folder(root: Path, name: str) -> Iterator[Sequence]:
-    for folder in sorted({file.parent for file in [*root.glob("calibration.yaml"), *root.glob("*/calibration.yaml")]}):
-        if not name or folder.name == name:
-            yield open_sequence("folder", folder)
-
-
-FINDERS = {"kitti-raw": _raw, "kitti-odometry": _odometry, "kitti-object": _object, "folder": _folder}
 
 
 class SyntheticPool:

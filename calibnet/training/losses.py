@@ -13,6 +13,7 @@ from calibnet.network.cost_volume import TEMPERATURE
 from calibnet.network.network import NetworkInputs, NetworkOutput
 from calibnet.network.pose import project_points
 
+
 class Target(NamedTuple):
     """The truth of a batch.
 

@@ -15,7 +15,7 @@ from calibnet.precision import autocast
 from calibnet.training.samples import TrainingSamples, collate, make_sample
 from calibnet.weights import load_network, weights_path
 
-LARGEST = 1.5
+LARGEST_ROTATION, LARGEST_TRANSLATION = 1.5, 3.0
 """Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them."""
 
 
@@ -57,4 +57,7 @@ def within(delta: NDArray[np.float64], bounds: MiscalibrationRange) -> bool:
     if not np.isfinite(delta).all():
         return False
     error = bounds_of(delta)
-    return error.rotation_deg < LARGEST * bounds.rotation_deg and error.translation_m < 2 * LARGEST * bounds.translation_m
+    return (
+        error.rotation_deg < LARGEST_ROTATION * bounds.rotation_deg
+        and error.translation_m < LARGEST_TRANSLATION * bounds.translation_m
+    )

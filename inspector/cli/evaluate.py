@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.datasets import DATASETS, Sequence, open_sequence, select_frames
+from calibnet.datasets import DATASETS, SelectedFrames, Sequence, open_sequence
 from inspector.cli.options import FOLDER, FRAMES, RANGE, STAGES
 from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
 
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from calibnet.cascade import Cascade
     from calibnet.evaluation.metrics import Metrics
-    from calibnet.evaluation.runner import Evaluation, Run
+    from calibnet.evaluation.runner import Calibrator, Evaluation
     from calibnet.geometry import MiscalibrationRange
 
 
@@ -27,23 +28,29 @@ if TYPE_CHECKING:
 @click.option("--root", type=click.Path(path_type=Path), required=True, help="The dataset's folder.")
 @click.option(
     "--sequences",
-    metavar="NAMES",
-    help="Comma-separated: numbers (kitti-odometry), DATE/DRIVE (kitti-raw), splits (kitti-object), folders below "
-    "--root (folder; without it --root itself).",
+    multiple=True,
+    metavar="NAME [NAME]...",
+    help="Numbers (kitti-odometry), DATE/DRIVE (kitti-raw), splits (kitti-object), folders below --root (folder; "
+    "without it --root itself).",
 )
+@click.argument("more", nargs=-1, metavar="")
 @click.option("--camera", type=click.IntRange(0, 3), help="Camera of the KITTI datasets.  [default: 2]")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
-@click.option("--range", "bounds", type=RANGE, default="5/0.5", show_default=True, help="Of the miscalibrations.")
+@click.option("--range", "bounds", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--audit", is_flag=True, help="Again with the image swapped, with a grey one, and with fewer rings.")
+@click.option("--drives/--no-drives", default=True, help="Also every sequence solved as one.  [default: yes]")
+@click.option("--classical/--no-classical", default=True, help="Also a refinement without training.  [default: yes]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 def evaluate(
     dataset: str,
     root: Path,
-    sequences: str | None,
+    sequences: tuple[str, ...],
+    more: tuple[str, ...],
     camera: int | None,
     frames: str,
     bounds: MiscalibrationRange,
@@ -52,35 +59,109 @@ def evaluate(
     stages: tuple[int, ...] | None,
     preset: str,
     weights: Path | None,
+    audit: bool,
+    drives: bool,
+    classical: bool,
     json_file: str | None,
 ) -> None:
     """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
 
     Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success
-    rates, for the initial error and after each stage.
+    rates: for the initial error, a classical refinement (edges of depth onto edges of the image), after
+    each stage on single frames, and for every sequence solved as one.
     """
-    opened = open_sequences(dataset, root, sequences, camera)
-    total = repeats * sum(len(select_frames(sequence, frames)) for sequence in opened)
+    names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
+    opened: list[Sequence] = [
+        SelectedFrames(sequence, frames) for sequence in open_sequences(dataset, root, names, camera)
+    ]
     prepare_json(json_file)
 
     from calibnet.cascade import Cascade
-    from calibnet.evaluation import runner
     from calibnet.geometry import stages_within
 
     cascade = Cascade.load(preset, stages or stages_within(bounds), weights)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
     console = console_beside(json_file)
-    with progress_bar(total) as advance:
-        evaluation = runner.evaluate(cascade, opened, bounds, repeats, seed, observer=advance, frames=frames)
+    with Bars() as bars:
+        measurement = Measurement(opened, bounds, repeats, seed, bars)
+        evaluation = measurement.single_frames(cascade, "single frames")
+        references = {"no correction": evaluation.initial}
+        if classical:
+            references["edge alignment"] = measurement.classical()
+        evaluation = replace(evaluation, references=references)
+        if drives:
+            evaluation = replace(evaluation, sequence=measurement.drives(cascade))
+        if audit:
+            donors = {id(one): find_donors(one, opened, dataset, root) for one in opened}
+            evaluation = replace(
+                evaluation,
+                audit=measurement.audit(cascade, donors),
+                audit_images=", ".join(dict.fromkeys(donor.name for donor in donors.values())),
+            )
     report(evaluation, console)
     write_json(json_file, evaluation.as_dict())
 
 
-def open_sequences(dataset: str, root: Path, names: str | None, camera: int | None) -> list[Sequence]:
+@dataclass(frozen=True)
+class Measurement:
+    """What is measured on, and the bars that show how far it is; one method a kind of row."""
+
+    sequences: list[Sequence]
+    bounds: MiscalibrationRange
+    repeats: int
+    seed: int
+    bars: Bars
+
+    def single_frames(self, calibrator: Calibrator, title: str, sequences: list[Sequence] | None = None) -> Evaluation:
+        """Every frame by itself."""
+        from calibnet.evaluation import runner
+
+        chosen = self.sequences if sequences is None else sequences
+        advance = self.bars.add(title, self.repeats * sum(map(len, chosen)))
+        return runner.evaluate(
+            calibrator, chosen, self.bounds, self.repeats, self.seed, observer=lambda run: advance(run.sequence)
+        )
+
+    def classical(self) -> Metrics:
+        """The same by aligning edges."""
+        from calibnet.evaluation.edge_alignment import EdgeAlignment
+
+        return self.single_frames(EdgeAlignment(self.bounds), "edge alignment").final
+
+    def drives(self, cascade: Cascade) -> Metrics | None:
+        """Every sequence solved as one."""
+        from calibnet.evaluation.drives import evaluate_drives
+
+        show = self.bars.add("whole sequences", None)
+        return evaluate_drives(
+            cascade, self.sequences, self.bounds, self.repeats, self.seed, lambda name, *_: show(name)
+        )
+
+    def audit(self, cascade: Cascade, donors: dict[int, Sequence]) -> dict[str, Metrics]:
+        """Every frame by itself, altered."""
+        from calibnet.evaluation.audit import Altered, alterations
+
+        rows = {}
+        for name in alterations(self.sequences[0]):
+            altered: list[Sequence] = [
+                Altered(sequence, alterations(donors[id(sequence)])[name]) for sequence in self.sequences
+            ]
+            rows[name] = self.single_frames(cascade, f"audit, {name}", altered).final
+        return rows
+
+
+def find_donors(sequence: Sequence, opened: list[Sequence], dataset: str, root: Path) -> Sequence:
+    """Where the audit takes other images from for one sequence."""
+    from calibnet.datasets.discovery import find_sequences
+    from calibnet.evaluation.audit import other_drive
+
+    return other_drive(sequence, opened, lambda: list(find_sequences(dataset, root)))
+
+
+def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:
     """Open what ``--sequences`` names; each dataset calls its parts differently."""
     options = {} if camera is None else {"camera": camera}
-    parts = [part.strip() for part in names.split(",") if part.strip()] if names else []
     if dataset == "folder":
         return [open_sequence(dataset, root / part, **options) for part in parts or ["."]]
     if dataset == "kitti-object":
@@ -101,20 +182,29 @@ def drive(text: str) -> dict[str, str]:
     return {"date": date, "drive": number}
 
 
-@contextlib.contextmanager
-def progress_bar(total: int) -> Iterator[Callable[[Run], None]]:
-    """Show a bar on stderr; yields what to call after every run."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+class Bars:
+    """Progress on stderr, a bar for each kind of row; gone at the end."""
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("evaluating", total=total)
+    def __enter__(self) -> Bars:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-        def advance(run: Run) -> None:
-            progress.update(task, advance=1, description=f"{run.sequence} frame {run.frame}")
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self.progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self.progress.start()
+        return self
 
-        yield advance
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+    def add(self, title: str, total: int | None) -> Callable[[str], None]:
+        """A new bar; returns what to call, with where it is, after every step."""
+        task = self.progress.add_task(title, total=total)
+
+        def advance(where: str) -> None:
+            self.progress.update(task, advance=1, description=f"{title}: {where}")
+
+        return advance
 
 
 def report(evaluation: Evaluation, console: Console) -> None:
@@ -126,18 +216,33 @@ def report(evaluation: Evaluation, console: Console) -> None:
         f"seed {evaluation.seed}"
     )
     rows = [("initial", evaluation.initial)]
+    rows += [(name, metrics) for name, metrics in evaluation.references.items() if metrics is not evaluation.initial]
     rows += [(f"stage {stage.number} ({stage.range})", stage.metrics) for stage in evaluation.stages]
+    if evaluation.sequence is not None:
+        rows.append(("sequence as one", evaluation.sequence))
+    rows += [(f"audit: {name}", metrics) for name, metrics in evaluation.audit.items()]
     for title, key, decimals in (
         ("Rotation error, degrees", "rotation_deg", 3),
         ("Translation error, cm", "translation_cm", 2),
     ):
         console.print(error_table(title, [(name, metrics.as_dict()[key]) for name, metrics in rows], decimals))
     console.print(success_table(rows))
+    if evaluation.audit:
+        console.print(audit_sentence(evaluation))
     if evaluation.failed:
         console.print(
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
             style="yellow",
         )
+
+
+def audit_sentence(evaluation: Evaluation) -> str:
+    """What is left of the initial rotation error with the true image and without it."""
+    initial = evaluation.initial.rotation_deg.median
+    left = {"the true image": evaluation.final, f"images of {evaluation.audit_images}": evaluation.audit["swapped"]}
+    left |= {"a grey image": evaluation.audit["grey"], "half the rings": evaluation.audit["thinned"]}
+    shares = ", ".join(f"{metrics.rotation_deg.median / initial:.0%} with {name}" for name, metrics in left.items())
+    return f"Of the initial rotation error (median) is left: {shares}."
 
 
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:

@@ -8,6 +8,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from calibnet.network.aggregation import Aggregation, Hourglass, WindowConv, coarsen_window, refine_window
+from calibnet.network.cost_volume import TEMPERATURE
 from tests.network.tiny import TINY
 
 
@@ -79,10 +80,15 @@ def test_hourglass_fuses_scales_only_when_asked(scales: tuple[int, ...], fuse: b
 
 def test_aggregation_scores_every_displacement_of_every_scale() -> None:
     inputs = TINY.groups + 2 * TINY.concat_channels
-    before, after, logits = Aggregation(TINY)(volumes_of((inputs,) * 3, TINY.window))
+    raw = [torch.randn(1, 25, 8 >> scale, 12 >> scale) for scale in range(3)]
+    aggregation = Aggregation(TINY)
+    before, after, logits = aggregation(volumes_of((inputs,) * 3, TINY.window), raw)
     assert [tuple(volume.shape[:3]) for volume in before] == [(1, 4, 25), (1, 6, 25), (1, 8, 25)]
     assert [volume.shape for volume in after] == [volume.shape for volume in before]
     assert [tuple(scores.shape) for scores in logits] == [(1, 25, 8, 12), (1, 25, 4, 6), (1, 25, 2, 3)]
+    for scale, (scores, scale_logits) in enumerate(zip(raw, logits, strict=True)):
+        added = aggregation.score[scale](after[scale])[:, 0]
+        torch.testing.assert_close(scale_logits, TEMPERATURE * scores + added)
 
 
 def test_one_number_stands_for_all_scales_and_hourglasses() -> None:

@@ -28,6 +28,7 @@ TINY = NetworkConfig(
     volume_channels=(4, 6, 8),
     hourglass_blocks=(1, 1),
     hourglasses=2,
+    convolve_finest=True,
     context_channels=16,
     head="geometric",
 )

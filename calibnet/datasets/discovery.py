@@ -1,0 +1,49 @@
+"""All sequences that lie below a dataset's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from calibnet.datasets.frame import Sequence
+from calibnet.datasets.registry import open_sequence
+
+
+def find_sequences(dataset: str, root: Path, name: str = "") -> Iterator[Sequence]:
+    """Open every sequence, of every colour camera, in the folder of a dataset.
+
+    Args:
+        dataset: as in `DATASETS`.
+        root: the dataset's folder.
+        name: only this one: ``DATE/DRIVE``, a sequence's number, a split or a folder.
+    """
+    return FINDERS[dataset](root, name)
+
+
+def _raw(root: Path, name: str) -> Iterator[Sequence]:
+    for folder in sorted(root.glob("*/*_sync")):
+        date, drive = folder.parent.name, folder.name.removesuffix("_sync").rpartition("_")[2]
+        if not name or name == f"{date}/{drive}":
+            for camera in (2, 3):
+                if (folder / f"image_{camera:02d}").is_dir():
+                    yield open_sequence("kitti-raw", root, date=date, drive=drive, camera=camera)
+
+
+def _odometry(root: Path, name: str) -> Iterator[Sequence]:
+    for folder in sorted((root / "sequences").glob(name or "*")):
+        for camera in (2, 3):
+            if (folder / f"image_{camera}").is_dir():
+                yield open_sequence("kitti-odometry", root, sequence=folder.name, camera=camera)
+
+
+def _object(root: Path, name: str) -> Iterator[Sequence]:
+    yield open_sequence("kitti-object", root, split=name or "train")
+
+
+def _folder(root: Path, name: str) -> Iterator[Sequence]:
+    for folder in sorted({file.parent for file in [*root.glob("calibration.yaml"), *root.glob("*/calibration.yaml")]}):
+        if not name or folder.name == name:
+            yield open_sequence("folder", folder)
+
+
+FINDERS = {"kitti-raw": _raw, "kitti-odometry": _odometry, "kitti-object": _object, "folder": _folder}

@@ -1,0 +1,83 @@
+"""Does it look at the image? The same frames with the image swapped or grey, and with fewer LiDAR rings.
+
+A regressor can memorise a rig from the LiDAR's ring pattern alone and score well on it. Such a
+calibrator is as good with a grey image; an honest one is lost without the true one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from calibnet.datasets import Frame, Sequence
+from calibnet.network.inputs import resize_image
+
+RING_DEG = 0.8
+"""Degrees of elevation of a kept and a dropped band together: of 64 beams about 32 are left."""
+
+Alteration = Callable[[Frame], Frame]
+
+
+class Altered:
+    """A `Sequence` whose frames are altered as they are read."""
+
+    def __init__(self, sequence: Sequence, alter: Alteration) -> None:
+        self.sequence, self.alter = sequence, alter
+        self.name, self.rig = sequence.name, sequence.rig
+
+    def __len__(self) -> int:
+        return len(self.sequence)
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read and alter one frame."""
+        return self.alter(self.sequence[position])
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[position] for position in range(len(self)))
+
+
+def grey(frame: Frame) -> Frame:
+    """The frame with nothing to see."""
+    return replace(frame, image=np.full_like(frame.image, 128))
+
+
+def thinned(frame: Frame) -> Frame:
+    """The frame with every other band of elevation, as a scanner with half the beams would see it."""
+    elevation = np.degrees(np.arctan2(frame.points[:, 2], np.hypot(frame.points[:, 0], frame.points[:, 1])))
+    return replace(frame, points=frame.points[elevation % RING_DEG < RING_DEG / 2])
+
+
+def swapped_with(donors: Sequence) -> Alteration:
+    """Put images of another drive into frames, in turn, fitted to their size."""
+
+    def swap(frame: Frame) -> Frame:
+        return replace(frame, image=resize_image(donors[frame.index % len(donors)].image, frame.camera))
+
+    return swap
+
+
+def alterations(donors: Sequence) -> dict[str, Alteration]:
+    """The three by the names that tables and JSON use."""
+    return {"swapped": swapped_with(donors), "grey": grey, "thinned": thinned}
+
+
+def other_drive(sequence: Sequence, opened: list[Sequence], beside: Callable[[], list[Sequence]]) -> Sequence:
+    """A drive whose images are not those of ``sequence``.
+
+    Args:
+        sequence: whose images are to be replaced.
+        opened: what is evaluated besides.
+        beside: finds what else lies in the dataset's folder.
+
+    Returns:
+        Another one of these, or a drive through the synthetic world where there is none.
+    """
+    for candidate in [*opened, *beside()]:
+        if Path(candidate.name).name != Path(sequence.name).name:
+            return candidate
+    from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
+
+    return SyntheticSequence(seed=1, length=4, rig=KITTI_LIKE)

@@ -1,0 +1,77 @@
+"""Measure what a cascade makes of whole drives, each solved as one from seeded miscalibrations."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from calibnet.datasets import Sequence
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.metrics import Metrics
+from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
+from calibnet.geometry.se3 import Matrix
+from calibnet.sequence_estimate import SequenceEstimate
+
+FEWEST_FRAMES = 2
+
+
+class DriveCalibrator(Protocol):
+    """What is measured; `calibnet.cascade.Cascade` is one."""
+
+    def calibrate_sequence(
+        self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
+    ) -> SequenceEstimate:
+        """Correct the extrinsic that all frames share; see `Cascade.calibrate_sequence`."""
+        ...
+
+
+def evaluate_drives(
+    cascade: DriveCalibrator,
+    sequences: list[Sequence],
+    bounds: MiscalibrationRange,
+    repeats: int,
+    seed: int,
+    observer: Callable[[str, int, int], None] | None = None,
+) -> Metrics | None:
+    """Errors of ``repeats`` estimates of every drive; those that fail keep their initial error.
+
+    Args:
+        cascade: what to measure.
+        sequences: the drives; what is not one drive on one mount (`shares_mount`) is left out.
+        bounds: range of the miscalibrations, of which there is one a drive and repeat.
+        repeats: miscalibrations a drive.
+        seed: of the miscalibrations.
+        observer: called with the drive's name and the numbers of frames read and to be read.
+
+    Returns:
+        None where no sequence is a drive.
+    """
+    errors = []
+    for number, sequence in enumerate(sequences):
+        if not shares_mount(sequence):
+            continue
+        reference = sequence[0].camera_from_lidar
+        for repeat in range(repeats):
+            delta = sample_miscalibration(bounds, np.random.default_rng([seed, number, repeat, 1]))
+            estimate = delta @ reference
+
+            def told(read: int, total: int, name: str = sequence.name) -> None:
+                if observer is not None:
+                    observer(name, read, total)
+
+            with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
+                estimate = cascade.calibrate_sequence(sequence, estimate, told).camera_from_lidar
+            errors.append(pose_error(estimate, reference))
+    return Metrics.of(errors) if errors else None
+
+
+def shares_mount(sequence: Sequence) -> bool:
+    """Whether the first, middle and last frames have one extrinsic, as those of a drive do."""
+    if len(sequence) < FEWEST_FRAMES:
+        return False
+    some = {0, len(sequence) // 2, len(sequence) - 1}
+    extrinsics = [sequence[position].camera_from_lidar for position in some]
+    return all(np.allclose(extrinsic, extrinsics[0], atol=1e-9) for extrinsic in extrinsics)

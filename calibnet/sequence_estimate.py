@@ -1,0 +1,125 @@
+"""One extrinsic from a drive: the mount is the same in every frame, so the frames are solved together.
+
+Every frame says with its normal equations where it believes the extrinsic to be and how firmly. Their
+sum, each frame weighted by how well it agrees with the others, is the estimate of all; how far they
+scatter around it is its uncertainty. A frame leaves 42 numbers behind, so memory does not grow with
+images or scans.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry.se3 import Matrix, rotation_from_vector, rotation_vector, transform
+
+OUTLIER = 3.0
+"""A frame so many times farther off than the median one counts half as much (Cauchy weights)."""
+UNSTATED = 1000.0
+"""How much firmer than the prior a head is taken to be that does not say: its answer is not drawn to the start."""
+ROUNDS = 10
+"""Re-weightings; they settle after three or four."""
+
+
+def pose_vector(correction: Matrix) -> NDArray[np.float64]:
+    """A 4x4 correction as ``(translation m, rotation vector rad)``."""
+    return np.concatenate([correction[:3, 3], rotation_vector(correction[:3, :3])])
+
+
+def pose_from_vector(vector: NDArray[np.float64]) -> Matrix:
+    """The inverse of `pose_vector`."""
+    return transform(rotation_from_vector(vector[3:]), vector[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The extrinsic that a number of frames agree on.
+
+    Attributes:
+        camera_from_lidar: 4x4.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, a perturbation in the camera frame: as the
+            network states it, widened until it explains how far the frames scatter.
+        frames: that went into it.
+    """
+
+    camera_from_lidar: Matrix = field(repr=False)
+    covariance: NDArray[np.float64] = field(repr=False)
+    frames: int
+
+    @property
+    def rotation_deg(self) -> float:
+        """Standard deviation of the rotation: the root of the summed variances of its axes."""
+        return float(np.degrees(np.sqrt(np.trace(self.covariance[3:, 3:]))))
+
+    @property
+    def translation_cm(self) -> float:
+        """Standard deviation of the translation, likewise."""
+        return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceEstimate(Estimate):
+    """What `Cascade.calibrate_sequence` returns.
+
+    Attributes:
+        history: the estimate after each frame of the last pass, with the frame's index in its sequence.
+        skipped: frames that could not be calibrated in that pass.
+    """
+
+    history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
+    skipped: int = 0
+
+
+class Consensus:
+    """Frames' corrections of one common extrinsic, and what they agree on."""
+
+    def __init__(self, before: Matrix, prior: NDArray[np.float64]) -> None:
+        """Start with none.
+
+        Args:
+            before: ``camera_from_lidar`` that all corrections are relative to.
+            prior: ``[6, 6]`` information of the range the stage was trained for. Every frame's information
+                contains it; the estimate counts it once.
+        """
+        self.before, self.prior = before, prior
+        self._vectors: list[NDArray[np.float64]] = []
+        self._informations: list[NDArray[np.float64]] = []
+
+    def __len__(self) -> int:
+        return len(self._vectors)
+
+    def add(self, correction: Matrix, information: NDArray[np.float64] | None) -> None:
+        """Take in one frame: its 4x4 correction and information ``[6, 6]``; without one, all frames count alike."""
+        self._vectors.append(pose_vector(correction))
+        self._informations.append(UNSTATED * self.prior if information is None else information)
+
+    def estimate(self) -> Estimate:
+        """What the frames so far agree on.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if not self._vectors:
+            raise ValueError("There is no frame to estimate from.")
+        vectors, informations = np.array(self._vectors), np.array(self._informations)
+        weights = np.ones(len(vectors))
+        for _ in range(ROUNDS):
+            normal, mean = self._solve(vectors, informations, weights)
+            offsets = vectors - mean
+            distances = np.einsum("ni,nij,nj->n", offsets, informations, offsets)
+            weights = 1 / (1 + distances / (OUTLIER**2 * max(float(np.median(distances)), 1e-12)))
+        covariance: NDArray[np.float64] = np.linalg.inv(normal)
+        if len(vectors) > 1:
+            freedom = 6 * (weights.sum() - weights.max())
+            covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))
+        return Estimate(pose_from_vector(mean) @ self.before, covariance, len(vectors))
+
+    def _solve(
+        self, vectors: NDArray[np.float64], informations: NDArray[np.float64], weights: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Summed normal equations: matrix ``[6, 6]`` and solution ``[6]``."""
+        weighted = weights[:, None, None] * informations
+        normal = weighted.sum(0) - weights.sum() * self.prior + self.prior
+        return normal, np.linalg.solve(normal, np.einsum("nij,nj->i", weighted, vectors))
