@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error, rotation_from_vector, rotation_vector, transform
@@ -47,12 +48,12 @@ class State:
         return Metrics.of(self.errors)
 
     @property
-    def rotation_deg(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def rotation_deg(self) -> NDArray[np.float64]:
         """``[N]`` degrees."""
         return np.array([error.rotation_deg for error in self.errors])
 
     @property
-    def translation_cm(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def translation_cm(self) -> NDArray[np.float64]:
         """``[N]`` centimetres."""
         return np.array([error.translation_cm for error in self.errors])
 
@@ -108,6 +109,13 @@ class Figures:
     def has_reference(self) -> bool:
         """Whether errors are against a known reference; if not they are distances to ``median``."""
         return self.run.has_reference
+
+    @property
+    def measure(self) -> str:
+        """What the errors of the states are, in words."""
+        if self.has_reference:
+            return "Error"
+        return "Distance from the result" if len(self.run.frames) == 1 else "Distance from the frames’ median"
 
     @property
     def initial(self) -> State:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
 from string import Template
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
-from inspector import colors
-from inspector.colors import Rgb
-from inspector.report.figures_svg import Series, histogram, line_chart
-from inspector.report.metrics import DISTANCE_M, Figures, State
+from inspector.report.charts import charts, series_styles
+from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.pictures import depth_scale
-from inspector.report.verdict import ROTATION, TRANSLATION, Quantity, count, headline, verdict
+from inspector.report.tables import axes_table, stages_table
+from inspector.report.verdict import ROTATION, TRANSLATION, count, headline, verdict
 
-ON_PAPER = 0.8
-"""Brightness of the series' colours on white, where those of the viewer's dark background are too pale."""
 SETTING_NAMES = {
     "sequence": "data",
     "rig": "sensors",
@@ -72,7 +69,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
     known = figures.has_reference
     return _template("page.html").substitute(
         title=escape(f"{name}: calibration report"),
-        style=_style(figures.states),
+        style=_template("page.css").substitute(series_styles(figures.states)),
         headline=escape(headline(figures)),
         warning=f'<p class="warning">{escape(run.warning)}</p>' if run.warning else "",
         verdict="\n".join(
@@ -84,10 +81,10 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         ranking=escape(_ranking(figures)),
         examples="\n".join(_example(figures, example) for example in examples),
         depth_scale=depth_scale(),
-        stages_title=f"{_what(figures)} after every stage",
-        stages_table=_stages_table(figures),
-        axes_table=_axes_table(figures),
-        charts=_charts(figures),
+        stages_title=f"{figures.measure} after every stage",
+        stages_table=stages_table(figures),
+        axes_table=axes_table(figures),
+        charts=charts(figures),
         settings=_settings(figures),
         method=escape(METHOD.format(against=AGAINST_REFERENCE if known else AGAINST_MEDIAN)),
         size=f"{recording_bytes / 1e6:.1f} MB",
@@ -101,45 +98,6 @@ def _resource(name: str) -> str:
 
 def _template(name: str) -> Template:
     return Template(_resource(name))
-
-
-def _style(states: Sequence[State]) -> str:
-    """The style sheet with the series' colours, which are those of the viewer."""
-    palette = {_css(state): _color(state) for state in states}
-    series = (
-        f"svg .line.{css} {{ stroke: var(--{css}); }} svg .dot.{css}, .legend .{css} {{ fill: var(--{css}); "
-        f"background: var(--{css}); }} svg .bar.{css} {{ fill: var(--{css}); stroke: var(--{css}); }}"
-        for css in palette
-    )
-    return _template("page.css").substitute(
-        colors=_variables({css: _darker(color) for css, color in palette.items()}),
-        dark_colors=_variables(palette),
-        series="\n".join(series),
-    )
-
-
-def _variables(palette: Mapping[str, Rgb]) -> str:
-    return "\n".join(f"  --{css}: rgb{color};" for css, color in palette.items())
-
-
-def _darker(color: Rgb) -> Rgb:
-    red, green, blue = (round(ON_PAPER * channel) for channel in color)
-    return red, green, blue
-
-
-def _color(state: State) -> Rgb:
-    return colors.INITIAL if state.number is None else colors.STAGES[state.number]
-
-
-def _what(figures: Figures) -> str:
-    """What the figures measure."""
-    if figures.has_reference:
-        return "Error"
-    return "Distance from the result" if len(figures.run.frames) == 1 else "Distance from the frames’ median"
-
-
-def _css(state: State) -> str:
-    return "initial" if state.number is None else f"stage-{state.number}"
 
 
 def _pair(error: PoseError) -> str:
@@ -194,94 +152,6 @@ def _side(css: str, name: str, file: str, frame: int) -> str:
         f'<div class="side {css}"><img src="{escape(file)}" alt="Frame {frame} with the LiDAR points, {name}">'
         f'<span class="tag">{name}</span></div>'
     )
-
-
-def _stages_table(figures: Figures) -> str:
-    """Mean, median, standard deviation and p95 of both errors and, with a reference, the success rates."""
-    statistics = ("mean", "median", "std", "p95")
-    groups = ["<th></th>"]
-    groups += [f'<th class="group" colspan="{len(statistics)}">{name}</th>' for name in ("Rotation", "Translation")]
-    heads = ["<th>after</th>", *(f"<th>{name}</th>" for name in statistics * 2)]
-    if figures.has_reference:
-        groups.append('<th class="group" colspan="2">Frames within</th>')
-        heads += ["<th>2° and 5 cm</th>", "<th>1° and 2.5 cm</th>"]
-    rows = []
-    for state in figures.states:
-        metrics = state.metrics
-        cells = [ROTATION.say(getattr(metrics.rotation_deg, name)) for name in statistics]
-        cells += [TRANSLATION.say(getattr(metrics.translation_cm, name)) for name in statistics]
-        if figures.has_reference:
-            cells += [f"{share:.0%}" for share in (metrics.success_2deg_5cm, metrics.success_1deg_2_5cm)]
-        rows.append(_row(state, cells))
-    return _table([groups, heads], rows)
-
-
-def _axes_table(figures: Figures) -> str:
-    heads = ["<th>after</th>"]
-    heads += [f"<th>{name}</th>" for name in ("roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)")]
-    rows = []
-    for state in figures.states:
-        rotation, translation = state.metrics.rotation_deg, state.metrics.translation_cm
-        cells = [ROTATION.say(angle) for angle in (rotation.roll, rotation.pitch, rotation.yaw)]
-        cells += [TRANSLATION.say(offset) for offset in (translation.x, translation.y, translation.z)]
-        rows.append(_row(state, cells))
-    return _table([heads], rows)
-
-
-def _row(state: State, cells: Iterable[str]) -> str:
-    trained_for = ""
-    if state.range is not None:
-        degrees, metres = state.range.split("/")
-        trained_for = f' <span class="range">±{escape(degrees)}° / {escape(metres)} m</span>'
-    return f"<th>{state.name}{trained_for}</th>" + "".join(f"<td>{cell}</td>" for cell in cells)
-
-
-def _table(heads: Iterable[Iterable[str]], rows: Iterable[str]) -> str:
-    head = "".join(f"<tr>{''.join(cells)}</tr>" for cells in heads)
-    body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return f'<table class="figures"><thead>{head}</thead><tbody>{body}</tbody></table>'
-
-
-def _charts(figures: Figures) -> str:
-    """Curves over the frames and histograms; a single frame has neither."""
-    if len(figures.run.frames) == 1:
-        return ""
-    what = _what(figures)
-    ends = [figures.initial, figures.corrected] if figures.run.stages else [figures.initial]
-    curves = [_curve(figures, quantity, what) for quantity in (ROTATION, TRANSLATION)]
-    bars = [_bars(ends, quantity, what) for quantity in (ROTATION, TRANSLATION)]
-    return (
-        f"<section><h2>{what} over the frames</h2>{_legend(figures.states)}"
-        f'<div class="two">{"".join(curves)}</div></section>'
-        f"<section><h2>How the frames are distributed</h2>{_legend(ends)}"
-        f'<div class="two">{"".join(bars)}</div></section>'
-    )
-
-
-def _curve(figures: Figures, quantity: Quantity, what: str) -> str:
-    frames = [frame.index for frame in figures.run.frames]
-    series = [_series(state, quantity) for state in figures.states]
-    svg = line_chart(f"{quantity.name}: {what.lower()} over the frames", frames, series, quantity.axis, quantity.say)
-    return f'<div class="chart"><h3>{quantity.name}</h3>{svg}</div>'
-
-
-def _bars(states: Sequence[State], quantity: Quantity, what: str) -> str:
-    series = [_series(state, quantity) for state in states]
-    svg = histogram(f"{quantity.name}: how many frames have which {what.lower()}", series, quantity.axis)
-    return f'<div class="chart"><h3>{quantity.name}</h3>{svg}</div>'
-
-
-def _series(state: State, quantity: Quantity) -> Series:
-    return Series(state.name, _css(state), state.rotation_deg if quantity is ROTATION else state.translation_cm)
-
-
-def _legend(states: Sequence[State]) -> str:
-    final = states[-1].number
-    items = (
-        f'<li><i class="{_css(state)}"></i>{state.name}{" = corrected" if final and state.number == final else ""}</li>'
-        for state in states
-    )
-    return f'<ul class="legend">{"".join(items)}</ul>'
 
 
 def _settings(figures: Figures) -> str:

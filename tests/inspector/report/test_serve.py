@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from inspector.report.serve import VIEWER_FILES, ReportServer, served_files
+from inspector.report.serve import VIEWER_FILES, ReportServer, fetch_viewer, served_files
 
 
 @pytest.fixture
@@ -77,3 +77,9 @@ def test_only_this_machine_can_connect(server: ReportServer) -> None:
     assert address.hostname == "127.0.0.1"
     with pytest.raises(ConnectionRefusedError):  # another of this machine's addresses: all of 127/8 are its own
         socket.create_connection(("127.0.0.2", int(address.port or 0)), timeout=5)
+
+
+def test_installed_rerun_hands_out_its_viewer(tmp_path: Path) -> None:
+    fetch_viewer(tmp_path / "viewer")
+    assert (tmp_path / "viewer" / "re_viewer_bg.wasm").read_bytes()[:4] == b"\0asm"
+    assert {file.name for file in (tmp_path / "viewer").iterdir()} == set(VIEWER_FILES)
