@@ -21,6 +21,7 @@ from inspector.recording_file import RecordingError, RecordingFile
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
+    from rerun.chunk import Chunk
 
 Extrinsic = NDArray[np.float64]
 
@@ -120,8 +121,13 @@ class RecordedRun:
         uv = np.asarray(positions.values.flatten()).reshape(-1, 2)
         return OverlayPoints(uv - np.float32(0.5), rgb)  # Rerun's pixel centres are at x.5
 
+    def chunks(self, *paths: str) -> Iterator[Chunk]:
+        """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
+        return self._file.chunks(*paths)
+
     def _row(self, entity: str, index: int, *components: str) -> list[Any]:
-        for _, batch in self._file.batches(entity):
+        for chunk in self._file.chunks(entity):
+            batch = chunk.to_record_batch()
             if set(components) <= set(batch.schema.names):
                 found = np.flatnonzero(np.asarray(batch[entities.FRAME]) == index)
                 if found.size:
@@ -168,7 +174,8 @@ def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
     """Chunks by entity; of a file that is cut off the pictures too, for a frame may lack one of them."""
     wanted = ("extrinsic/**", f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
     tables: dict[str, list[RecordBatch]] = defaultdict(list)
-    for entity, batch in file.batches(*wanted):
+    for chunk in file.chunks(*wanted):
+        entity, batch = chunk.entity_path.lstrip("/"), chunk.to_record_batch()
         tables[entity].append(batch.select([entities.FRAME]) if entity in PICTURES else batch)
     return tables
 

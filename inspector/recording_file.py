@@ -17,8 +17,7 @@ from inspector import entities
 from inspector.outputs import rerun_binary
 
 if TYPE_CHECKING:
-    from pyarrow import RecordBatch
-    from rerun.chunk import StoreEntry
+    from rerun.chunk import Chunk, StoreEntry
 
 
 class RecordingError(CalibnetError):
@@ -47,8 +46,8 @@ class RecordingFile:
         self._reader, entries = self._open()
         self._entry = self._ours(entries)
 
-    def batches(self, *paths: str) -> Iterator[tuple[str, RecordBatch]]:
-        """Entity path (without its first slash) and Arrow rows of every chunk of some entities.
+    def chunks(self, *paths: str) -> Iterator[Chunk]:
+        """Every chunk of some entities.
 
         Args:
             paths: entity paths or patterns such as ``extrinsic/**``; chunks of others are not read.
@@ -58,8 +57,7 @@ class RecordingFile:
         """
         source = self._reader.stream(store=self._entry) if self.cut else self._reader.store(store=self._entry).stream()
         try:
-            for chunk in source.filter(content=[f"/{path}" for path in paths]):
-                yield chunk.entity_path.lstrip("/"), chunk.to_record_batch()
+            yield from source.filter(content=[f"/{path}" for path in paths])
         except RuntimeError:
             raise RecordingError(f"{self.path} is damaged in the middle; copy it again or record it again.") from None
 

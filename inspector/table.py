@@ -10,32 +10,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import RANGES, PoseError, pose_error
+from inspector import entities
 from inspector.observation import Observation
 
 NOTHING = "–"
 READING_AID = (
-    "Points are coloured by depth, red near to blue far: where the calibration is right, their jumps "
-    "in colour lie on the edges of the picture. Play the timeline `step` to watch the correction "
-    "stage by stage in the tab *Cascade*."
+    "Where the calibration is right, jumps in the points' colours lie on the edges of the picture. "
+    "Play the timeline `step` with *Cascade / Step by step* in front to watch each frame being corrected."
 )
 
 
-def stage_table(observation: Observation) -> str:
-    """The table of one frame, with the stages that did not run and why."""
-    frame = observation.frame
-    lines = [f"### Frame {frame.index}", "", *_stages(observation), "", *_axes(observation), ""]
+def stage_table(observation: Observation, linked: bool = True) -> str:
+    """The table of one frame, with the stages that did not run and why.
+
+    Args:
+        observation: the frame and what was done to it.
+        linked: whether the overlays are there that the stages' names link to.
+    """
+    lines = [f"### {_headline(observation)}", "", *_stages(observation, linked), "", *_axes(observation), ""]
     lines += [f"{stage.reason}\n" for stage in observation.skipped]
     if observation.reference is None:
         lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
     return "\n".join([*lines, *_extrinsic(observation.trace.corrected), "", READING_AID, ""])
 
 
-def _stages(observation: Observation) -> list[str]:
+def _headline(observation: Observation) -> str:
+    """The result in a line."""
+    frame, trace = observation.frame, observation.trace
+    before, after = observation.error(trace.initial), observation.error(trace.corrected)
+    if before is None or after is None:
+        change = pose_error(trace.corrected, trace.initial)
+        return f"Frame {frame.index}: corrected by {change.rotation_deg:.2f}° and {change.translation_cm:.1f} cm"
+    return (
+        f"Frame {frame.index}: {before.rotation_deg:.2f}° → {after.rotation_deg:.2f}°, "
+        f"{before.translation_cm:.1f} → {after.translation_cm:.1f} cm"
+    )
+
+
+def _stages(observation: Observation, linked: bool) -> list[str]:
     trace = observation.trace
     with_errors = observation.reference is not None
     skipped = {stage.number for stage in observation.skipped}
     ran = {stage.number: stage for stage in trace.stages}
-    header = ["", "trained for", *(["rotation error", "translation error"] if with_errors else []), "corrected by"]
+    header = ["after", "trained for", *(["rotation error", "translation error"] if with_errors else []), "moved by"]
     rows = [["miscalibrated" if with_errors else "start", NOTHING, *_error(observation.error(trace.initial)), NOTHING]]
     for number, bounds in enumerate(RANGES, start=1):
         trained_for = f"±{bounds.rotation_deg:g}° / {bounds.translation_m:g} m"
@@ -43,11 +60,12 @@ def _stages(observation: Observation) -> list[str]:
             stage = ran[number]
             motion = pose_error(stage.after, stage.before)
             change = f"{motion.rotation_deg:.2f}° / {motion.translation_cm:.1f} cm"
-            rows.append([f"**stage {number}**", trained_for, *_error(observation.error(stage.after)), change])
+            name = f"[stage {number}](recording://{entities.overlay_stage(number)})" if linked else f"stage {number}"
+            rows.append([name, trained_for, *_error(observation.error(stage.after)), change])
         elif number in skipped:
             empty = [NOTHING, NOTHING] if with_errors else []
             rows.append([f"stage {number}", trained_for, *empty, "skipped"])
-    return _markdown(header, rows)
+    return markdown(header, rows)
 
 
 def _axes(observation: Observation) -> list[str]:
@@ -60,7 +78,7 @@ def _axes(observation: Observation) -> list[str]:
         "corrected by": None if known else pose_error(trace.corrected, trace.initial),
     }
     header = ["", "roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)"]
-    return _markdown(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
+    return markdown(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
 
 
 def _per_axis(error: PoseError) -> list[str]:
@@ -78,6 +96,7 @@ def _error(error: PoseError | None) -> list[str]:
     return [] if error is None else [f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"]
 
 
-def _markdown(header: list[str], rows: list[list[str]]) -> list[str]:
+def markdown(header: list[str], rows: list[list[str]]) -> list[str]:
+    """The lines of a Markdown table."""
     ruler = ["---"] * len(header)
     return ["| " + " | ".join(cells) + " |" for cells in (header, ruler, *rows)]

@@ -35,6 +35,7 @@ COMMANDS = {
     "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
     "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
+    "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),
     "check": LazyCommand("inspector.cli.check:check", "Fail when a recording's errors exceed bounds; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),

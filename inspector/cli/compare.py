@@ -1,0 +1,83 @@
+"""``calib-inspect compare``: several runs on the same frames, side by side."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from calibnet.errors import ConfigError
+from inspector.cli.errors import ExitCode, fail
+from inspector.cli.recordings import RECORDING, open_run
+from inspector.cli.viewing import choose_outputs, saved_lines, viewing_options
+
+if TYPE_CHECKING:
+    from inspector.comparison import Comparison
+    from inspector.outputs import Outputs
+
+
+@click.command()
+@click.argument("recordings", type=RECORDING, nargs=-1, required=True, metavar="A.rrd B.rrd [C.rrd ...]")
+@click.option("--names", metavar="A,B", help="Of the runs, comma-separated.  [default: those of the files]")
+@click.option("--common-frames", is_flag=True, help="Compare the frames that all runs have.")
+@viewing_options
+def compare(
+    recordings: tuple[Path, ...],
+    names: str | None,
+    common_frames: bool,
+    save: Path | None,
+    headless: bool,
+    serve: bool,
+    bind: str,
+    connect: str | None,
+) -> int:
+    """Put recorded runs of one sequence side by side: other weights, miscalibration or preset.
+
+    Shows their overlays, their error curves in one plot, and a table of medians, 95th percentiles and
+    success rates with the differences to the first run.
+    """
+    if len(recordings) < 2:
+        raise click.UsageError("Give two recordings or more.")
+    called = [name.strip() for name in names.split(",")] if names else [path.stem for path in recordings]
+    if len(called) != len(recordings):
+        raise click.UsageError(f"--names has {len(called)} names for {len(recordings)} recordings.")
+
+    from inspector.comparison import Comparison
+    from inspector.comparison_recording import record_comparison
+    from inspector.stream import RecordingLostError
+
+    outputs = choose_outputs(f"compare-{'-'.join(called)}", save, headless, serve, bind, connect)
+    refuse_overwriting(outputs.file, recordings)
+    comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
+    outputs.check()
+    try:
+        record_comparison(comparison, outputs.open())
+        return finish(comparison, outputs)
+    except RecordingLostError as error:
+        os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
+    finally:
+        outputs.close()
+
+
+def refuse_overwriting(file: Path | None, recordings: tuple[Path, ...]) -> None:
+    """Raise `ConfigError` when the comparison would replace what it reads."""
+    if file is not None and file.resolve() in [path.resolve() for path in recordings]:
+        raise ConfigError(f"{file} is one of the runs; choose another --save.")
+
+
+def finish(comparison: Comparison, outputs: Outputs) -> int:
+    """Print the medians and where the comparison is; serve until Ctrl-C where that was asked for."""
+    for run in comparison.runs:
+        metrics = run.corrected
+        if metrics is not None:
+            rotation, translation = metrics.rotation_deg.median, metrics.translation_cm.median
+            click.echo(f"{run.name}: {rotation:.2f}° / {translation:.1f} cm, median over {len(run.frames)} frames.")
+    if outputs.file is not None:
+        for line in saved_lines(outputs.file, len(comparison.indices)):
+            click.echo(line)
+    if outputs.page is not None:
+        click.echo(f"Serving at {outputs.page} until Ctrl-C.")
+        outputs.wait_while_serving()
+    return ExitCode.OK
