@@ -1,40 +1,55 @@
 """The layout of the viewer: one function a tab; only views that have data are made.
 
 A new view is a line in its tab's function; a new stage appears by itself, since every tab walks
-through `Layout.stages`.
+through `Layout.stages`. Tabs with something for every stage have a page for each.
 """
 
 from __future__ import annotations
 
-import math
-
-import rerun as rr
 import rerun.blueprint as rrb
 
 from inspector import entities
-from inspector.legends import LEGEND_SPACING
-from inspector.observation import Detail, Grid, Layout, StageLayout, Vector
+from inspector.contents import Part
+from inspector.observation import Grid, Layout, StageLayout
+from inspector.views import (
+    LEGEND_HEIGHT,
+    SCREEN_HEIGHT,
+    SCREEN_WIDTH,
+    TITLE_HEIGHT,
+    View,
+    curve_view,
+    frustum_legend,
+    image_view,
+    overlay_view,
+    point_legend,
+    scene_view,
+    tensor_view,
+)
 
-SCREEN_WIDTH, SCREEN_HEIGHT, LEGEND_HEIGHT = 1920.0, 980.0, 85.0
-SCENE_BACKGROUND = (44, 47, 54)
-"""Grey enough that dark points of the picture stay visible."""
-
-View = rrb.View | rrb.Container
+LARGEST_OVERLAY = 390.0
+"""Height in pixels beyond which curves and table of the overview would have too little room."""
+LEGEND_SHARE = 0.06
+"""Of a tab's height that its legend takes."""
+FRAMES_PER_SECOND = 10.0
+"""Speed at which frames play: that of KITTI's scanner."""
 
 
 def make_blueprint(layout: Layout) -> rrb.Blueprint:
     """All tabs that the recording has data for."""
-    tabs: list[View] = [overview_tab(layout), cascade_tab(layout)]
+    parts = layout.contents.parts
     inside = [stage for stage in layout.stages if stage.grids]
-    if inside:
-        tabs += [
-            rrb.Tabs(*(cost_volume_page(stage, layout) for stage in inside), name="Cost volumes"),
-            rrb.Tabs(*(hourglass_page(stage) for stage in inside), name="Hourglass"),
-        ]
-    tabs.append(scene_tab(layout))
+    tabs: list[View] = [overview_tab(layout)]
+    if layout.stages and parts & {Part.OVERLAYS, Part.VOLUMES}:
+        tabs.append(cascade_tab(layout))
+    if inside and parts & {Part.VOLUMES, Part.TENSORS}:
+        tabs.append(rrb.Tabs(*(cost_volume_page(stage, layout) for stage in inside), name="Cost volumes"))
+    if inside and Part.HOURGLASS in parts:
+        tabs.append(rrb.Tabs(*(hourglass_page(stage) for stage in inside), name="Hourglass"))
+    if Part.SCENE in parts:
+        tabs.append(scene_tab(layout))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
-        rrb.TimePanel(state="collapsed", timeline=entities.FRAME),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=FRAMES_PER_SECOND),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
@@ -43,102 +58,123 @@ def make_blueprint(layout: Layout) -> rrb.Blueprint:
 
 
 def overview_tab(layout: Layout) -> View:
-    """The result at one look: three overlays, the depth colours, the error curves, the table."""
+    """The result at one look: three overlays, their legend, the error curves, the table."""
     overlays = [
-        overlay_view(
-            "Miscalibrated" if layout.has_reference else "Start: calibration as given", entities.OVERLAY_MISCALIBRATED
-        ),
-        overlay_view("Corrected", entities.OVERLAY_CORRECTED),
+        overlay_view(layout.start, entities.OVERLAY_MISCALIBRATED, layout.image),
+        overlay_view("Corrected", entities.OVERLAY_CORRECTED, layout.image),
     ]
     if layout.has_reference:
-        overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE))
-    table = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
-    below: View = table
-    if layout.has_reference:
-        curves = [
-            rrb.TimeSeriesView(
-                origin=f"error/{kind}",
-                contents=["$origin/**", f"- /{entities.error_corrected(kind)}"],
-                name=f"{kind.capitalize()} error [{unit}]",
-                plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-            )
-            for kind, unit in entities.ERROR_KINDS.items()
-        ]
-        below = rrb.Horizontal(rrb.Vertical(*curves), table, column_shares=[1.0, 1.0])
+        overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE, layout.image))
+    below: View = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
+    if layout.has_reference and Part.CURVES in layout.contents.parts:
+        curves = [curve_view(kind, unit) for kind, unit in entities.ERROR_KINDS.items()]
+        below = rrb.Horizontal(rrb.Vertical(*curves), below, column_shares=[1.0, 1.0])
+    width, height = layout.image
+    overlay = min(SCREEN_WIDTH / len(overlays) * height / width + TITLE_HEIGHT, LARGEST_OVERLAY)
     return rrb.Vertical(
         rrb.Horizontal(*overlays),
-        legend("Depth of the points", entities.LEGEND_DEPTH),
+        point_legend(layout),
         below,
-        row_shares=_overview_rows(layout.aspect, len(overlays)),
+        row_shares=[overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay],
         name="Overview",
     )
 
 
-def _overview_rows(aspect: float, overlays: int) -> list[float]:
-    """Heights of overlays, legend and the rest, so that the overlays fill a screen of 1920 x 1080."""
-    overlay = min(SCREEN_WIDTH / overlays / aspect + 64.0, 390.0)
-    return [overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay]
-
-
 def cascade_tab(layout: Layout) -> View:
-    """The overlay after every stage, beside the displacement and confidence that led to it."""
-    rows: list[View] = [
-        rrb.Horizontal(
-            overlay_view(
-                "Before the first stage: miscalibrated" if layout.has_reference else "Start",
-                entities.OVERLAY_MISCALIBRATED,
-            ),
-            overlay_view("Current: play the timeline “step” to see it corrected", entities.OVERLAY_CURRENT),
-            legend("Colours of displacement (direction; white = none)", entities.LEGEND_DISPLACEMENT),
+    """The overlay after every stage side by side, one after the other on ``step``, and what each stage saw."""
+    pages: list[View] = []
+    if Part.OVERLAYS in layout.contents.parts:
+        overlays = [overlay_view(f"Start: {layout.start.lower()}", entities.OVERLAY_MISCALIBRATED, layout.image)]
+        overlays += [
+            overlay_view(f"After {_lower(stage.title)}", entities.overlay_stage(stage.number), layout.image)
+            for stage in layout.stages
+        ]
+        columns = 2 if len(overlays) > 1 else 1
+        current = overlay_view(
+            "Choose the timeline “step” below and play: start, then every stage", entities.OVERLAY_CURRENT, layout.image
         )
+        pages = [
+            _with_legend(rrb.Grid(*overlays, grid_columns=columns), point_legend(layout), "All stages"),
+            _with_legend(current, point_legend(layout), "Step by step"),
+        ]
+    if Part.VOLUMES in layout.contents.parts:
+        pages += [_stage_page(stage, layout) for stage in layout.stages if stage.grids]
+    return rrb.Tabs(*pages, name="Cascade")
+
+
+def _stage_page(stage: StageLayout, layout: Layout) -> View:
+    """What one stage saw: where it moves the points, and how sure it is."""
+    grid = stage.grids[0]
+    maps = [
+        image_view(
+            f"Displacement found: colour and arrow point to where the image fits (cells of {grid.stride} px)",
+            entities.displacement(stage.number),
+            grid,
+        ),
+        image_view("Confidence, 0 unsure to 1 a pixel or better", entities.confidence(stage.number), grid),
     ]
-    for stage in layout.stages:
-        views: list[View] = [overlay_view(f"After {_lower(stage.title)}", entities.overlay_stage(stage.number))]
-        if stage.grids:
-            grid = stage.grids[0]
-            views += [
-                image_view(
-                    f"{stage.title}: displacement found, arrows in cells of {grid.stride} px",
-                    entities.displacement(stage.number),
-                    grid,
-                ),
-                image_view(f"{stage.title}: confidence, bright = sure", entities.confidence(stage.number), grid),
-            ]
-        rows.append(rrb.Horizontal(*views))
-    return rrb.Vertical(*rows, name="Cascade")
+    rows: list[View] = [rrb.Horizontal(*maps)]
+    if Part.OVERLAYS in layout.contents.parts:
+        earlier = layout.stages[: layout.stages.index(stage)]
+        name = f"Before: after stage {earlier[-1].number}" if earlier else f"Before: {layout.start.lower()}"
+        path = entities.overlay_stage(earlier[-1].number) if earlier else entities.OVERLAY_MISCALIBRATED
+        after = overlay_view("After: " + _lower(stage.title), entities.overlay_stage(stage.number), layout.image)
+        rows.insert(0, rrb.Horizontal(overlay_view(name, path, layout.image), after))
+    return rrb.Vertical(*rows, _map_legends(), row_shares=[1.0] * len(rows) + [0.25], name=stage.title)
 
 
 def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
-    """One row a scale: score where points are now, best match, the chosen cell's window, the tensor."""
-    rows: list[View] = []
+    """One row a scale: which displacement won, which is true, how surely, and the window of one cell."""
+    parts = layout.contents.parts
+    maps: View = rrb.Vertical(
+        *(_volume_row(stage.number, grid, layout) for grid in stage.grids),
+        _map_legends(),
+        row_shares=[1.0] * len(stage.grids) + [0.35],
+        name="Which displacement won" if Part.TENSORS in parts else stage.title,
+    )
+    if Part.TENSORS not in parts:
+        return maps
+    slices = rrb.Vertical(*(_slice_row(stage.number, grid) for grid in stage.grids), name="All displacements")
+    return rrb.Tabs(*([maps] if Part.VOLUMES in parts else []), slices, name=stage.title)
+
+
+def _volume_row(number: int, grid: Grid, layout: Layout) -> View:
+    stride, cell = grid.stride, entities.chosen_cell(number, grid.stride)
+    best = f"1/{stride}: displacement that won, in cells of {stride} px"
+    views: list[View] = [image_view(best, entities.best_match(number, stride), grid, cell)]
+    if layout.has_reference:
+        views.append(image_view(f"1/{stride}: true displacement", entities.true_match(number, stride), grid, cell))
+    peak = f"1/{stride}: how surely, peak probability"
     truth = ", white true" if layout.has_reference else ""
-    for grid in stage.grids:
-        stride = grid.stride
-        score, best = entities.score(stage.number, stride), entities.best_match(stage.number, stride)
-        cell = entities.chosen_cell(stage.number, stride)
-        views: list[View] = [
-            image_view(f"1/{stride}: score where points are now, bright = match", score, grid, cell),
-            image_view(f"1/{stride}: best match after aggregation", best, grid, cell),
-            image_view(f"Red now, green found{truth}", entities.window(stage.number, stride)),
-        ]
-        if layout.detail is Detail.FULL:
-            views.append(
-                tensor_view(f"1/{stride}: whole cost volume, sliders dy dx", entities.cost_volume(stage.number, stride))
-            )
-        rows.append(rrb.Horizontal(*views, column_shares=[3.0, 3.0, 2.0, 3.0][: len(views)]))
-    return rrb.Vertical(*rows, name=stage.title)
+    window = f"Pink cell: red now, green won{truth}"
+    views += [
+        image_view(peak, entities.peak_probability(number, stride), grid, cell),
+        image_view(window, entities.window(number, stride)),
+    ]
+    return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.3])
+
+
+def _slice_row(number: int, grid: Grid) -> View:
+    stride = grid.stride
+    every = f"1/{stride}: a tile for every displacement, dx → dy ↓, steps of {stride} px; bright = probable"
+    return rrb.Horizontal(
+        image_view(every, entities.slices(number, stride)),
+        tensor_view(f"1/{stride}: raw scores, sliders dy dx", entities.cost_volume(number, stride)),
+        tensor_view(f"1/{stride}: probability, sliders dy dx", entities.probability(number, stride)),
+        column_shares=[2.0, 1.0, 1.0],
+    )
 
 
 def hourglass_page(stage: StageLayout) -> View:
-    """One row a scale: the strongest channels before and after aggregation."""
+    """One row a scale: the liveliest channels before and after aggregation."""
     rows = [
         rrb.Horizontal(
             image_view(
-                f"1/{stride}: before the hourglass, 16 liveliest channels",
+                f"1/{stride}: channels that vary most, before the hourglass",
                 entities.hourglass_before(stage.number, stride),
             ),
             image_view(
-                f"1/{stride}: after the hourglass, 16 liveliest channels",
+                f"1/{stride}: after the hourglass, same colour scale as before",
                 entities.hourglass_after(stage.number, stride),
             ),
         )
@@ -148,75 +184,35 @@ def hourglass_page(stage: StageLayout) -> View:
 
 
 def scene_tab(layout: Layout) -> View:
-    """The cloud coloured through both extrinsics, and where each stage believes the camera to be."""
-    start = "miscalibrated" if layout.has_reference else "given"
-    clouds = rrb.Horizontal(
-        scene_view(f"Cloud coloured through the {start} extrinsic", entities.CLOUD_CORRECTED, layout),
-        scene_view("Cloud coloured through the corrected extrinsic", entities.CLOUD_INITIAL, layout),
-    )
-    return rrb.Vertical(clouds, frustum_legend(layout), row_shares=[12.0, 1.0], name="3D")
+    """The cloud coloured through one extrinsic after the other, and where each believes the camera to be."""
+    seen = {layout.start: ("initial", entities.CAMERA_INITIAL)}
+    seen |= {stage.title: (f"stage_{stage.number}", entities.camera_stage(stage.number)) for stage in layout.stages}
+    last = list(seen.values())[-1][0]
+    if layout.has_reference:
+        seen["Reference (truth)"] = ("reference", entities.CAMERA_REFERENCE)
+    truth = [entities.CAMERA_REFERENCE] if layout.has_reference else []
+    cameras = [camera for _, camera in seen.values()]
+    compared = {_lower(layout.start): "initial", "corrected": last} | ({"reference": "reference"} if truth else {})
+    views = [scene_view(f"Coloured through: {name}", part, cameras, layout) for name, part in compared.items()]
+    pages = [
+        scene_view(name, through, list(dict.fromkeys([camera, *truth])), layout)
+        for name, (through, camera) in seen.items()
+    ]
+    return rrb.Tabs(_with_legend(rrb.Horizontal(*views), frustum_legend(layout), "Side by side"), *pages, name="3D")
 
 
-def overlay_view(name: str, points: str) -> rrb.Spatial2DView:
-    """Points over the frame's image."""
-    return rrb.Spatial2DView(origin="/", contents=[f"/{entities.IMAGE}", f"/{points}/**"], name=name)
+def _with_legend(view: View, below: View, name: str) -> View:
+    return rrb.Vertical(view, below, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=name)
 
 
-def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> rrb.Spatial2DView:
-    """A map and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
-    if grid is None:
-        return rrb.Spatial2DView(origin=f"/{path}", name=name)
-    bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))
-    contents = ["$origin/**", *(f"/{mark}" for mark in marks)]
-    return rrb.Spatial2DView(origin=f"/{path}", contents=contents, name=name, visual_bounds=bounds)
-
-
-def legend(name: str, path: str) -> rrb.Spatial2DView:
-    """A static legend."""
-    return rrb.Spatial2DView(origin=f"/{path}", name=name)
-
-
-def frustum_legend(layout: Layout) -> rrb.Spatial2DView:
-    """The names of the frustums in their colours, all in one row."""
-    width = LEGEND_SPACING * (len(layout.stages) + (2 if layout.has_reference else 1))
-    bounds = rrb.VisualBounds2D(x_range=(-LEGEND_SPACING / 2, width - LEGEND_SPACING / 2), y_range=(-8.0, 16.0))
-    return rrb.Spatial2DView(origin=f"/{entities.LEGEND_STAGES}", name="Camera frustums", visual_bounds=bounds)
-
-
-def tensor_view(name: str, path: str) -> rrb.TensorView:
-    """A cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
-    return rrb.TensorView(
-        origin=f"/{path}",
-        name=name,
-        slice_selection=rrb.TensorSliceSelection(width=3, height=2, slider=[0, 1]),
-        scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="nearest"),
-        view_fit="FillKeepAspectRatio",
-    )
-
-
-def scene_view(name: str, without: str, layout: Layout) -> rrb.Spatial3DView:
-    """The scene seen over the camera's shoulder, without one of the clouds."""
-    return rrb.Spatial3DView(
-        origin=f"/{entities.WORLD}",
-        contents=["$origin/**", f"- /{without}"],
-        name=name,
-        eye_controls=rrb.EyeControls3D(
-            position=_seen_from(layout, ahead=-6.0, left=2.0, up=2.8),
-            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-0.5),
-            eye_up=(0.0, 0.0, 1.0),
+def _map_legends() -> View:
+    """Colours of displacements and of certainty."""
+    return rrb.Horizontal(
+        rrb.Spatial2DView(
+            origin=f"/{entities.LEGEND_DISPLACEMENT}", name="Displacement: hue = direction, white = none"
         ),
-        line_grid=rrb.LineGrid3D(visible=False),
-        background=SCENE_BACKGROUND,
-        defaults=[rr.TransformAxes3D(0.0)],
+        rrb.Spatial2DView(origin=f"/{entities.LEGEND_CERTAINTY}", name="Probability and confidence"),
     )
-
-
-def _seen_from(layout: Layout, ahead: float, left: float, up: float) -> Vector:
-    """A place in the LiDAR frame, given in metres from the camera along its heading."""
-    (x, y, z), (dx, dy, _) = layout.position, layout.forward
-    length = math.hypot(dx, dy) or 1.0
-    dx, dy = dx / length, dy / length
-    return x + ahead * dx - left * dy, y + ahead * dy + left * dx, z + up
 
 
 def _lower(title: str) -> str:

@@ -1,46 +1,84 @@
-"""Feature maps as one picture: the liveliest channels side by side."""
+"""Many small maps as one picture with a palette: activations by channel, volume slices by displacement."""
 
 from __future__ import annotations
 
 import io
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from inspector.colors import VIRIDIS
+from inspector.colors import EMPTY, VIRIDIS
 
-CHANNELS: Final = 16
+CHANNELS: Final = 8
 """Channels shown at most: those that vary most."""
 COLUMNS: Final = 4
+TILE_WIDTH: Final = 64
+"""Least width of a tile in pixels: coarse maps are magnified to it."""
+HEADER: Final = 9
+"""Height of a channel's number above its tile."""
+GAP, TEXT = 0, 255
+"""Palette entries that are no level."""
+LOWEST, HIGHEST = 1, 254
+PALETTE: Final = np.concatenate([[EMPTY], VIRIDIS[LOWEST : HIGHEST + 1], [(255, 255, 255)]]).astype(np.uint8)
 
 
-def channel_grid(activations: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Lay out ``[C, h, w]`` activations, `COLUMNS` maps a row, each stretched to its own contrast.
+def liveliest_channels(activations: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Numbers, ascending, of the `CHANNELS` channels of ``[C, h, w]`` that vary most; none that is constant."""
+    spread = np.nan_to_num(activations.astype(np.float32)).std(axis=(1, 2))
+    liveliest = np.argsort(-spread, kind="stable")[:CHANNELS]
+    varying = liveliest[spread[liveliest] > 0]
+    return np.sort(varying if varying.size else liveliest[:1])
+
+
+def channel_grid(activations: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
+    """Lay out the liveliest of ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each.
+
+    Args:
+        activations: maps of any size.
+        low: value of the darkest colour.
+        high: value of the brightest.
 
     Returns:
-        ``[H, W]`` uint8 levels, 0 in the gaps of one pixel between the maps.
+        ``[H, W]`` uint8 entries of `PALETTE`.
     """
-    maps = np.nan_to_num(activations.astype(np.float32))
-    liveliest = np.argsort(-maps.std(axis=(1, 2)), kind="stable")[:CHANNELS]
-    maps = maps[liveliest]
-    low = maps.min(axis=(1, 2), keepdims=True)
-    span = np.maximum(maps.max(axis=(1, 2), keepdims=True) - low, 1e-6)
-    tiles = (255.0 * (maps - low) / span).astype(np.uint8)
-    count, height, width = tiles.shape
-    rows = -(-count // COLUMNS)
-    grid = np.zeros((rows * (height + 1) - 1, COLUMNS * (width + 1) - 1), dtype=np.uint8)
-    for position, tile in enumerate(tiles):
-        top, left = (position // COLUMNS) * (height + 1), (position % COLUMNS) * (width + 1)
-        grid[top : top + height, left : left + width] = tile
+    channels = liveliest_channels(activations)
+    scale = max(1, TILE_WIDTH // activations.shape[2])
+    tiles = levels(activations[channels], low, high).repeat(scale, axis=1).repeat(scale, axis=2)
+    _, height, width = tiles.shape
+    rows = -(-len(tiles) // COLUMNS)
+    grid = np.full((rows * (height + HEADER), COLUMNS * (width + 2) - 2), GAP, dtype=np.uint8)
+    for position, (channel, tile) in enumerate(zip(channels, tiles, strict=True)):
+        top, left = (position // COLUMNS) * (height + HEADER), (position % COLUMNS) * (width + 2)
+        cv2.putText(grid, str(channel), (left + 1, top + HEADER - 2), cv2.FONT_HERSHEY_PLAIN, 0.6, TEXT)
+        grid[top + HEADER : top + HEADER + height, left : left + width] = tile
     return grid
 
 
-def channel_grid_png(activations: NDArray[np.floating]) -> bytes:
-    """The grid in viridis, as a PNG with a palette: lossless, and one byte a cell before deflation."""
-    picture = Image.fromarray(channel_grid(activations))
-    picture.putpalette(VIRIDIS.tobytes())
+def slice_grid(volume: NDArray[np.floating], occupied: NDArray[np.bool_], high: float) -> NDArray[np.uint8]:
+    """All slices of a volume ``[Dy, Dx, h, w]`` side by side, ``dx`` to the right and ``dy`` down.
+
+    Returns:
+        ``[Dy (h + 1), Dx (w + 1)]`` uint8 entries of `PALETTE`; cells without a LiDAR point are empty.
+    """
+    tiles = np.where(occupied, levels(volume, 0.0, high), GAP).astype(np.uint8)
+    padded = np.pad(tiles, ((0, 0), (0, 0), (0, 1), (0, 1)), constant_values=GAP)
+    across, down = volume.shape[1] * padded.shape[3], volume.shape[0] * padded.shape[2]
+    return padded.transpose(0, 2, 1, 3).reshape(down, across)
+
+
+def levels(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
+    """Palette entries `LOWEST` to `HIGHEST` of values from ``low`` to ``high``, same shape."""
+    share = np.clip((np.nan_to_num(values.astype(np.float32)) - low) / max(high - low, 1e-6), 0.0, 1.0)
+    return (LOWEST + (HIGHEST - LOWEST) * share).astype(np.uint8)
+
+
+def palette_png(grid: NDArray[np.uint8]) -> bytes:
+    """The picture as PNG with a palette: lossless, one byte a cell before deflation."""
+    picture = Image.fromarray(grid)
+    picture.putpalette(PALETTE.tobytes())
     encoded = io.BytesIO()
-    picture.save(encoded, format="png")
+    picture.save(encoded, format="png", compress_level=3)
     return encoded.getvalue()

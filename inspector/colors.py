@@ -12,10 +12,17 @@ Rgb = tuple[int, int, int]
 
 NEAR_M: Final = 3.0
 FAR_M: Final = 80.0
-EMPTY: Final[Rgb] = (34, 34, 40)
+EMPTY: Final[Rgb] = (62, 63, 72)
 """Cells that hold no LiDAR point."""
+EDGE: Final[Rgb] = (255, 60, 220)
+"""Points at depth discontinuities: a colour that streets and cars do not have."""
+REST: Final[Rgb] = (120, 170, 190)
+"""The other points, beside `EDGE`."""
+WORST_PX: Final = 20.0
+"""Displacement against the reference that is fully red."""
 INITIAL: Final[Rgb] = (255, 75, 75)
 REFERENCE: Final[Rgb] = (255, 255, 255)
+LIMIT: Final[Rgb] = (150, 150, 150)
 FOUND: Final[Rgb] = (90, 255, 120)
 STAGES: Final[dict[int, Rgb]] = {
     1: (255, 140, 40),
@@ -44,6 +51,13 @@ def depth_colors(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
     return colors
 
 
+def error_colors(displacement: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Turbo from blue, in place, to red, `WORST_PX` pixels off or more; ``[...]`` to ``[..., 3]`` uint8 RGB."""
+    level = np.clip(displacement / WORST_PX, 0.0, 1.0)
+    colors: NDArray[np.uint8] = TURBO[(25 + 215 * level).astype(np.intp)]
+    return colors
+
+
 def flow_colors(displacement: NDArray[np.floating] | NDArray[np.integer], reach: float) -> NDArray[np.uint8]:
     """Hue by direction, saturation by the square root of length; white = none.
 
@@ -62,6 +76,11 @@ def flow_colors(displacement: NDArray[np.floating] | NDArray[np.integer], reach:
     rgb = cv2.cvtColor(hsv[None], cv2.COLOR_HSV2RGB)[0]
     colors: NDArray[np.uint8] = (255.0 * rgb).round().astype(np.uint8).reshape(*shape, 3)
     return colors
+
+
+def certainty_colors(values: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Viridis on the square root of a probability or confidence, 0 dark to 1 bright, so that small ones differ."""
+    return map_colors(np.sqrt(np.clip(values.astype(np.float32), 0.0, 1.0)), 0.0, 1.0)
 
 
 def map_colors(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:

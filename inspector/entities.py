@@ -30,11 +30,11 @@ OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
 OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
 OVERLAY_CURRENT = "overlay/current"
-OVERLAY_CAPTION = "overlay/current/caption"
 
 WORLD = "world"
-CLOUD_INITIAL = "world/cloud/initial"
-CLOUD_CORRECTED = "world/cloud/corrected"
+CLOUD = "world/cloud"
+"""Positions, once a frame, and colours through every extrinsic: components of the archetype `COLORS_THROUGH`."""
+COLORS_THROUGH = "colors_through"
 LIDAR = "world/lidar"
 CAMERA_INITIAL = "world/camera/initial"
 CAMERA_REFERENCE = "world/camera/reference"
@@ -46,8 +46,10 @@ CAMERA = "extrinsic/camera"
 MATRIX = "camera_from_lidar"
 """Component of the extrinsics: 16 float64 row by row, exactly what the run computed."""
 
-LEGEND_DEPTH = "legend/depth"
+LEGEND_POINTS = "legend/points"
+"""What the colours of the overlays' points stand for."""
 LEGEND_DISPLACEMENT = "legend/displacement"
+LEGEND_CERTAINTY = "legend/certainty"
 LEGEND_STAGES = "legend/stages"
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
@@ -61,6 +63,11 @@ ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 def overlay_stage(number: int) -> str:
     """Points over the image after a stage."""
     return f"overlay/stage_{number}"
+
+
+def caption(overlay: str) -> str:
+    """Which extrinsic an overlay shows and how far off it is, written into the picture."""
+    return f"{overlay}/caption"
 
 
 def camera_stage(number: int) -> str:
@@ -88,6 +95,11 @@ def error_corrected(kind: str) -> str:
     return f"error/{kind}/corrected"
 
 
+def error_limit(kind: str) -> str:
+    """The bound of the success rate, as a curve to hold the others against."""
+    return f"error/{kind}/limit"
+
+
 def displacement(stage: int) -> str:
     """Where the network moves the LiDAR cells, as a map of flow colours."""
     return f"stage_{stage}/displacement"
@@ -113,14 +125,29 @@ def probability(stage: int, stride: int) -> str:
     return f"stage_{stage}/scale_{stride}/probability"
 
 
-def score(stage: int, stride: int) -> str:
-    """Slice of the cost volume at the window's centre: how well points match where they are now."""
-    return f"stage_{stage}/scale_{stride}/score_at_centre"
-
-
 def best_match(stage: int, stride: int) -> str:
     """Displacement of the most probable cell, as flow colours."""
     return f"stage_{stage}/scale_{stride}/best_match"
+
+
+def true_match(stage: int, stride: int) -> str:
+    """Displacement to where the reference puts each cell's point, as flow colours."""
+    return f"stage_{stage}/scale_{stride}/true_match"
+
+
+def peak_probability(stage: int, stride: int) -> str:
+    """Probability of the best match: how sure each cell is."""
+    return f"stage_{stage}/scale_{stride}/peak_probability"
+
+
+def slices(stage: int, stride: int) -> str:
+    """All slices of the aggregated volume side by side, one for every displacement."""
+    return f"stage_{stage}/scale_{stride}/slices"
+
+
+def slice_marks(stage: int, stride: int) -> str:
+    """Frames around the slice that won most cells and the one that holds the true displacement; axis labels."""
+    return f"{slices(stage, stride)}/marks"
 
 
 def window(stage: int, stride: int) -> str:
@@ -139,7 +166,7 @@ def window_truth(stage: int, stride: int) -> str:
 
 
 def chosen_cell(stage: int, stride: int) -> str:
-    """A frame around the chosen cell, drawn over both slices."""
+    """A frame around the chosen cell, drawn over the maps."""
     return f"stage_{stage}/scale_{stride}/chosen_cell"
 
 

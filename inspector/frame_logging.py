@@ -9,69 +9,90 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from inspector import colors, entities
-from inspector.observation import Detail, Layout, Observation
+from inspector.contents import Contents, Part
+from inspector.observation import Layout, Observation
 from inspector.overlay import Overlay, Thinning, make_overlay
+from inspector.painting import make_painter
 from inspector.table import stage_table
 
 JPEG_QUALITY = 85
-THINNING = {Detail.OVERVIEW: Thinning(cells_across=140, pixel=1.0), Detail.FULL: Thinning(cells_across=260, pixel=0.25)}
-"""Overview keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
+SUCCESS = {"rotation": 1.0, "translation": 2.5}
+"""Bounds of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
+SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=220, pixel=0.25)
+"""Sparse keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
 
 
-def log_frame(rec: rr.RecordingStream, observation: Observation, detail: Detail) -> None:
+def log_frame(rec: rr.RecordingStream, observation: Observation, contents: Contents) -> None:
     """Log the image, all overlays, the errors, the extrinsics and the table of one frame.
 
     The timelines ``frame`` and ``time`` must be set; ``step`` is set here: everything belongs to
     the frame's step 0, except `entities.OVERLAY_CURRENT`, which has one row a stage.
     """
-    frame, trace = observation.frame, observation.trace
-    first_step = frame.index * entities.STEPS_PER_FRAME
-    rec.set_time(entities.STEP, sequence=first_step)
+    frame = observation.frame
+    rec.set_time(entities.STEP, sequence=frame.index * entities.STEPS_PER_FRAME)
     rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
-    rec.log(entities.TABLE, rr.TextDocument(stage_table(observation), media_type=rr.MediaType.MARKDOWN))
-    _log_errors(rec, observation)
+    table = stage_table(observation, Part.OVERLAYS in contents.parts)
+    rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
+    if Part.CURVES in contents.parts:
+        _log_errors(rec, observation)
     _log_extrinsics(rec, observation)
+    _log_overlays(rec, observation, contents)
+
+
+def _log_overlays(rec: rr.RecordingStream, observation: Observation, contents: Contents) -> None:
+    """The points over the image under every extrinsic; the current one walks through the stages on ``step``."""
+    frame, trace = observation.frame, observation.trace
+    thinning, paint = DENSE if contents.dense else SPARSE, make_painter(observation, contents.color)
 
     def overlay(camera_from_lidar: NDArray[np.float64]) -> Overlay:
-        return make_overlay(frame, camera_from_lidar, THINNING[detail])
+        return make_overlay(frame, camera_from_lidar, thinning, paint)
 
-    miscalibrated = overlay(trace.initial)
-    after_stage = {stage.number: overlay(stage.after) for stage in trace.stages}
-    corrected = after_stage[trace.stages[-1].number] if trace.stages else miscalibrated
-    rec.log(entities.OVERLAY_MISCALIBRATED, miscalibrated.archetype())
-    rec.log(entities.OVERLAY_CORRECTED, corrected.archetype())
+    def log(path: str, points: Overlay, name: str, camera_from_lidar: NDArray[np.float64]) -> None:
+        rec.log(path, points.archetype())
+        _log_caption(rec, observation, path, name, camera_from_lidar)
+
+    start = "as given" if observation.reference is None else "miscalibrated"
+    initial = overlay(trace.initial)
+    log(entities.OVERLAY_MISCALIBRATED, initial, start, trace.initial)
     if observation.reference is not None:
-        rec.log(entities.OVERLAY_REFERENCE, overlay(observation.reference).archetype())
-    rec.log(entities.OVERLAY_CURRENT, miscalibrated.archetype())
-    _log_caption(rec, observation, "start" if observation.reference is None else "miscalibrated", trace.initial)
+        log(entities.OVERLAY_REFERENCE, overlay(observation.reference), "reference", observation.reference)
+    if Part.OVERLAYS not in contents.parts:
+        log(entities.OVERLAY_CORRECTED, overlay(trace.corrected), "corrected", trace.corrected)
+        return
+    log(entities.OVERLAY_CURRENT, initial, start, trace.initial)
+    points, first_step = initial, frame.index * entities.STEPS_PER_FRAME
     for stage in trace.stages:
-        points = after_stage[stage.number]
-        rec.log(entities.overlay_stage(stage.number), points.archetype())
+        points, name = overlay(stage.after), f"after stage {stage.number}"
+        log(entities.overlay_stage(stage.number), points, name, stage.after)
         rec.set_time(entities.STEP, sequence=first_step + stage.number)
-        rec.log(entities.OVERLAY_CURRENT, points.archetype())
-        _log_caption(rec, observation, f"after stage {stage.number}", stage.after)
+        log(entities.OVERLAY_CURRENT, points, name, stage.after)
         rec.set_time(entities.STEP, sequence=first_step)
+    log(entities.OVERLAY_CORRECTED, points, "corrected", trace.corrected)
 
 
 def _log_caption(
-    rec: rr.RecordingStream, observation: Observation, state: str, camera_from_lidar: NDArray[np.float64]
+    rec: rr.RecordingStream, observation: Observation, overlay: str, name: str, camera_from_lidar: NDArray[np.float64]
 ) -> None:
-    """Write into the picture which stage `entities.OVERLAY_CURRENT` shows, and how far off it is."""
+    """Write into the picture which extrinsic it shows, and how far off that is."""
     error = observation.error(camera_from_lidar)
-    figures = "" if error is None else f": {error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
-    width = observation.frame.camera.width
-    rec.log(
-        entities.OVERLAY_CAPTION,
-        rr.Points2D(
-            [[width / 2, 0.0]], labels=f"{state}{figures}", colors=colors.REFERENCE, radii=0.0, show_labels=True
-        ),
+    off = error is not None and name != "reference"
+    figures = f": {error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off" if off and error else ""
+    caption = rr.Points2D(
+        [[observation.frame.camera.width / 2, 0.0]],
+        labels=f"{name}{figures}",
+        colors=colors.REFERENCE,
+        radii=0.0,
+        show_labels=True,
     )
+    rec.log(entities.caption(overlay), caption)
 
 
 def _log_errors(rec: rr.RecordingStream, observation: Observation) -> None:
     """Rotation in degrees and translation in centimetres, initial and after every stage."""
     trace = observation.trace
     for kind in entities.ERROR_KINDS:
+        if observation.reference is not None:
+            rec.log(entities.error_limit(kind), rr.Scalars(SUCCESS[kind]))
         paths = {entities.error_initial(kind): trace.initial, entities.error_corrected(kind): trace.corrected}
         paths |= {entities.error_stage(kind, stage.number): stage.after for stage in trace.stages}
         for path, camera_from_lidar in paths.items():
@@ -100,13 +121,14 @@ def _log_extrinsics(rec: rr.RecordingStream, observation: Observation) -> None:
 
 def log_curve_styles(rec: rr.RecordingStream, layout: Layout) -> None:
     """Name and colour the error curves, once for the recording."""
-    if not layout.has_reference:
+    if not layout.has_reference or Part.CURVES not in layout.contents.parts:
         return
-    for kind in entities.ERROR_KINDS:
+    for kind, unit in entities.ERROR_KINDS.items():
         curves = {entities.error_initial(kind): ("miscalibrated", colors.INITIAL)}
         for stage in layout.stages:
-            name = f"after {stage.title.lower()}"
-            curves[entities.error_stage(kind, stage.number)] = (name, colors.STAGES[stage.number])
+            curves[entities.error_stage(kind, stage.number)] = (stage.short.lower(), colors.STAGES[stage.number])
+        limit = f"success: below {SUCCESS[kind]:g} {unit}"
+        rec.log(entities.error_limit(kind), rr.SeriesLines(names=limit, colors=colors.LIMIT, widths=1.5), static=True)
         for path, (name, color) in curves.items():
             rec.log(
                 path,

@@ -1,15 +1,54 @@
-"""The cell that the cost-volume views point at, and where it truly belongs."""
+"""Where a stage's cells start and truly belong, and the one cell whose search window is shown."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from calibnet.geometry import project
-from calibnet.geometry.projection import nearest_per_cell
+from calibnet.geometry import PinholeCamera, project
+from calibnet.geometry.projection import Projection, nearest_per_cell
 from calibnet.trace import StageDetail, StageTrace
 from inspector.observation import Observation
+
+
+@dataclass(frozen=True, eq=False)
+class StartingPoints:
+    """The scan in the network's image before a stage.
+
+    Attributes:
+        camera: the network's.
+        projection: of the scan with the extrinsic that the stage starts from.
+        displacement: ``[M, 2]`` float32 pixels ``(dx, dy)`` to where the reference puts each point; None without one.
+    """
+
+    camera: PinholeCamera
+    projection: Projection = field(repr=False)
+    displacement: NDArray[np.float32] | None = field(repr=False)
+
+    @classmethod
+    def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
+        """Project the scan as the stage found it."""
+        camera, reference = observation.trace.camera, observation.reference
+        projection = project(observation.frame.points, stage.before, camera)
+        if reference is None:
+            return cls(camera, projection, None)
+        points = observation.frame.points[projection.index, :3]
+        true = (points @ reference[:3, :3].T + reference[:3, 3]) @ camera.matrix.T
+        ahead = np.maximum(true[:, 2:], 1e-3)  # what is behind the true camera is off by a lot, whatever the figure
+        return cls(camera, projection, (true[:, :2] / ahead - projection.pixels).astype(np.float32))
+
+    def nearest(self, stride: int) -> NDArray[np.int64]:
+        """``[h, w]``: row of the nearest point of each cell, -1 where there is none."""
+        return nearest_per_cell(self.projection, self.camera, stride)
+
+    def true_field(self, stride: int) -> NDArray[np.float32] | None:
+        """``[h, w, 2]`` pixels: the true displacement of each cell's nearest point, 0 in empty cells."""
+        if self.displacement is None:
+            return None
+        winner = self.nearest(stride)
+        return np.where((winner >= 0)[..., None], self.displacement[winner], np.float32(0.0))
 
 
 @dataclass(frozen=True)
@@ -29,15 +68,13 @@ class Match:
         return int((self.pixel[0] + 0.5) // stride), int((self.pixel[1] + 0.5) // stride)
 
 
-def chosen_match(observation: Observation, stage: StageTrace, results: StageDetail) -> Match | None:
+def chosen_match(points: StartingPoints, results: StageDetail) -> Match | None:
     """The nearest point of the cell the stage is surest of; None if no cell holds a point.
 
     Cells whose search window reaches over the image's border are passed over where others exist.
     """
     finest = results.scales[0]
-    camera = observation.trace.camera
-    projection = project(observation.frame.points, stage.before, camera)
-    winner = nearest_per_cell(projection, camera, finest.stride)
+    winner = points.nearest(finest.stride)
     candidates = (winner >= 0) & finest.occupied
     inner = np.zeros_like(candidates)
     margin_y, margin_x = finest.volume.shape[0] // 2, finest.volume.shape[1] // 2
@@ -48,10 +85,9 @@ def chosen_match(observation: Observation, stage: StageTrace, results: StageDeta
         return None
     surest = int(np.argmax(np.where(candidates, results.confidence, -1.0)))
     point = winner.reshape(-1)[surest]
-    u, v = (float(value) for value in projection.pixels[point])
-    if observation.reference is None:
-        return Match((u, v), None)
-    scan_row = projection.index[point]
-    in_reference = observation.reference @ np.append(observation.frame.points[scan_row, :3], 1.0)
-    true_u, true_v = (camera.matrix @ in_reference[:3])[:2] / in_reference[2]
-    return Match((u, v), (float(true_u) - u, float(true_v) - v))
+    true = None if points.displacement is None else _pair(points.displacement[point])
+    return Match(_pair(points.projection.pixels[point]), true)
+
+
+def _pair(values: NDArray[np.float32]) -> tuple[float, float]:
+    return float(values[0]), float(values[1])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import PoseError, invert, pose_error
 from calibnet.trace import CascadeTrace
+from inspector.contents import Contents
 
 Vector = tuple[float, float, float]
 
@@ -28,13 +28,6 @@ class Skipped(Protocol):
     def reason(self) -> str:
         """One sentence that names the stage."""
         ...
-
-
-class Detail(StrEnum):
-    """How much of each frame is logged."""
-
-    OVERVIEW = "overview"
-    FULL = "full"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +74,11 @@ class StageLayout:
     grids: tuple[Grid, ...]
 
     @property
+    def short(self) -> str:
+        """For legends and tabs."""
+        return f"Stage {self.number}"
+
+    @property
     def title(self) -> str:
         """For view names, for instance ``"Stage 3 (±5°/0.5 m)"``."""
         degrees, metres = self.range.split("/")
@@ -94,21 +92,26 @@ class Layout:
     Attributes:
         stages: those that ran.
         has_reference: whether errors and a reference overlay exist.
-        detail: how much is logged.
-        aspect: width of the image over its height.
+        contents: what is logged of each frame.
+        image: width and height of the first frame's image, in pixels.
         position: of the camera in the LiDAR frame, metres.
         forward: its viewing direction there, of unit length.
     """
 
     stages: tuple[StageLayout, ...]
     has_reference: bool
-    detail: Detail
-    aspect: float = 3.3
+    contents: Contents
+    image: tuple[int, int] = (1242, 375)
     position: Vector = (0.0, 0.0, 0.0)
     forward: Vector = (1.0, 0.0, 0.0)
 
+    @property
+    def start(self) -> str:
+        """What the extrinsic before the first stage is called."""
+        return "Miscalibrated" if self.has_reference else "As given"
+
     @classmethod
-    def of(cls, observation: Observation, detail: Detail) -> Layout:
+    def of(cls, observation: Observation, contents: Contents) -> Layout:
         """The layout of a recording that starts with this observation."""
         stages = tuple(
             StageLayout(
@@ -125,8 +128,8 @@ class Layout:
         return cls(
             stages,
             observation.reference is not None,
-            detail,
-            camera.width / camera.height,
+            contents,
+            (camera.width, camera.height),
             _vector(lidar_from_camera[:3, 3]),
             _vector(lidar_from_camera[:3, 2]),
         )

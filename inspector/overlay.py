@@ -1,4 +1,4 @@
-"""LiDAR points over the image: projected, thinned by a z-buffer and coloured by depth."""
+"""LiDAR points over the image: projected, thinned by a z-buffer and painted."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import project
 from calibnet.geometry.projection import nearest_per_cell
-from inspector.colors import depth_colors
-
-POINT_SIZE = 1.1
-"""Radius in points of the screen, so that zooming separates the points instead of growing them."""
+from inspector.painting import Painter, paint_depth
 
 
 @dataclass(frozen=True)
@@ -37,23 +34,29 @@ class Overlay:
     Attributes:
         pixels: ``[M, 2]`` float32, ``(u, v)``.
         colors: ``[M, 3]`` uint8.
+        sizes: ``[M]`` float32, radii in points of the screen.
     """
 
     pixels: NDArray[np.float32] = field(repr=False)
     colors: NDArray[np.uint8] = field(repr=False)
+    sizes: NDArray[np.float32] = field(repr=False)
 
     def archetype(self) -> rr.Points2D:
         """The points as Rerun draws them: half a pixel on, since its pixel centres are at x.5."""
-        return rr.Points2D(self.pixels + 0.5, colors=self.colors, radii=rr.Radius.ui_points(POINT_SIZE))
+        sizes = self.sizes[:1] if len(np.unique(self.sizes)) < 2 else self.sizes
+        return rr.Points2D(self.pixels + 0.5, colors=self.colors, radii=rr.Radius.ui_points(sizes))
 
 
-def make_overlay(frame: Frame, camera_from_lidar: NDArray[np.float64], thinning: Thinning) -> Overlay:
+def make_overlay(
+    frame: Frame, camera_from_lidar: NDArray[np.float64], thinning: Thinning, paint: Painter = paint_depth
+) -> Overlay:
     """Project a frame's scan with an extrinsic; the nearest point of each cell stays.
 
     Args:
         frame: image, scan and camera.
         camera_from_lidar: the extrinsic to show.
         thinning: how many points to keep.
+        paint: gives the points their colours and sizes.
     """
     projection = project(frame.points, camera_from_lidar, frame.camera)
     stride = max(1, round(frame.camera.width / thinning.cells_across))
@@ -61,4 +64,5 @@ def make_overlay(frame: Frame, camera_from_lidar: NDArray[np.float64], thinning:
     kept = winner[winner >= 0]
     far_to_near = kept[np.argsort(-projection.depth[kept], kind="stable")]
     pixels = np.round(projection.pixels[far_to_near] / thinning.pixel) * thinning.pixel
-    return Overlay(pixels.astype(np.float32), depth_colors(projection.depth[far_to_near]))
+    colors, sizes = paint(projection, far_to_near)
+    return Overlay(pixels.astype(np.float32), colors, sizes)

@@ -16,14 +16,15 @@ import rerun as rr
 
 from inspector import entities
 from inspector.blueprint import make_blueprint
+from inspector.contents import Part
 from inspector.frame_logging import log_curve_styles, log_frame
 from inspector.legends import log_legends
-from inspector.observation import Detail, Layout, Observation
+from inspector.observation import Layout, Observation
 from inspector.scene_logging import log_scene, log_scene_frame
 from inspector.stage_logging import log_stages
 from inspector.stream import Stream
 
-FLUSH_EVERY = {Detail.OVERVIEW: (4, 32), Detail.FULL: (1, 12)}
+FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
 """Fewest and most frames between two flushes; a kill loses at most these.
 
 A flush writes one chunk an entity. Each costs 3 kB of file, much beside a small frame, and some of
@@ -65,15 +66,16 @@ class Recording:
             description: identifies the run.
             layout: what the recording will contain.
         """
-        self._detail: Detail = layout.detail
+        self._contents = layout.contents
         self._frames = self._unflushed = 0
         self._stream = Stream(
             entities.APPLICATION_ID, description.recording_id, description.title, sinks, make_blueprint(layout)
         )
         self._rec = self._stream.rec
         self._rec.send_property(entities.RUN, rr.AnyValues(**description.options))
-        self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_contents(layout)))
-        log_scene_frame(self._rec)
+        self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_described(layout)))
+        if Part.SCENE in layout.contents.parts:
+            log_scene_frame(self._rec)
         log_legends(self._rec, layout)
         log_curve_styles(self._rec, layout)
         self._stream.flush()  # a recording that is cut off anywhere later can still be read
@@ -83,12 +85,12 @@ class Recording:
         frame = observation.frame
         self._rec.set_time(entities.FRAME, sequence=frame.index)
         self._rec.set_time(entities.TIME, duration=frame.timestamp)
-        log_frame(self._rec, observation, self._detail)
-        log_stages(self._rec, observation, self._detail)
-        log_scene(self._rec, observation, self._detail)
+        log_frame(self._rec, observation, self._contents)
+        log_stages(self._rec, observation, self._contents)
+        log_scene(self._rec, observation, self._contents)
         self._frames += 1
         self._unflushed += 1
-        fewest, most = FLUSH_EVERY[self._detail]
+        fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
             self._unflushed = 0
             self._stream.flush()
@@ -104,7 +106,7 @@ class Recording:
         self.close()
 
 
-def _contents(layout: Layout) -> dict[str, Any]:
+def _described(layout: Layout) -> dict[str, Any]:
     """What the recording contains, for readers that have no layout.
 
     Names are not those of any option: Rerun keeps one type a name in a process.

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import PinholeCamera, invert, project
 from inspector import colors, entities
-from inspector.observation import Detail, Observation
+from inspector.contents import Contents, Part
+from inspector.observation import Observation
 
-POINTS = {Detail.OVERVIEW: 5_000, Detail.FULL: 30_000}
+SPARSE, DENSE = 5_000, 30_000
 SEEN_SHARE = 0.8
 OUTSIDE = (70, 72, 80)
 """Points that the camera does not see."""
-POINT_SIZE = 1.8
-FRUSTUM_LENGTH_M = 2.5
+POINT_SIZE = 1.6
+FRUSTUM_LENGTH_M = 1.2
 RANGE_M = 80.0
 
 
@@ -30,18 +31,26 @@ def log_scene_frame(rec: rr.RecordingStream) -> None:
     rec.log(entities.LIDAR, rr.TransformAxes3D(0.5), rr.Transform3D(), static=True)
 
 
-def log_scene(rec: rr.RecordingStream, observation: Observation, detail: Detail) -> None:
-    """Log both clouds and all frustums of one frame."""
+def log_scene(rec: rr.RecordingStream, observation: Observation, contents: Contents) -> None:
+    """Log the cloud, its colours through every extrinsic, and all frustums of one frame."""
+    if Part.SCENE not in contents.parts:
+        return
     frame, trace = observation.frame, observation.trace
-    points = _subsample(observation, POINTS[detail])
-    rec.log(entities.CLOUD_INITIAL, _colored(frame, points, trace.initial))
-    rec.log(entities.CLOUD_CORRECTED, _colored(frame, points, trace.corrected))
-    _log_camera(rec, entities.CAMERA_INITIAL, trace.initial, frame.camera, colors.INITIAL)
+    extrinsics = {"initial": (entities.CAMERA_INITIAL, trace.initial, colors.INITIAL)}
     for stage in trace.stages:
-        color = colors.STAGES[stage.number]
-        _log_camera(rec, entities.camera_stage(stage.number), stage.after, frame.camera, color)
+        path = entities.camera_stage(stage.number)
+        extrinsics[f"stage_{stage.number}"] = (path, stage.after, colors.STAGES[stage.number])
     if observation.reference is not None:
-        _log_camera(rec, entities.CAMERA_REFERENCE, observation.reference, frame.camera, colors.REFERENCE)
+        extrinsics["reference"] = (entities.CAMERA_REFERENCE, observation.reference, colors.REFERENCE)
+    points = _subsample(observation, DENSE if contents.dense else SPARSE)
+    rec.log(entities.CLOUD, rr.Points3D(points[:, :3], radii=rr.Radius.ui_points(POINT_SIZE)))
+    through = {
+        name: rr.components.ColorBatch(_seen_colors(frame, points, camera_from_lidar))
+        for name, (_, camera_from_lidar, _) in extrinsics.items()
+    }
+    rec.log(entities.CLOUD, rr.DynamicArchetype(archetype=entities.COLORS_THROUGH, components=through))
+    for path, camera_from_lidar, color in extrinsics.values():
+        _log_camera(rec, path, camera_from_lidar, frame.camera, color)
 
 
 def _subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
@@ -62,14 +71,16 @@ def _evenly(rows: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
     return rows[:: max(1, -(-len(rows) // limit))]
 
 
-def _colored(frame: Frame, points: NDArray[np.float32], camera_from_lidar: NDArray[np.float64]) -> rr.Points3D:
-    """Points with the colour of the pixel they fall on, grey where they fall on none."""
+def _seen_colors(
+    frame: Frame, points: NDArray[np.float32], camera_from_lidar: NDArray[np.float64]
+) -> NDArray[np.uint8]:
+    """``[M, 3]``: the colour of the pixel that each point falls on, grey where it falls on none."""
     projection = project(points, camera_from_lidar, frame.camera)
     rgb = np.full((len(points), 3), OUTSIDE, dtype=np.uint8)
     u, v = np.rint(projection.pixels).astype(np.intp).T
     height, width = frame.image.shape[:2]
     rgb[projection.index] = frame.image[np.minimum(v, height - 1), np.minimum(u, width - 1)]
-    return rr.Points3D(points[:, :3], colors=rgb, radii=rr.Radius.ui_points(POINT_SIZE))
+    return rgb
 
 
 def _log_camera(
@@ -89,6 +100,6 @@ def _log_camera(
             camera_xyz=rr.ViewCoordinates.RDF,
             image_plane_distance=FRUSTUM_LENGTH_M,
             color=color,
-            line_width=-2.0,
+            line_width=-1.5,
         ),
     )

@@ -24,7 +24,8 @@ from calibnet.datasets.frame import Frame, Sequence
 from calibnet.errors import CalibnetError
 from calibnet.interruption import StopRequest
 from calibnet.trace import CascadeTrace
-from inspector.observation import Detail, Layout, Observation, Skipped
+from inspector.contents import Contents
+from inspector.observation import Layout, Observation, Skipped
 from inspector.outputs import Outputs
 from inspector.recording import Recording, RunDescription
 from inspector.start import Start
@@ -57,7 +58,7 @@ class Session:
         start: where each calibration starts.
         outputs: where the recording goes.
         description: what the recording says about itself.
-        detail: how much is logged.
+        contents: what is logged of each frame.
         console: where progress is shown.
     """
 
@@ -67,7 +68,7 @@ class Session:
     start: Start
     outputs: Outputs
     description: RunDescription
-    detail: Detail
+    contents: Contents
     console: Console
 
     def run(self) -> Summary:
@@ -90,7 +91,7 @@ class Session:
                         break
                     observation = self._observe(position)
                     if recording is None:
-                        layout = Layout.of(observation, self.detail)
+                        layout = Layout.of(observation, self.contents)
                         recording = Recording(self.outputs.open(), self.description, layout)
                     self.outputs.check_space()
                     recording.log(observation)
@@ -106,7 +107,7 @@ class Session:
 
     def _observe(self, position: int) -> Observation:
         frame = self.sequence[position]
-        trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=True)
+        trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
         return Observation(frame, trace, self.start.reference(frame), tuple(self.cascade.skipped))
 
     def _what_is_kept(self, summary: Summary) -> str:

@@ -11,7 +11,7 @@ import click
 
 from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
-from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, RANGE, STAGES
+from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, STAGES
 from inspector.cli.viewing import RECORDINGS, choose_outputs, saved_lines, viewing_options
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from calibnet.datasets import Sequence
     from calibnet.geometry import MiscalibrationRange
     from calibnet.geometry.se3 import Matrix
+    from inspector.contents import Contents
     from inspector.outputs import Outputs
     from inspector.start import Start
     from inspector.summary import Summary
@@ -43,10 +44,24 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
         "--detail",
-        type=click.Choice(["overview", "full"]),
-        default="full",
+        type=click.Choice(["overview", "full", "custom"]),
+        help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most; custom: what --log "
+        "names.  [default: full]",
+    ),
+    click.option(
+        "--log",
+        "parts",
+        type=PARTS,
+        help="With --detail custom, parts of a frame to record: curves (errors), overlays (after every stage), volumes "
+        "(maps of the cost volumes), hourglass (activations), scene (3D), tensors (raw volumes, all slices). Image, "
+        "first and last overlay, extrinsics and table are always there.",
+    ),
+    click.option(
+        "--color",
+        type=click.Choice(["depth", "intensity", "edge", "error"]),
+        default="depth",
         show_default=True,
-        help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most.",
+        help="Of the points over the image; edge: those at depth edges stand out; error: pixels off the reference.",
     ),
     click.option(
         "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
@@ -172,7 +187,9 @@ def calibrate(
     stages: tuple[int, ...] | None,
     preset: str,
     weights: Path | None,
-    detail: str,
+    detail: str | None,
+    parts: tuple[str, ...] | None,
+    color: str,
     report: Path | None,
     save: Path | None,
     headless: bool,
@@ -188,7 +205,6 @@ def calibrate(
     from calibnet.cascade import Cascade
     from calibnet.datasets import select_frames
     from calibnet.geometry import MiscalibrationRange
-    from inspector.observation import Detail
     from inspector.recording import RunDescription
     from inspector.session import Session
     from inspector.start import Start
@@ -198,6 +214,12 @@ def calibrate(
         raise click.UsageError("Give --range or --miscalibrate, not both.")
     if given is not None and per_frame:
         raise click.UsageError("--per-frame draws from --range; --miscalibrate is the same for all frames.")
+    if as_is and color == "error":
+        raise click.UsageError(
+            f"--color error shows the distance to the reference, and {sequence.name} has none: give --range or "
+            "--miscalibrate to take its calibration for the reference, or choose another --color."
+        )
+    contents = choose_contents(detail, parts, color)
     positions = select_frames(sequence, frames)
     if report is not None:
         from inspector.report.write import RECORDING, check_folder
@@ -219,11 +241,13 @@ def calibrate(
         "seed": seed,
         "stages": ",".join(str(stage.number) for stage in cascade.stages),
         "preset": preset,
-        "detail": detail,
+        "detail": detail or "full",
+        "parts": ",".join(sorted(contents.parts)),
+        "color": color,
     }
     provenance = describe_provenance(preset, [stage.number for stage in cascade.stages], weights)
     description = RunDescription(f"{sequence.name}, {describe(start)}", identity, provenance)
-    session = Session(sequence, positions, cascade, start, outputs, description, Detail(detail), console)
+    session = Session(sequence, positions, cascade, start, outputs, description, contents, console)
     try:
         summary = session.run()
         return finish(summary, outputs, report)
@@ -231,6 +255,16 @@ def calibrate(
         os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
         outputs.close()
+
+
+def choose_contents(detail: str | None, parts: tuple[str, ...] | None, color: str) -> Contents:
+    """What is recorded of each frame; --log alone means --detail custom."""
+    from inspector.contents import Coloring, Contents, Detail, Part
+
+    level = Detail(detail or ("full" if parts is None else "custom"))
+    if (level is Detail.CUSTOM) != (parts is not None):
+        raise click.UsageError("--detail custom and --log belong together: --log says which parts to record.")
+    return Contents.of(level, frozenset(map(Part, parts or ())), Coloring(color))
 
 
 def announce(console: Console, sequence: Sequence, start: Start, cascade: Any) -> None:

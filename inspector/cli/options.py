@@ -91,9 +91,28 @@ class MiscalibrationType(click.ParamType["Matrix"]):
         return miscalibration(numbers[:3], numbers[3:])
 
 
+class PartsType(click.ParamType[tuple[str, ...]]):
+    """Names of `inspector.contents.Part` with commas between them, to a tuple."""
+
+    name = "PART,PART"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
+        """Check every name; a value that is a tuple already is kept."""
+        from inspector.contents import Part
+
+        if isinstance(value, tuple):
+            return value
+        parts = tuple(part.strip() for part in str(value).split(","))
+        unknown = [part for part in parts if part not in list(Part)]
+        if unknown:
+            self.fail(f"{unknown[0]!r} is no part of a frame; choose from {', '.join(Part)}.", param, ctx)
+        return parts
+
+
 RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()
+PARTS = PartsType()
 MISCALIBRATION = MiscalibrationType()
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""

@@ -34,7 +34,7 @@ def record() -> Callable[..., None]:
     from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
-    from inspector.observation import Detail
+    from inspector.contents import Coloring, Contents, Detail, Part
     from inspector.outputs import Outputs
     from inspector.recording import RunDescription
     from inspector.session import Session
@@ -44,6 +44,8 @@ def record() -> Callable[..., None]:
         file: Path,
         length: int = 3,
         detail: str = "full",
+        parts: tuple[str, ...] = (),
+        color: str = "depth",
         as_is: bool = False,
         seed: int = 1,
         sequence: Any = None,
@@ -58,7 +60,7 @@ def record() -> Callable[..., None]:
             Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
             Outputs(file),
             RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),
-            Detail(detail),
+            Contents.of(Detail(detail), frozenset(map(Part, parts)), Coloring(color)),
             Console(quiet=True),
         )
         return session.run()

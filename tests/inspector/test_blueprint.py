@@ -9,13 +9,16 @@ import pytest
 import rerun.blueprint as rrb
 
 from inspector.blueprint import make_blueprint
-from inspector.observation import Detail, Grid, Layout, StageLayout
+from inspector.contents import Coloring, Contents, Detail, Part
+from inspector.observation import Grid, Layout, StageLayout
+from inspector.views import COLORED_BY
 
 GRIDS = (Grid(8, 20, 64), Grid(16, 10, 32))
 
 
-def layout(has_reference: bool = True, detail: Detail = Detail.FULL) -> Layout:
-    return Layout((StageLayout(3, "5/0.5", GRIDS), StageLayout(5, "1/0.1", GRIDS)), has_reference, detail)
+def layout(has_reference: bool = True, contents: Contents | None = None) -> Layout:
+    stages = (StageLayout(3, "5/0.5", GRIDS), StageLayout(5, "1/0.1", GRIDS))
+    return Layout(stages, has_reference, contents or Contents.of(Detail.FULL))
 
 
 def walk(part: Any) -> Iterator[Any]:
@@ -41,23 +44,32 @@ def test_every_stage_and_scale_has_its_views() -> None:
     views = names(make_blueprint(layout()))
     for stage in ("stage 3 (±5°/0.5 m)", "stage 5 (±1°/0.1 m)"):
         assert f"After {stage}" in views
-    assert sum("whole cost volume" in name for name in views) == 4
-    assert sum("before the hourglass" in name for name in views) == 4
+    for part in ("displacement that won", "true displacement", "how surely", "raw scores", "before the hourglass"):
+        assert sum(part in name for name in views) == 4, part
 
 
 @pytest.mark.parametrize(
-    ("has_reference", "detail", "absent"),
+    ("has_reference", "contents", "absent"),
     [
-        (False, Detail.FULL, ("eference", "error", "true", "iscalibrated")),
-        (True, Detail.OVERVIEW, ("whole cost volume",)),
+        (False, Contents.of(Detail.FULL), ("eference", "error", "true", "iscalibrated")),
+        (True, Contents.of(Detail.OVERVIEW), ("raw scores", "sliders", "a tile for every")),
+        (True, Contents.of(Detail.CUSTOM, frozenset({Part.SCENE})), ("After", "error", "hourglass", "displacement")),
+        (True, Contents.of(Detail.CUSTOM, frozenset({Part.CURVES})), ("oloured through", "After", "sliders")),
     ],
 )
-def test_no_view_without_data(has_reference: bool, detail: Detail, absent: tuple[str, ...]) -> None:
-    views = names(make_blueprint(layout(has_reference, detail)))
+def test_no_view_without_data(has_reference: bool, contents: Contents, absent: tuple[str, ...]) -> None:
+    views = names(make_blueprint(layout(has_reference, contents)))
     assert views
     assert not [name for name in views if any(text in name for text in absent)]
 
 
 def test_a_run_without_details_has_no_empty_tabs() -> None:
-    bare = Layout((StageLayout(3, "5/0.5", ()),), True, Detail.FULL)
+    bare = Layout((StageLayout(3, "5/0.5", ()),), True, Contents.of(Detail.FULL))
     assert [str(part.name) for part in tabs(make_blueprint(bare)).contents] == ["Overview", "Cascade", "3D"]
+
+
+@pytest.mark.parametrize("coloring", Coloring)
+def test_the_legend_is_that_of_the_colours(coloring: Coloring) -> None:
+    views = names(make_blueprint(layout(contents=Contents.of(Detail.FULL, color=coloring))))
+    assert COLORED_BY[coloring] in views
+    assert not [COLORED_BY[other] for other in Coloring if other is not coloring and COLORED_BY[other] in views]

@@ -8,11 +8,13 @@ from types import ModuleType
 import numpy as np
 from PIL import Image
 
-from inspector.channel_grid import channel_grid, channel_grid_png
+from inspector.channel_grid import GAP, HEADER, HIGHEST, LOWEST, channel_grid, palette_png, slice_grid
 from inspector.colors import EMPTY, depth_colors, flow_colors
-from inspector.matches import chosen_match
+from inspector.contents import Coloring
+from inspector.matches import StartingPoints, chosen_match
 from inspector.observation import Observation
 from inspector.overlay import Thinning, make_overlay
+from inspector.painting import depth_edges, make_painter
 
 
 def test_near_is_red_and_far_is_blue() -> None:
@@ -49,24 +51,70 @@ def test_overlay_keeps_the_nearest_point_of_each_cell_and_draws_it_last(fakes: M
     assert len(overlay.pixels) > 100
 
 
-def test_channel_grid_shows_the_liveliest_first_and_survives_flat_ones() -> None:
-    maps = np.zeros((20, 3, 5), dtype=np.float16)
-    maps[7, 0, 0] = 9.0
-    maps[12, 2, 4] = 4.0
-    grid = channel_grid(maps)
-    assert grid.shape == (4 * 4 - 1, 4 * 6 - 1)
-    assert grid[0, 0] == 255 and grid[2, 6 + 4] == 255
-    assert (grid > 0).sum() == 2
-    decoded = Image.open(io.BytesIO(channel_grid_png(maps)))
-    assert decoded.size == (23, 15)
+def test_channel_grid_numbers_the_liveliest_and_keeps_the_colour_scale_it_is_given() -> None:
+    maps = np.zeros((20, 3, 64), dtype=np.float16)
+    maps[7, 0, 0], maps[12, 2, 4] = 9.0, 4.5
+    grid = channel_grid(maps, 0.0, 9.0)
+    assert grid.shape == (3 + HEADER, 4 * 66 - 2)
+    assert grid[HEADER, 0] == HIGHEST  # channel 7 comes first
+    assert grid[HEADER + 2, 66 + 4] == (LOWEST + HIGHEST) // 2  # half as bright as 9
+    assert grid[HEADER, 2 * 66] == GAP  # dead channels are left out
+    decoded = Image.open(io.BytesIO(palette_png(grid)))
+    assert decoded.size == grid.shape[::-1]
+
+
+def test_slices_lie_where_their_displacement_points() -> None:
+    volume = np.zeros((3, 3, 2, 4))
+    volume[0, 2] = 1.0  # up and right
+    occupied = np.array([[True, True, True, False]] * 2)
+    grid = slice_grid(volume, occupied, 1.0)
+    assert grid.shape == (9, 15)
+    assert (grid[:2, 10:13] == HIGHEST).all()
+    assert (grid[:2, 13] == GAP).all()
+    assert (grid == HIGHEST).sum() == 6
 
 
 def test_chosen_cell_is_occupied_and_its_true_displacement_is_the_fields(fakes: ModuleType) -> None:
     frame = fakes.make_frame(0)
     trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
     stage = trace.stages[0]
-    match = chosen_match(Observation(frame, trace, frame.camera_from_lidar), stage, stage.detail)
+    points = StartingPoints.of(Observation(frame, trace, frame.camera_from_lidar), stage)
+    match = chosen_match(points, stage.detail)
     x, y = match.cell(8)
     assert stage.detail.scales[0].occupied[y, x]
     np.testing.assert_allclose(match.true_displacement, stage.detail.displacement[y, x], atol=0.05)
-    assert chosen_match(Observation(frame, trace), stage, stage.detail).true_displacement is None
+    np.testing.assert_allclose(points.true_field(8), stage.detail.displacement, atol=0.05)
+    unknown = StartingPoints.of(Observation(frame, trace), stage)
+    assert chosen_match(unknown, stage.detail).true_displacement is None
+    assert unknown.true_field(8) is None
+
+
+def test_an_edge_is_a_point_that_stands_before_something_farther() -> None:
+    azimuth = np.radians(np.arange(-20.0, 20.0, 0.25))
+    distance = np.where(np.abs(azimuth) < np.radians(5.0), 10.0, 30.0)
+    scan = np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), 0 * azimuth, 0 * azimuth], axis=1)
+    edges = depth_edges(scan.astype(np.float32))
+    assert edges.any()
+    assert (distance[edges] == 10.0).all()
+    assert np.degrees(np.abs(azimuth[edges])).min() > 4.0
+
+
+def test_error_colours_tell_pixels_from_the_reference(fakes: ModuleType) -> None:
+    frame = fakes.make_frame(0)
+    trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
+    paint = make_painter(Observation(frame, trace, frame.camera_from_lidar), Coloring.ERROR)
+    thinning = Thinning(cells_across=40, pixel=0.25)
+    right = make_overlay(frame, frame.camera_from_lidar, thinning, paint).colors.astype(int)
+    wrong = make_overlay(frame, trace.initial, thinning, paint).colors.astype(int)
+    assert (right == right[0]).all() and right[0, 2] > right[0, 0]  # blue: in place
+    assert np.median(wrong[:, 0] - wrong[:, 2]) > 50  # red: far off
+
+
+def test_edges_stand_out_by_size_and_are_the_same_under_every_extrinsic(fakes: ModuleType) -> None:
+    frame = fakes.make_frame(0)
+    trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
+    paint = make_painter(Observation(frame, trace), Coloring.EDGE)
+    overlay = make_overlay(frame, frame.camera_from_lidar, Thinning(cells_across=400, pixel=0.25), paint)
+    large = overlay.sizes == overlay.sizes.max()
+    assert 0.0 < large.mean() < 0.5
+    assert (overlay.colors[large] == overlay.colors[large][0]).all()

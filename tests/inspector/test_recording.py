@@ -30,8 +30,7 @@ def expected_streams() -> dict[str, str]:
         "overlay/corrected": points,
         "overlay/reference": points,
         "overlay/current": points,
-        "world/cloud/initial": "Points3D:positions",
-        "world/cloud/corrected": "Points3D:positions",
+        "world/cloud": "Points3D:positions",
         "world/camera/initial": "Pinhole:image_from_camera",
         "world/camera/reference": "Pinhole:image_from_camera",
     }
@@ -51,8 +50,11 @@ def expected_streams() -> dict[str, str]:
             streams |= {
                 f"{scale}/cost_volume": "Tensor:data",
                 f"{scale}/probability": "Tensor:data",
-                f"{scale}/score_at_centre": image,
                 f"{scale}/best_match": image,
+                f"{scale}/true_match": image,
+                f"{scale}/peak_probability": image,
+                f"{scale}/slices": encoded,
+                f"{scale}/slices/marks": "Boxes2D:half_sizes",
                 f"{scale}/window": image,
                 f"{scale}/window/truth": points,
                 f"{scale}/hourglass_before": encoded,
@@ -165,8 +167,37 @@ def test_overview_keeps_every_view_but_the_raw_volumes(record: Callable[..., Any
     file = tmp_path / "overview.rrd"
     record(file, detail="overview", length=5)
     paths = {str(column.entity_path).lstrip("/") for column in RrdReader(file).store().schema().component_columns()}
-    volumes = {path for path in expected_streams() if path.endswith(("cost_volume", "probability"))}
+    volumes = {
+        path for path in expected_streams() if path.endswith(("cost_volume", "/probability", "slices", "slices/marks"))
+    }
     assert expected_streams().keys() - paths == volumes
+
+
+def test_the_cloud_has_colours_through_every_extrinsic(full_recording: Path, read: Read) -> None:
+    names = ("initial", *(f"stage_{stage}" for stage in STAGES), "reference")
+    through = {name: read(full_recording, "world/cloud", f"colors_through:{name}")[0][1] for name in names}
+    positions = read(full_recording, "world/cloud", "Points3D:positions")[0][1]
+    assert {len(value) for value in through.values()} == {len(positions)}
+    assert through["stage_5"] != through["initial"]
+
+
+@pytest.mark.parametrize("parts", [("curves",), ("overlays", "scene"), ("hourglass",), ("tensors",)])
+def test_custom_detail_records_what_is_named_and_no_more(
+    record: Callable[..., Any], tmp_path: Path, parts: tuple[str, ...]
+) -> None:
+    file = tmp_path / "custom.rrd"
+    record(file, length=1, detail="custom", parts=parts, stages=(3,), strides=(8,))
+    paths = {str(column.entity_path).lstrip("/") for column in RrdReader(file).store().schema().component_columns()}
+    shows = {
+        "curves": "error/rotation/stage_3",
+        "overlays": "overlay/stage_3",
+        "scene": "world/cloud",
+        "volumes": "stage_3/scale_8/best_match",
+        "hourglass": "stage_3/scale_8/hourglass_after",
+        "tensors": "stage_3/scale_8/cost_volume",
+    }
+    assert {part for part, path in shows.items() if path in paths} == set(parts)
+    assert {"image", "overlay/miscalibrated", "overlay/corrected", "table", "extrinsic/initial"} <= paths
 
 
 def test_other_strides_and_radii(record: Callable[..., Any], tmp_path: Path, read: Read) -> None:

@@ -31,14 +31,14 @@ spec.loader.exec_module(fakes)
 from rich.console import Console
 from calibnet.geometry import MiscalibrationRange
 from inspector.cli.inspect import finish
-from inspector.observation import Detail
+from inspector.contents import Contents, Detail
 from inspector.outputs import Outputs, has_display
 from inspector.recording import RunDescription
 from inspector.session import Session
 from inspector.start import Start
 outputs = Outputs(Path(sys.argv[2]))
 session = Session(fakes.FakeSequence(100_000), range(100_000), fakes.FakeCascade(), Start(MiscalibrationRange(5, 0.5)),
-                  outputs, RunDescription("fake/00", {"seed": 0}), Detail.FULL, Console(quiet=True))
+                  outputs, RunDescription("fake/00", {"seed": 0}), Contents.of(Detail.FULL), Console(quiet=True))
 sys.exit(finish(session.run(), outputs))
 """
 
