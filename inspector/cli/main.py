@@ -36,6 +36,7 @@ COMMANDS = {
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
     "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
     "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),
+    "export": LazyCommand("inspector.cli.export:export", "The extrinsic for KITTI, ROS 2 or OpenCV, or as JSON."),
     "check": LazyCommand("inspector.cli.check:check", "Fail when a recording's errors exceed bounds; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),

@@ -1,0 +1,87 @@
+"""``calib-inspect export``: the corrected extrinsic for other tools."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from inspector.cli.options import FOLDER
+from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run, write_file
+
+if TYPE_CHECKING:
+    from inspector.exported import Exported
+
+ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
+
+
+@click.command()
+@click.argument("recording", type=RECORDING, required=False, metavar="[RUN.rrd]")
+@click.option("--from", "folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
+@click.option(
+    "--format", "form", type=click.Choice(["kitti", "ros", "opencv", "json"]), required=True, help="What to write."
+)
+@click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
+@click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default]")
+@click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
+@click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
+@click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
+@click.option(
+    "--parent",
+    type=click.Choice(["lidar", "camera"]),
+    default="lidar",
+    show_default=True,
+    help="Which of the two is the ROS parent frame.",
+)
+def export(
+    recording: Path | None,
+    folder: Path | None,
+    form: str,
+    frame: int | None,
+    median: bool,
+    output: Path | None,
+    camera_frame: str,
+    lidar_frame: str,
+    parent: str,
+) -> None:
+    """Write the corrected extrinsic as KITTI calib.txt, ROS 2 static transform, OpenCV YAML or JSON.
+
+    By default the median of all frames: the rotation and the translation with the smallest sum of
+    distances to those of the frames, which outliers hardly move. Every file says its convention.
+    """
+    if (recording is None) == (folder is None):
+        raise click.UsageError("Give a recording or --from FOLDER.")
+    if frame is not None and median:
+        raise click.UsageError("Give --frame or --median, not both.")
+    if folder is not None and (frame is not None or median):
+        raise click.UsageError("--frame and --median choose from a recording; a folder has one calibration.")
+    for name in (camera_frame, lidar_frame):
+        if ROS_NAME.fullmatch(name) is None:
+            raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
+
+    from inspector import export_formats as formats
+
+    exported = chosen(recording, folder, frame)
+    if form == "ros":
+        text = formats.as_ros(exported, formats.RosFrames(camera_frame, lidar_frame, parent == "lidar"))
+    else:
+        write = {"kitti": formats.as_kitti, "opencv": formats.as_opencv, "json": formats.as_json}[form]
+        text = write(exported)
+    if output is None:
+        click.echo(text, nl=False)
+    else:
+        write_file(output, text.encode())
+        click.echo(f"Saved {output}: {exported.origin}.", err=True)
+
+
+def chosen(recording: Path | None, folder: Path | None, frame: int | None) -> Exported:
+    """The extrinsic that the options name."""
+    from inspector.exported import exported_folder, exported_frame, exported_median
+
+    if folder is not None:
+        return exported_folder(folder)
+    assert recording is not None
+    run = open_run(recording)
+    return exported_median(run) if frame is None else exported_frame(run, frame)
