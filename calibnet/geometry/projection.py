@@ -22,35 +22,50 @@ class Projection:
         pixels: ``[M, 2]`` float32, sub-pixel ``(u, v)``.
         depth: ``[M]`` float32, metres along the optical axis.
         index: ``[M]`` int64, row of each point in the scan.
+        points: ``[M, 3]`` float32, the points in the camera frame.
     """
 
     pixels: NDArray[np.float32]
     depth: NDArray[np.float32]
     index: NDArray[np.int64]
+    points: NDArray[np.float32]
+
+    def far_to_near(self) -> NDArray[np.int64]:
+        """Rows by falling depth; those of one depth in the order of the scan."""
+        return np.argsort(-self.depth, kind="stable")
 
 
 def project(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> Projection:
     """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""
     in_camera = transform_points(camera_from_lidar, points[:, :3])
     index = np.flatnonzero(in_camera[:, 2] > MINIMUM_DEPTH)
-    x, y, depth = in_camera[index].T
+    in_front = in_camera[index]
+    x, y, depth = in_front.T
     matrix = camera.matrix.astype(np.float32)
     u = (matrix[0, 0] * x + matrix[0, 1] * y) / depth + matrix[0, 2]
     v = matrix[1, 1] * y / depth + matrix[1, 2]
     inside = (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
     pixels = np.stack([u[inside], v[inside]], axis=1)
-    return Projection(pixels.astype(np.float32), depth[inside].astype(np.float32), index[inside])
+    return Projection(
+        pixels.astype(np.float32),
+        depth[inside].astype(np.float32),
+        index[inside],
+        in_front[inside].astype(np.float32),
+    )
 
 
-def nearest_per_cell(projection: Projection, camera: PinholeCamera, stride: int = 1) -> NDArray[np.int64]:
-    """Z-buffer at ``stride`` pixels a cell.
+def nearest_per_cell(
+    projection: Projection, camera: PinholeCamera, stride: int = 1, far_to_near: NDArray[np.int64] | None = None
+) -> NDArray[np.int64]:
+    """Z-buffer at ``stride`` pixels a cell; ``far_to_near`` saves the sorting where several are made.
 
     Returns ``[h, w]`` int64: for every cell the row in ``projection`` of its nearest point, or -1.
     """
     height, width = -(-camera.height // stride), -(-camera.width // stride)
     cell = np.floor((projection.pixels + 0.5) / stride).astype(np.int64)
     flat = np.minimum(cell[:, 1], height - 1) * width + np.minimum(cell[:, 0], width - 1)
-    far_to_near = np.argsort(-projection.depth, kind="stable")
+    if far_to_near is None:
+        far_to_near = projection.far_to_near()
     winner = np.full(height * width, -1, dtype=np.int64)
     winner[flat[far_to_near]] = far_to_near  # the last assignment wins: the nearest
     return winner.reshape(height, width)

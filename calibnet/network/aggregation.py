@@ -46,6 +46,27 @@ class WindowConv(nn.Module):
         return y.reshape(batch, -1, height, width, channels).permute(0, 4, 1, 2, 3)
 
 
+def pointwise(conv: nn.Conv3d, volume: Tensor) -> Tensor:
+    """A 1x1x1 convolution as a product over the channels, which lie last in memory: ``[B, C, D, h, w]``."""
+    return F.linear(volume.permute(0, 2, 3, 4, 1), conv.weight.flatten(1), conv.bias).permute(0, 4, 1, 2, 3)
+
+
+def spatial(conv: nn.Conv3d, volume: Tensor) -> Tensor:
+    """A 1x3x3 convolution of stride 2, with the window in the batch: ``[B, C, D, h, w] -> [B, C', D, h/2, w/2]``."""
+    batch, channels, window, height, width = volume.shape
+    images = volume.permute(0, 2, 3, 4, 1).reshape(-1, height, width, channels).permute(0, 3, 1, 2)
+    halved = F.conv2d(images, conv.weight.squeeze(2), conv.bias, stride=2, padding=1).permute(0, 2, 3, 1)
+    return halved.unflatten(0, (batch, window)).permute(0, 4, 1, 2, 3)
+
+
+def double(volume: Tensor) -> Tensor:
+    """Repeat every cell 2x2 times: ``[B, C, D, h, w] -> [B, C, D, 2h, 2w]``."""
+    batch, channels, window, height, width = volume.shape
+    cells = volume.permute(0, 2, 3, 4, 1)[:, :, :, None, :, None]
+    cells = cells.expand(batch, window, height, 2, width, 2, channels)
+    return cells.reshape(batch, window, 2 * height, 2 * width, channels).permute(0, 4, 1, 2, 3)
+
+
 class VolumeBlock(nn.Module):
     """A convolution along x, one along y, and a skip: ``[B, C, D, h, w] -> [B, C, D, h, w]``.
 
@@ -64,12 +85,10 @@ class VolumeBlock(nn.Module):
 
 def coarsen_window(volume: Tensor, window: int) -> Tensor:
     """Place a fine volume's displacements in the coarse window: ``[B, C, D, h, w] -> [B, C, D, h, w]``."""
-    batch, channels, _, height, width = volume.shape
-    picked = volume.unflatten(2, (window, window))[:, :, ::2, ::2]
-    margin = (window - picked.shape[2]) // 2
-    padded = F.pad(picked.flatten(3), (0, 0, margin, margin)).unflatten(3, (-1, height, width))
-    padded = F.pad(padded.flatten(4), (0, 0, margin, margin))
-    return padded.reshape(batch, channels, window * window, height, width)
+    picked = volume.permute(0, 2, 3, 4, 1).unflatten(1, (window, window))[:, ::2, ::2]  # channels stay last in memory
+    margin = (window - picked.shape[1]) // 2
+    padded = F.pad(picked, (0, 0) * 3 + (margin, margin) * 2)
+    return padded.flatten(1, 2).permute(0, 4, 1, 2, 3)
 
 
 @lru_cache(maxsize=8)
@@ -85,7 +104,8 @@ def refine_window(volume: Tensor, window: int) -> Tensor:
     """Interpolate the centre of a coarse volume's window to the fine one; space is left as it is."""
     along = refinement(window).to(volume)
     both = torch.einsum("ia,jb->ijab", along, along).reshape(window * window, window * window)
-    return torch.einsum("de,bcehw->bcdhw", both, volume)
+    rows = volume.permute(0, 2, 3, 4, 1)
+    return (both @ rows.flatten(2)).view_as(rows).permute(0, 4, 1, 2, 3)
 
 
 class Hourglass(nn.Module):
@@ -119,14 +139,14 @@ class Hourglass(nn.Module):
         entered: list[Tensor] = []
         for scale, volume in enumerate(volumes):
             if scale and self.fuse:
-                volume = volume + coarsen_window(self.down[scale - 1](entered[-1]), self.window)
+                volume = volume + coarsen_window(spatial(self.down[scale - 1], entered[-1]), self.window)
             entered.append(self.down_blocks[scale](volume))
         left: list[Tensor] = []
         for scale in reversed(range(len(volumes))):
             volume = entered[scale]
             if left and self.fuse:
-                finer = refine_window(self.up[scale](left[0]), self.window)
-                volume = volume + F.interpolate(finer, scale_factor=(1, 2, 2), mode="nearest")
+                finer = refine_window(pointwise(self.up[scale], left[0]), self.window)
+                volume = volume + double(finer)
             left.insert(0, self.up_blocks[scale](volume))
         return left
 
@@ -152,12 +172,12 @@ class Aggregation(nn.Module):
             ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by itself, and
             what the hourglass adds to it.
         """
-        before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]
+        before = [pointwise(enter[0], volume).relu() for enter, volume in zip(self.enter, volumes, strict=True)]
         after = before
         for hourglass in self.hourglasses:
             after = hourglass(after)
         logits = [
-            TEMPERATURE * raw + score(volume).squeeze(1)
+            TEMPERATURE * raw + pointwise(score, volume).squeeze(1)
             for raw, score, volume in zip(scores, self.score, after, strict=True)
         ]
         return before, after, logits

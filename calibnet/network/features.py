@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -18,6 +20,18 @@ def image_channels(image: Tensor) -> Tensor:
     return (image.float() - 110.0) / 65.0
 
 
+def dilate(x: Tensor, radius: int, dim: int) -> Tensor:
+    """Maximum over ``2 * radius + 1`` neighbours of non-negative numbers along one axis.
+
+    Maxima of shifted copies: `max_pool2d` takes ten times as long on a CPU, since it finds indices too.
+    """
+    size = x.shape[dim]
+    padding = [0, 0, radius, radius] if dim == 2 else [radius, radius, 0, 0]
+    padded = F.pad(x, padding)
+    shifts = [padded.narrow(dim, shift, size) for shift in range(2 * radius + 1)]
+    return functools.reduce(torch.maximum, shifts)
+
+
 def lidar_channels(lidar: Tensor) -> Tensor:
     """Sparse depth (metres, 0 = empty) and intensity ``[B, 2, H, W]`` to network input ``[B, 6, H, W]``.
 
@@ -28,8 +42,8 @@ def lidar_channels(lidar: Tensor) -> Tensor:
     occupied = (depth > 0).float()
     inverse = occupied * (4.0 / depth.clamp(min=1.0))
     logarithm = occupied * (depth.clamp(min=1.0).log() * 0.5 - 1.0)
-    near = F.max_pool2d(inverse, (5, 3), 1, (2, 1))
-    wide = F.max_pool2d(near, (7, 5), 1, (3, 2))
+    near = dilate(dilate(inverse, 2, dim=2), 1, dim=3)
+    wide = dilate(dilate(near, 3, dim=2), 2, dim=3)
     return torch.cat([inverse, logarithm, occupied, intensity * occupied, near, wide], dim=1)
 
 

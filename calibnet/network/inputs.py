@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera, project
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.geometry.se3 import Matrix, transform_points
+from calibnet.geometry.se3 import Matrix
 
 
 class LidarInput(NamedTuple):
@@ -55,12 +55,12 @@ def lidar_input(
     # a last row of zeros, which the index -1 of empty cells picks
     depth = np.append(projection.depth, np.float32(0))
     intensity = np.append(points[projection.index, 3], np.float32(0))
-    in_camera = transform_points(camera_from_lidar, points[projection.index, :3])
-    in_camera = np.concatenate([in_camera, np.zeros((1, 3), np.float32)])
-    pixel = nearest_per_cell(projection, camera)
+    in_camera = np.concatenate([projection.points, np.zeros((1, 3), np.float32)])
+    far_to_near = projection.far_to_near()
+    pixel = nearest_per_cell(projection, camera, 1, far_to_near)
     image = np.stack([depth[pixel], intensity[pixel]]).astype(np.float32)
     cells = [
-        np.ascontiguousarray(in_camera[nearest_per_cell(projection, camera, scale)].transpose(2, 0, 1))
+        np.ascontiguousarray(in_camera[nearest_per_cell(projection, camera, scale, far_to_near)].transpose(2, 0, 1))
         for scale in scales
     ]
     return LidarInput(image, cells)
