@@ -20,6 +20,7 @@ from inspector.views import (
     curve_view,
     frustum_legend,
     image_view,
+    names_legend,
     overlay_view,
     point_legend,
     scene_view,
@@ -128,7 +129,7 @@ def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
     parts = layout.contents.parts
     maps: View = rrb.Vertical(
         *(_volume_row(stage.number, grid, layout) for grid in stage.grids),
-        _map_legends(),
+        _map_legends(names_legend("Marks in the window", entities.LEGEND_WINDOW, 3 if layout.has_reference else 2)),
         row_shares=[1.0] * len(stage.grids) + [0.35],
         name="Which displacement won" if Part.TENSORS in parts else stage.title,
     )
@@ -140,18 +141,16 @@ def cost_volume_page(stage: StageLayout, layout: Layout) -> View:
 
 def _volume_row(number: int, grid: Grid, layout: Layout) -> View:
     stride, cell = grid.stride, entities.chosen_cell(number, grid.stride)
-    best = f"1/{stride}: displacement that won, in cells of {stride} px"
-    views: list[View] = [image_view(best, entities.best_match(number, stride), grid, cell)]
+    views: list[View] = [
+        image_view(f"1/{stride}: displacement that won", entities.best_match(number, stride), grid, cell)
+    ]
     if layout.has_reference:
         views.append(image_view(f"1/{stride}: true displacement", entities.true_match(number, stride), grid, cell))
-    peak = f"1/{stride}: how surely, peak probability"
-    truth = ", white true" if layout.has_reference else ""
-    window = f"Pink cell: red now, green won{truth}"
     views += [
-        image_view(peak, entities.peak_probability(number, stride), grid, cell),
-        image_view(window, entities.window(number, stride)),
+        image_view(f"1/{stride}: how surely (peak probability)", entities.peak_probability(number, stride), grid, cell),
+        image_view(f"1/{stride}: window of the pink cell", entities.window(number, stride)),
     ]
-    return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.3])
+    return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])
 
 
 def _slice_row(number: int, grid: Grid) -> View:
@@ -170,7 +169,7 @@ def hourglass_page(stage: StageLayout) -> View:
     rows = [
         rrb.Horizontal(
             image_view(
-                f"1/{stride}: channels that vary most, before the hourglass",
+                f"1/{stride}: channels that vary most (number above), before the hourglass",
                 entities.hourglass_before(stage.number, stride),
             ),
             image_view(
@@ -205,13 +204,14 @@ def _with_legend(view: View, below: View, name: str) -> View:
     return rrb.Vertical(view, below, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=name)
 
 
-def _map_legends() -> View:
-    """Colours of displacements and of certainty."""
+def _map_legends(*more: View) -> View:
+    """Colours of displacements and of certainty, and what else a page needs."""
     return rrb.Horizontal(
         rrb.Spatial2DView(
             origin=f"/{entities.LEGEND_DISPLACEMENT}", name="Displacement: hue = direction, white = none"
         ),
-        rrb.Spatial2DView(origin=f"/{entities.LEGEND_CERTAINTY}", name="Probability and confidence"),
+        rrb.Spatial2DView(origin=f"/{entities.LEGEND_CERTAINTY}", name="Probability, confidence"),
+        *more,
     )
 
 

@@ -52,7 +52,7 @@ def channel_grid(activations: NDArray[np.floating], low: float, high: float) -> 
     grid = np.full((rows * (height + HEADER), COLUMNS * (width + 2) - 2), GAP, dtype=np.uint8)
     for position, (channel, tile) in enumerate(zip(channels, tiles, strict=True)):
         top, left = (position // COLUMNS) * (height + HEADER), (position % COLUMNS) * (width + 2)
-        cv2.putText(grid, str(channel), (left + 1, top + HEADER - 2), cv2.FONT_HERSHEY_PLAIN, 0.6, TEXT)
+        grid[top : top + HEADER, left : left + width][_number(channel, width)] = TEXT
         grid[top + HEADER : top + HEADER + height, left : left + width] = tile
     return grid
 
@@ -66,7 +66,15 @@ def slice_grid(volume: NDArray[np.floating], occupied: NDArray[np.bool_], high: 
     tiles = np.where(occupied, levels(volume, 0.0, high), GAP).astype(np.uint8)
     padded = np.pad(tiles, ((0, 0), (0, 0), (0, 1), (0, 1)), constant_values=GAP)
     across, down = volume.shape[1] * padded.shape[3], volume.shape[0] * padded.shape[2]
-    return padded.transpose(0, 2, 1, 3).reshape(down, across)
+    grid: NDArray[np.uint8] = padded.transpose(0, 2, 1, 3).reshape(down, across)
+    return grid
+
+
+def _number(value: int, width: int) -> NDArray[np.bool_]:
+    """A number's pixels ``[HEADER, width]``; not drawn in place, as OpenCV blends its edges with other entries."""
+    drawn = np.zeros((HEADER, width), dtype=np.uint8)
+    cv2.putText(drawn, str(value), (1, HEADER - 2), cv2.FONT_HERSHEY_PLAIN, 0.6, 255)
+    return np.asarray(drawn > 110)
 
 
 def levels(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:

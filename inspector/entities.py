@@ -50,6 +50,7 @@ LEGEND_POINTS = "legend/points"
 """What the colours of the overlays' points stand for."""
 LEGEND_DISPLACEMENT = "legend/displacement"
 LEGEND_CERTAINTY = "legend/certainty"
+LEGEND_WINDOW = "legend/window"
 LEGEND_STAGES = "legend/stages"
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
@@ -97,7 +98,7 @@ def error_corrected(kind: str) -> str:
 
 def error_limit(kind: str) -> str:
     """The bound of the success rate, as a curve to hold the others against."""
-    return f"error/{kind}/limit"
+    return f"error/{kind}/success_limit"
 
 
 def displacement(stage: int) -> str:

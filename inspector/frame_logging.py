@@ -18,7 +18,7 @@ from inspector.table import stage_table
 JPEG_QUALITY = 85
 SUCCESS = {"rotation": 1.0, "translation": 2.5}
 """Bounds of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
-SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=220, pixel=0.25)
+SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=180, pixel=0.25)
 """Sparse keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
 
 

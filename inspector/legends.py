@@ -34,6 +34,8 @@ def log_legends(rec: rr.RecordingStream, layout: Layout) -> None:
         _log_displacement_wheel(rec)
         certainty = colors.certainty_colors(np.linspace(0.0, 1.0, BAR_WIDTH) ** 2)
         _log_bar(rec, entities.LEGEND_CERTAINTY, Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES}))
+        marks = {"now": colors.INITIAL, "won": colors.FOUND}
+        _log_names(rec, entities.LEGEND_WINDOW, marks | ({"true": colors.REFERENCE} if layout.has_reference else {}))
     if Part.SCENE in layout.contents.parts:
         _log_camera_names(rec, layout)
 
@@ -60,7 +62,7 @@ def point_bar(coloring: Coloring) -> Bar:
 
 def _log_bar(rec: rr.RecordingStream, path: str, bar: Bar) -> None:
     rec.log(path, rr.Image(np.tile(bar.strip, (BAR_HEIGHT, 1, 1))), static=True)
-    positions = [(BAR_WIDTH * place, BAR_HEIGHT / 2) for place in bar.labels]
+    positions = [(BAR_WIDTH * place, 0.0) for place in bar.labels]
     _log_labels(rec, f"{path}/labels", positions, list(bar.labels.values()), [colors.REFERENCE] * len(positions))
 
 
@@ -77,8 +79,13 @@ def _log_camera_names(rec: rr.RecordingStream, layout: Layout) -> None:
     names |= {f"after stage {stage.number}": colors.STAGES[stage.number] for stage in layout.stages}
     if layout.has_reference:
         names["reference"] = colors.REFERENCE
+    _log_names(rec, entities.LEGEND_STAGES, names)
+
+
+def _log_names(rec: rr.RecordingStream, path: str, names: dict[str, colors.Rgb]) -> None:
+    """Names in their colours, in a row."""
     positions = [(LEGEND_SPACING * position, 0.0) for position in range(len(names))]
-    _log_labels(rec, entities.LEGEND_STAGES, positions, list(names), list(names.values()))
+    _log_labels(rec, path, positions, list(names), list(names.values()))
 
 
 def _log_labels(

@@ -14,7 +14,7 @@ from inspector import colors
 from inspector.contents import Coloring
 from inspector.observation import Observation
 
-POINT_SIZE: Final = 1.1
+POINT_SIZE: Final = 1.4
 """Radius in points of the screen, so that zooming separates the points instead of growing them."""
 EDGE_SIZE: Final = 1.7
 REST_SIZE: Final = 0.7

@@ -53,7 +53,9 @@ def _stages(observation: Observation, linked: bool) -> list[str]:
     skipped = {stage.number for stage in observation.skipped}
     ran = {stage.number: stage for stage in trace.stages}
     header = ["after", "trained for", *(["rotation error", "translation error"] if with_errors else []), "moved by"]
-    rows = [["miscalibrated" if with_errors else "start", NOTHING, *_error(observation.error(trace.initial)), NOTHING]]
+    rows = [
+        ["miscalibrated" if with_errors else "as given", NOTHING, *_error(observation.error(trace.initial)), NOTHING]
+    ]
     for number, bounds in enumerate(RANGES, start=1):
         trained_for = f"±{bounds.rotation_deg:g}° / {bounds.translation_m:g} m"
         if number in ran:

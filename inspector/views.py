@@ -13,8 +13,10 @@ from inspector.contents import Coloring
 from inspector.legends import LEGEND_SPACING
 from inspector.observation import Grid, Layout, Vector
 
-SCREEN_WIDTH, SCREEN_HEIGHT, LEGEND_HEIGHT = 1920.0, 980.0, 50.0
-TITLE_HEIGHT = 28.0
+SCREEN_WIDTH, SCREEN_HEIGHT, LEGEND_HEIGHT = 1920.0, 980.0, 64.0
+TITLE_HEIGHT = 36.0
+DIMMED = 0.65
+"""Opacity of the image under points, so that these stand out."""
 SCENE_BACKGROUND = (44, 47, 54)
 """Grey enough that dark points of the picture stay visible."""
 COLORED_BY = {
@@ -31,7 +33,11 @@ def overlay_view(name: str, points: str, image: tuple[int, int] | None = None) -
     """Points over the frame's image; with its size, points and captions beyond it do not widen the view."""
     bounds = None if image is None else rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(0.0, image[1]))
     return rrb.Spatial2DView(
-        origin="/", contents=[f"/{entities.IMAGE}", f"/{points}/**"], name=name, visual_bounds=bounds
+        origin="/",
+        contents=[f"/{entities.IMAGE}", f"/{points}/**"],
+        name=name,
+        visual_bounds=bounds,
+        overrides={f"/{entities.IMAGE}": rr.EncodedImage.from_fields(opacity=DIMMED)},
     )
 
 
@@ -54,13 +60,15 @@ def point_legend(layout: Layout) -> rrb.Spatial2DView:
     return legend(COLORED_BY[layout.contents.color], entities.LEGEND_POINTS)
 
 
+def names_legend(name: str, path: str, count: int) -> rrb.Spatial2DView:
+    """So many names in their colours, in one row."""
+    bounds = rrb.VisualBounds2D(x_range=(-LEGEND_SPACING / 2, LEGEND_SPACING * (count - 0.5)), y_range=(-8.0, 16.0))
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds, titlebar=False)
+
+
 def frustum_legend(layout: Layout) -> rrb.Spatial2DView:
-    """The names of the frustums in their colours, all in one row."""
-    width = LEGEND_SPACING * (len(layout.stages) + (2 if layout.has_reference else 1))
-    bounds = rrb.VisualBounds2D(x_range=(-LEGEND_SPACING / 2, width - LEGEND_SPACING / 2), y_range=(-8.0, 16.0))
-    return rrb.Spatial2DView(
-        origin=f"/{entities.LEGEND_STAGES}", name="Camera frustums", visual_bounds=bounds, titlebar=False
-    )
+    """The names of the frustums in their colours."""
+    return names_legend("Cameras", entities.LEGEND_STAGES, len(layout.stages) + (2 if layout.has_reference else 1))
 
 
 def curve_view(kind: str, unit: str) -> rrb.TimeSeriesView:
@@ -104,8 +112,8 @@ def scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> r
         name=name,
         overrides={f"/{entities.CLOUD}": [rr.Points3D.from_fields().visualizer(mappings=[colors])]},
         eye_controls=rrb.EyeControls3D(
-            position=_seen_from(layout, ahead=-5.0, left=1.5, up=2.4),
-            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-0.5),
+            position=_seen_from(layout, ahead=-5.0, left=1.5, up=2.8),
+            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-1.8),
             eye_up=(0.0, 0.0, 1.0),
         ),
         line_grid=rrb.LineGrid3D(visible=False),
