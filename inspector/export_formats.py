@@ -70,7 +70,7 @@ def as_opencv(exported: Exported) -> str:
     """A YAML file for ``cv2.FileStorage``; ``rvec`` and ``tvec`` are what ``cv2.projectPoints`` takes."""
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.writeComment(CONVENTION)
-    storage.writeComment("camera_matrix in pixels, pixel centres at integers; of images without the distortion")
+    storage.writeComment("camera_matrix in pixels, their centres at integers; distortion is that of the raw images")
     storage.writeComment(f"Source: calib-inspect, {exported.origin}")
     storage.write("image_width", exported.camera.width)
     storage.write("image_height", exported.camera.height)

@@ -102,6 +102,9 @@ def loaded_by(statement: str) -> set[str]:
         "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['--version'])",
         "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['evaluate', '--help'])",
         "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['info', '--help'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['compare', '--help'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['check', '--help'])",
+        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['export', '--help'])",
     ],
 )
 def test_what_must_stay_quick_imports_nothing_heavy(statement: str) -> None:
