@@ -92,6 +92,11 @@ class Comparison:
         """Whether all runs start from the same extrinsics."""
         return all(run.starts_like(self.first) for run in self.runs[1:])
 
+    @property
+    def one_coloring(self) -> bool:
+        """Whether the points of all overlays are coloured by the same thing."""
+        return len({run.run.settings.get("color") for run in self.runs}) == 1
+
     @classmethod
     def of(cls, runs: Sequence[RecordedRun], names: Sequence[str], common_frames: bool = False) -> Comparison:
         """Put runs side by side.

@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 
 from inspector import entities
 from inspector.comparison import Comparison
-from inspector.views import LEGEND_HEIGHT, SCREEN_HEIGHT, SCREEN_WIDTH, View, legend
+from inspector.views import LEGEND_HEIGHT, SCREEN_HEIGHT, SCREEN_WIDTH, View, legend, overlay_view
 
 COMPARISON_TABLE = "comparison/table"
 LARGEST_OVERLAY = 390.0
@@ -36,13 +36,13 @@ def results_tab(comparison: Comparison) -> View:
     if any(run.run.has_reference for run in comparison.runs):
         curves = [_curves(comparison, kind, unit) for kind, unit in entities.ERROR_KINDS.items()]
         below = rrb.Horizontal(rrb.Vertical(*curves), table, column_shares=[1.0, 1.2])
-    return rrb.Vertical(
-        side_by_side(_corrected(comparison)),
-        legend("Depth of the points", entities.LEGEND_POINTS),
-        below,
-        row_shares=_rows(comparison),
-        name="Comparison",
-    )
+    overlays = side_by_side(_corrected(comparison))
+    height = _overlay_height(comparison)
+    if not comparison.one_coloring:
+        return rrb.Vertical(overlays, below, row_shares=[height, SCREEN_HEIGHT - height], name="Comparison")
+    shares = [height, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - height]
+    colors = legend("Colours of the points", entities.LEGEND_POINTS)
+    return rrb.Vertical(overlays, colors, below, row_shares=shares, name="Comparison")
 
 
 def overlays_tab(comparison: Comparison) -> View:
@@ -72,12 +72,8 @@ def _corrected(comparison: Comparison) -> list[rrb.Spatial2DView]:
 def _overlay(comparison: Comparison, name: str, points: str) -> rrb.Spatial2DView:
     """Points over the frame's image; all views show the same part, whatever lies beside the image."""
     cameras = [frame.camera for frame in comparison.first.frames]
-    bounds = rrb.VisualBounds2D(
-        x_range=(0.0, float(max(camera.width for camera in cameras))),
-        y_range=(0.0, float(max(camera.height for camera in cameras))),
-    )
-    contents = [f"/{entities.IMAGE}", f"/{points}/**"]
-    return rrb.Spatial2DView(origin="/", contents=contents, name=name, visual_bounds=bounds)
+    size = (max(camera.width for camera in cameras), max(camera.height for camera in cameras))
+    return overlay_view(name, points, size)
 
 
 def _curves(comparison: Comparison, kind: str, unit: str) -> rrb.TimeSeriesView:
@@ -97,11 +93,10 @@ def _largest(comparison: Comparison, kind: str) -> float:
     )
 
 
-def _rows(comparison: Comparison) -> list[float]:
-    """Heights of overlays, legend and the rest, so that the overlays fill a screen of 1920 x 1080."""
+def _overlay_height(comparison: Comparison) -> float:
+    """Height of the overlays together, so that they fill the width of a screen of 1920 x 1080."""
     camera = comparison.first.frames[0].camera
     columns = min(len(comparison.runs), MOST_COLUMNS)
     rows = -(-len(comparison.runs) // columns)
     wanted = rows * (SCREEN_WIDTH / columns * camera.height / camera.width + TITLE_BAR)
-    height = min(wanted, LARGEST_OVERLAY)
-    return [height, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - height]
+    return min(wanted, LARGEST_OVERLAY)

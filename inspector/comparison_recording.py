@@ -25,9 +25,8 @@ if TYPE_CHECKING:
 
 SHARED = (f"{entities.IMAGE}/**", f"{entities.LEGEND_POINTS}/**", f"{entities.OVERLAY_REFERENCE}/**")
 """The same in all runs, and taken from one."""
-CURVES = tuple(entities.error_corrected(kind) for kind in entities.ERROR_KINDS)
-OWN = (f"{entities.OVERLAY_MISCALIBRATED}/**", f"{entities.OVERLAY_CORRECTED}/**", *CURVES)
-"""What every run has of its own."""
+OWN = (f"{entities.OVERLAY_MISCALIBRATED}/**", f"{entities.OVERLAY_CORRECTED}/**")
+"""Of every run."""
 RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
 CHUNKS_A_FLUSH = 16
 
@@ -49,7 +48,7 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
         table = rr.TextDocument(comparison_table(comparison), media_type=rr.MediaType.MARKDOWN)
         stream.rec.log(COMPARISON_TABLE, table, static=True)
         for number, run in enumerate(comparison.runs):
-            _log_curve_styles(stream.rec, run, RUN_COLORS[number % len(RUN_COLORS)])
+            _log_curves(stream.rec, run, RUN_COLORS[number % len(RUN_COLORS)])
         for count, chunk in enumerate(_copied(comparison), start=1):
             rr.send_chunks(chunk, recording=stream.rec)
             if count % CHUNKS_A_FLUSH == 0:
@@ -58,14 +57,21 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
         stream.close()
 
 
-def _log_curve_styles(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
-    for curve in CURVES:
-        rec.log(
-            run.path(curve),
-            rr.SeriesLines(names=run.name, colors=color, widths=2.0),
-            rr.SeriesPoints(names=run.name, colors=color, marker_sizes=3.0),
-            static=True,
-        )
+def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
+    """Errors after the last stage, from the extrinsics: a recording need not have curves."""
+    errors = [error for frame in run.frames if (error := frame.error(frame.corrected)) is not None]
+    if len(errors) < len(run.frames):
+        return
+    times = [
+        rr.TimeColumn(entities.FRAME, sequence=[frame.index for frame in run.frames]),
+        rr.TimeColumn(entities.TIME, duration=[frame.seconds for frame in run.frames]),
+    ]
+    curves = {"rotation": [error.rotation_deg for error in errors], "translation": [e.translation_cm for e in errors]}
+    for kind, values in curves.items():
+        path = run.path(entities.error_corrected(kind))
+        rec.send_columns(path, times, rr.Scalars.columns(scalars=values))
+        line = rr.SeriesLines(names=run.name, colors=color, widths=2.0)
+        rec.log(path, line, rr.SeriesPoints(names=run.name, colors=color, marker_sizes=3.0), static=True)
 
 
 def _copied(comparison: Comparison) -> Iterator[Chunk]:

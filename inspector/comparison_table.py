@@ -11,7 +11,7 @@ from inspector.table import NOTHING, markdown
 
 RECORD_KEYS = ("samples", "minutes", "commit", "interim")
 """What tells weights apart, of their training record."""
-UNCOMPARED = ("detail",)
+UNCOMPARED = ("detail", "parts", "color")
 """Settings that change what is shown and not what is computed."""
 
 Column = tuple[str, Callable[[Metrics], float], Callable[[float], str]]
