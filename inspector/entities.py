@@ -41,6 +41,7 @@ CAMERA_REFERENCE = "world/camera/reference"
 
 EXTRINSIC_INITIAL = "extrinsic/initial"
 EXTRINSIC_REFERENCE = "extrinsic/reference"
+EXTRINSIC_DRIVE = "extrinsic/drive"
 CAMERA = "extrinsic/camera"
 """The frame's own camera: ``width``, ``height``, ``camera_matrix`` row by row, and ``source``, its image's name."""
 MATRIX = "camera_from_lidar"
@@ -74,6 +75,16 @@ def caption(overlay: str) -> str:
 def camera_stage(number: int) -> str:
     """The camera's frustum in the LiDAR frame after a stage."""
     return f"world/camera/stage_{number}"
+
+
+def drive_parameter(name: str) -> str:
+    """One parameter of the extrinsic estimated from the whole drive."""
+    return f"drive/{name}"
+
+
+def drive_curve(name: str, curve: str) -> str:
+    """Its curve after every frame: ``estimate``, or the ``upper`` or ``lower`` end of its uncertainty."""
+    return f"{drive_parameter(name)}/{curve}"
 
 
 def extrinsic_stage(number: int) -> str:

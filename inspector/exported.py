@@ -62,6 +62,19 @@ def exported_median(run: RecordedRun) -> Exported:
     return Exported(median_pose([frame.corrected for frame in run.frames]), first.camera, np.zeros(5), origin)
 
 
+def exported_drive(run: RecordedRun) -> Exported:
+    """The extrinsic that the run solved from all frames together.
+
+    Raises:
+        RecordingError: the run did not do that.
+    """
+    if run.drive is None:
+        raise RecordingError(
+            f"{run.path} has no estimate from the whole drive; record it with --sequence-estimate, or use --median."
+        )
+    return Exported(run.drive, run.frames[0].camera, np.zeros(5), f"{run.title}, all frames solved together")
+
+
 def exported_folder(folder: Path) -> Exported:
     """The calibration of a plain folder: of its ``calibration.yaml``.
 

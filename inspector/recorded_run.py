@@ -89,6 +89,7 @@ class RecordedRun:
         stages: the stages that ran, coarse to fine.
         has_reference: whether the frames have a reference, and with it errors.
         frames: the complete frames, in order; at least one.
+        drive: ``camera_from_lidar`` solved from all frames together; None where the run did not do that.
         warning: one sentence when the file is cut off, to show the user; else empty.
     """
 
@@ -100,6 +101,7 @@ class RecordedRun:
     stages: tuple[RecordedStage, ...]
     has_reference: bool
     frames: tuple[RecordedFrame, ...] = field(repr=False)
+    drive: Extrinsic | None = field(repr=False)
     warning: str
     _file: RecordingFile = field(repr=False)
 
@@ -155,6 +157,7 @@ def read_run(path: Path) -> RecordedRun:
     if not frames:
         raise RecordingError(f"{path} ends before its first frame is complete; copy it again or record it again.")
     versions = {name: value for name, (value,) in provenance.items()}
+    history = {} if file.cut else _matrices(tables[entities.EXTRINSIC_DRIVE])  # its last row is the result
     weights = json.loads(versions.pop("weights", "{}"))
     return RecordedRun(
         path=path,
@@ -165,6 +168,7 @@ def read_run(path: Path) -> RecordedRun:
         stages=tuple(RecordedStage(*stage) for stage in zip(numbers, ranges, strict=True)),
         has_reference=has_reference,
         frames=frames,
+        drive=history[max(history)] if history else None,
         warning=f"{path} is cut off: only its {len(frames)} complete frames are used." if file.cut else "",
         _file=file,
     )

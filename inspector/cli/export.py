@@ -25,6 +25,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 )
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default]")
+@click.option("--drive", is_flag=True, help="The extrinsic solved from all frames together (--sequence-estimate).")
 @click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
 @click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
@@ -41,6 +42,7 @@ def export(
     form: str,
     frame: int | None,
     median: bool,
+    drive: bool,
     output: Path | None,
     camera_frame: str,
     lidar_frame: str,
@@ -53,17 +55,18 @@ def export(
     """
     if (recording is None) == (folder is None):
         raise click.UsageError("Give a recording or --from FOLDER.")
-    if frame is not None and median:
-        raise click.UsageError("Give --frame or --median, not both.")
-    if folder is not None and (frame is not None or median):
-        raise click.UsageError("--frame and --median choose from a recording; a folder has one calibration.")
+    choices = (frame is not None) + median + drive
+    if choices > 1:
+        raise click.UsageError("Give one of --frame, --median and --drive.")
+    if folder is not None and choices:
+        raise click.UsageError("--frame, --median and --drive choose from a recording; a folder has one calibration.")
     for name in (camera_frame, lidar_frame):
         if ROS_NAME.fullmatch(name) is None:
             raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
 
     from inspector import export_formats as formats
 
-    exported = chosen(recording, folder, frame)
+    exported = chosen(recording, folder, frame, drive)
     if form == "ros":
         text = formats.as_ros(exported, formats.RosFrames(camera_frame, lidar_frame, parent == "lidar"))
     else:
@@ -76,12 +79,14 @@ def export(
         click.echo(f"Saved {output}: {exported.origin}.", err=True)
 
 
-def chosen(recording: Path | None, folder: Path | None, frame: int | None) -> Exported:
+def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool) -> Exported:
     """The extrinsic that the options name."""
-    from inspector.exported import exported_folder, exported_frame, exported_median
+    from inspector.exported import exported_drive, exported_folder, exported_frame, exported_median
 
     if folder is not None:
         return exported_folder(folder)
     assert recording is not None
     run = open_run(recording)
+    if drive:
+        return exported_drive(run)
     return exported_median(run) if frame is None else exported_frame(run, frame)

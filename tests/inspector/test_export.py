@@ -21,7 +21,7 @@ from calibnet.geometry.median import median_pose
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.export_formats import quaternion_xyzw
-from inspector.exported import exported_median
+from inspector.exported import exported_drive, exported_median
 from inspector.recorded_run import RecordedRun, read_run
 from inspector.recording_file import RecordingError
 
@@ -148,6 +148,13 @@ def test_json_is_the_median_unless_a_frame_is_named(
     np.testing.assert_array_equal(one["camera_from_lidar"], recorded.frames[0].corrected)
 
 
+def test_the_estimate_from_the_whole_drive(recorded: RecordedRun) -> None:
+    drive = recorded.frames[0].initial
+    exported = exported_drive(replace(recorded, drive=drive))
+    assert exported.camera_from_lidar is drive
+    assert "all frames solved together" in exported.origin
+
+
 def test_a_folders_calibration_keeps_its_distortion(
     export: Callable[..., str], own_folder: Path, fakes: ModuleType
 ) -> None:
@@ -180,9 +187,10 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
     [
         ((), 2, "Give a recording or --from"),
         (("RUN", "--from", "x"), 2, "Give a recording or --from"),
-        (("RUN", "--frame", 1, "--median"), 2, "not both"),
+        (("RUN", "--frame", 1, "--median"), 2, "one of --frame, --median and --drive"),
         (("--from", "x", "--median"), 2, "has one calibration"),
         (("RUN", "--lidar-frame", "two words"), 2, "no ROS frame name"),
+        (("RUN", "--drive"), 3, "record it with --sequence-estimate"),
         (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),
         (("--from", "nowhere"), 3, "cannot be read"),
         (("nowhere.rrd",), 3, "There is no recording nowhere.rrd"),

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 import rerun as rr
+from rerun.chunk import RrdReader
 
 from calibnet.geometry import MiscalibrationRange, project
 from inspector import entities
@@ -66,6 +67,21 @@ def test_pictures_come_back(full_recording: Path, fakes: ModuleType) -> None:
     assert nearest.max() <= 0.126  # positions are rounded to a quarter of a pixel
     with pytest.raises(RecordingError, match="holds no image of frame 7"):
         run.image(7)
+
+
+def test_of_a_drive_solved_as_one_the_last_estimate_is_the_result(tmp_path: Path, full_recording: Path) -> None:
+    file = tmp_path / "drive.rrd"
+    rec = rr.RecordingStream("calib-inspect")
+    rec.save(file)
+    rr.send_chunks(RrdReader(full_recording).store().stream(), recording=rec)
+    for index in (0, 2):
+        rec.set_time("frame", sequence=index)
+        rec.log(entities.EXTRINSIC_DRIVE, rr.AnyValues(camera_from_lidar=np.full(16, float(index))))
+    rec.disconnect()
+    drive = read_run(file).drive
+    assert drive is not None
+    np.testing.assert_array_equal(drive, np.full((4, 4), 2.0))
+    assert read_run(full_recording).drive is None
 
 
 def test_without_reference_there_is_none(record: Callable[..., Any], tmp_path: Path) -> None:
@@ -131,8 +147,10 @@ def test_what_cannot_be_read_is_one_sentence(make: Callable[[Path], Any], senten
 
 
 def test_cut_before_the_first_frame(long_recording: Path, tmp_path: Path) -> None:
+    content = long_recording.read_bytes()
+    first = content.index(b"camera_from_lidar")  # the schema of the first chunk of extrinsics
     with pytest.raises(RecordingError, match="before its first frame is complete"):
-        read_run(cut(long_recording, 0.12, tmp_path / "cut.rrd"))
+        read_run(cut(long_recording, first / len(content), tmp_path / "cut.rrd"))
 
 
 def test_damage_in_the_middle(full_recording: Path, tmp_path: Path) -> None:
