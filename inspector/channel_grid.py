@@ -80,7 +80,8 @@ def _number(value: int, width: int) -> NDArray[np.bool_]:
 def levels(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
     """Palette entries `LOWEST` to `HIGHEST` of values from ``low`` to ``high``, same shape."""
     share = np.clip((np.nan_to_num(values.astype(np.float32)) - low) / max(high - low, 1e-6), 0.0, 1.0)
-    return (LOWEST + (HIGHEST - LOWEST) * share).astype(np.uint8)
+    entries: NDArray[np.uint8] = (LOWEST + (HIGHEST - LOWEST) * share).astype(np.uint8)
+    return entries
 
 
 def palette_png(grid: NDArray[np.uint8]) -> bytes:

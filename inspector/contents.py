@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from calibnet.trace import ScaleTrace, StageDetail
+
 
 class Detail(StrEnum):
     """How much of each frame is logged: a light set of views, everything, or the parts that are named."""
@@ -40,7 +42,8 @@ class Contents:
 
     Attributes:
         parts: which parts.
-        dense: many points, at a quarter of a pixel; otherwise few, for a megabyte a frame at most.
+        dense: many points, at a quarter of a pixel, and the cost volumes of every scale; otherwise few points and
+            the finest scale, for a megabyte a frame at most.
         color: of the overlays' points; ``error`` needs a reference.
     """
 
@@ -59,3 +62,9 @@ class Contents:
     def inside(self) -> bool:
         """Whether anything is logged that only the network's intermediate results show."""
         return bool(self.parts & {Part.VOLUMES, Part.HOURGLASS, Part.TENSORS})
+
+    def scales(self, results: StageDetail | None) -> tuple[ScaleTrace, ...]:
+        """The cost volumes that are shown, fine to coarse; none where the run kept none."""
+        if results is None or not self.inside:
+            return ()
+        return results.scales if self.dense else results.scales[:1]

@@ -45,7 +45,7 @@ def _log_overlays(rec: rr.RecordingStream, observation: Observation, contents: C
     thinning, paint = DENSE if contents.dense else SPARSE, make_painter(observation, contents.color)
 
     def overlay(camera_from_lidar: NDArray[np.float64]) -> Overlay:
-        return make_overlay(frame, camera_from_lidar, thinning, paint)
+        return make_overlay(observation.projected(camera_from_lidar), frame.camera, thinning, paint)
 
     def log(path: str, points: Overlay, name: str, camera_from_lidar: NDArray[np.float64]) -> None:
         rec.log(path, points.archetype())

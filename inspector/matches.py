@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import PinholeCamera, project
+from calibnet.geometry import PinholeCamera
 from calibnet.geometry.projection import Projection, nearest_per_cell
 from calibnet.trace import StageDetail, StageTrace
 from inspector.observation import Observation
@@ -19,7 +19,7 @@ class StartingPoints:
 
     Attributes:
         camera: the network's.
-        projection: of the scan with the extrinsic that the stage starts from.
+        projection: of the scan with the extrinsic that the stage starts from, rows far to near.
         displacement: ``[M, 2]`` float32 pixels ``(dx, dy)`` to where the reference puts each point; None without one.
     """
 
@@ -29,19 +29,22 @@ class StartingPoints:
 
     @classmethod
     def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
-        """Project the scan as the stage found it."""
-        camera, reference = observation.trace.camera, observation.reference
-        projection = project(observation.frame.points, stage.before, camera)
+        """The scan as the stage found it; the network's image is the frame's, resized."""
+        camera, reference, frame = observation.trace.camera, observation.reference, observation.frame
+        projection = observation.projected(stage.before)
+        scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
+        pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers
+        projection = replace(projection, pixels=pixels)
         if reference is None:
             return cls(camera, projection, None)
-        points = observation.frame.points[projection.index, :3]
-        true = (points @ reference[:3, :3].T + reference[:3, 3]) @ camera.matrix.T
+        to_image = (camera.matrix @ reference[:3]).astype(np.float32)
+        true = frame.points[projection.index, :3] @ to_image[:, :3].T + to_image[:, 3]
         ahead = np.maximum(true[:, 2:], 1e-3)  # what is behind the true camera is off by a lot, whatever the figure
-        return cls(camera, projection, (true[:, :2] / ahead - projection.pixels).astype(np.float32))
+        return cls(camera, projection, true[:, :2] / ahead - pixels)
 
     def nearest(self, stride: int) -> NDArray[np.int64]:
         """``[h, w]``: row of the nearest point of each cell, -1 where there is none."""
-        return nearest_per_cell(self.projection, self.camera, stride)
+        return nearest_per_cell(self.projection, self.camera, stride, np.arange(len(self.projection.depth)))
 
     def true_field(self, stride: int) -> NDArray[np.float32] | None:
         """``[h, w, 2]`` pixels: the true displacement of each cell's nearest point, 0 in empty cells."""

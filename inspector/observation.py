@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import PoseError, invert, pose_error
+from calibnet.geometry import PoseError, invert, pose_error, project
+from calibnet.geometry.projection import Projection
 from calibnet.trace import CascadeTrace
 from inspector.contents import Contents
 
@@ -46,6 +48,30 @@ class Observation:
     reference: NDArray[np.float64] | None = field(default=None, repr=False)
     skipped: tuple[Skipped, ...] = ()
 
+    def projected(self, camera_from_lidar: NDArray[np.float64]) -> Projection:
+        """The scan in the frame's image, rows far to near; each extrinsic of the run is projected once."""
+        key = camera_from_lidar.tobytes()
+        if key not in self._projections:
+            seen = project(self.frame.points[self._in_front], camera_from_lidar, self.frame.camera)
+            order = seen.far_to_near()
+            self._projections[key] = Projection(
+                seen.pixels[order], seen.depth[order], self._in_front[seen.index[order]], seen.points[order]
+            )
+        return self._projections[key]
+
+    @cached_property
+    def _projections(self) -> dict[bytes, Projection]:
+        return {}
+
+    @cached_property
+    def _in_front(self) -> NDArray[np.intp]:
+        """Rows of the scan before the camera under any extrinsic of the run: half of what a scanner sees."""
+        extrinsics = [self.trace.initial, *(stage.after for stage in self.trace.stages)]
+        extrinsics += [] if self.reference is None else [self.reference]
+        ahead = np.stack([extrinsic[2] for extrinsic in extrinsics]).astype(np.float32)
+        depths = ahead[:, :3] @ self.frame.points[:, :3].T + ahead[:, 3:]
+        return np.flatnonzero(depths.max(axis=0) > 0.0)
+
     def error(self, camera_from_lidar: NDArray[np.float64]) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""
         return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
@@ -66,7 +92,7 @@ class StageLayout:
     Attributes:
         number: 1 to 5.
         range: for instance ``"5/0.5"``.
-        grids: stride, height and width in cells of each cost volume, fine to coarse.
+        grids: stride, height and width in cells of each cost volume that is shown, fine to coarse.
     """
 
     number: int
@@ -96,6 +122,7 @@ class Layout:
         image: width and height of the first frame's image, in pixels.
         position: of the camera in the LiDAR frame, metres.
         forward: its viewing direction there, of unit length.
+        as_one: whether an estimate from the whole drive follows the frames.
     """
 
     stages: tuple[StageLayout, ...]
@@ -104,6 +131,7 @@ class Layout:
     image: tuple[int, int] = (1242, 375)
     position: Vector = (0.0, 0.0, 0.0)
     forward: Vector = (1.0, 0.0, 0.0)
+    as_one: bool = False
 
     @property
     def start(self) -> str:
@@ -111,15 +139,13 @@ class Layout:
         return "Miscalibrated" if self.has_reference else "As given"
 
     @classmethod
-    def of(cls, observation: Observation, contents: Contents) -> Layout:
+    def of(cls, observation: Observation, contents: Contents, as_one: bool = False) -> Layout:
         """The layout of a recording that starts with this observation."""
         stages = tuple(
             StageLayout(
                 stage.number,
                 str(stage.range),
-                tuple(Grid(scale.stride, *scale.occupied.shape) for scale in stage.detail.scales)
-                if stage.detail
-                else (),
+                tuple(Grid(scale.stride, *scale.occupied.shape) for scale in contents.scales(stage.detail)),
             )
             for stage in observation.trace.stages
         )
@@ -132,6 +158,7 @@ class Layout:
             (camera.width, camera.height),
             _vector(lidar_from_camera[:3, 3]),
             _vector(lidar_from_camera[:3, 2]),
+            as_one,
         )
 
 

@@ -8,9 +8,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from calibnet.datasets.frame import Frame
-from calibnet.geometry import project
-from calibnet.geometry.projection import nearest_per_cell
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.projection import Projection, nearest_per_cell
 from inspector.painting import Painter, paint_depth
 
 
@@ -48,21 +47,19 @@ class Overlay:
 
 
 def make_overlay(
-    frame: Frame, camera_from_lidar: NDArray[np.float64], thinning: Thinning, paint: Painter = paint_depth
+    projection: Projection, camera: PinholeCamera, thinning: Thinning, paint: Painter = paint_depth
 ) -> Overlay:
-    """Project a frame's scan with an extrinsic; the nearest point of each cell stays.
+    """Thin a projected scan; the nearest point of each cell stays.
 
     Args:
-        frame: image, scan and camera.
-        camera_from_lidar: the extrinsic to show.
+        projection: rows far to near, see `inspector.observation.Observation.projected`.
+        camera: whose image it is.
         thinning: how many points to keep.
         paint: gives the points their colours and sizes.
     """
-    projection = project(frame.points, camera_from_lidar, frame.camera)
-    stride = max(1, round(frame.camera.width / thinning.cells_across))
-    winner = nearest_per_cell(projection, frame.camera, stride)
-    kept = winner[winner >= 0]
-    far_to_near = kept[np.argsort(-projection.depth[kept], kind="stable")]
-    pixels = np.round(projection.pixels[far_to_near] / thinning.pixel) * thinning.pixel
-    colors, sizes = paint(projection, far_to_near)
+    stride = max(1, round(camera.width / thinning.cells_across))
+    winner = nearest_per_cell(projection, camera, stride, np.arange(len(projection.depth)))
+    kept = np.sort(winner[winner >= 0])
+    pixels = np.round(projection.pixels[kept] / thinning.pixel) * thinning.pixel
+    colors, sizes = paint(projection, kept)
     return Overlay(pixels.astype(np.float32), colors, sizes)

@@ -59,7 +59,7 @@ def _subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
     near = np.square(frame.points[:, :3]).sum(axis=1) < RANGE_M**2
     seen = np.zeros(len(frame.points), dtype=np.bool_)
     for camera_from_lidar in (observation.trace.initial, observation.trace.corrected):
-        seen[project(frame.points, camera_from_lidar, frame.camera).index] = True
+        seen[observation.projected(camera_from_lidar).index] = True
     parts = [
         _evenly(np.flatnonzero(near & seen), round(SEEN_SHARE * limit)),
         _evenly(np.flatnonzero(near & ~seen), round((1.0 - SEEN_SHARE) * limit)),

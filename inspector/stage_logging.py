@@ -36,7 +36,7 @@ def log_stage(
     if contents.parts & {Part.VOLUMES, Part.TENSORS}:
         points = StartingPoints.of(observation, stage)
         match = chosen_match(points, results)
-        for scale in results.scales:
+        for scale in contents.scales(results):
             true = points.true_field(scale.stride)
             if Part.VOLUMES in contents.parts:
                 log_maps(rec, number, scale, true)
@@ -46,7 +46,7 @@ def log_stage(
                 log_tensors(rec, number, scale)
                 log_slices(rec, number, scale, true)
     if Part.HOURGLASS in contents.parts:
-        for scale in results.scales:
+        for scale in contents.scales(results):
             log_hourglass(rec, number, scale)
 
 

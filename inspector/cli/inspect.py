@@ -39,14 +39,19 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--miscalibrate", "given", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."),
     click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
     click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random."),
+    click.option(
+        "--sequence-estimate",
+        is_flag=True,
+        help="After the frames, solve them all as one drive on one mount, and record how the estimate converges.",
+    ),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
         "--detail",
         type=click.Choice(["overview", "full", "custom"]),
-        help="full: some 4 MB a frame; overview: fewer points and no raw volumes, 1 MB at most; custom: what --log "
-        "names.  [default: full]",
+        help="full: some 5 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
+        "custom: what --log names.  [default: full]",
     ),
     click.option(
         "--log",
@@ -184,6 +189,7 @@ def calibrate(
     given: Matrix | None,
     per_frame: bool,
     seed: int,
+    sequence_estimate: bool,
     stages: tuple[int, ...] | None,
     preset: str,
     weights: Path | None,
@@ -214,6 +220,8 @@ def calibrate(
         raise click.UsageError("Give --range or --miscalibrate, not both.")
     if given is not None and per_frame:
         raise click.UsageError("--per-frame draws from --range; --miscalibrate is the same for all frames.")
+    if sequence_estimate and per_frame:
+        raise click.UsageError("--sequence-estimate needs one mount for all frames; --per-frame moves it in each.")
     if as_is and color == "error":
         raise click.UsageError(
             f"--color error shows the distance to the reference, and {sequence.name} has none: give --range or "
@@ -244,10 +252,11 @@ def calibrate(
         "detail": detail or "full",
         "parts": ",".join(sorted(contents.parts)),
         "color": color,
+        "sequence_estimate": sequence_estimate,
     }
     provenance = describe_provenance(preset, [stage.number for stage in cascade.stages], weights)
     description = RunDescription(f"{sequence.name}, {describe(start)}", identity, provenance)
-    session = Session(sequence, positions, cascade, start, outputs, description, contents, console)
+    session = Session(sequence, positions, cascade, start, outputs, description, contents, console, sequence_estimate)
     try:
         summary = session.run()
         return finish(summary, outputs, report)
@@ -306,6 +315,7 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
     for line in summary.lines():
         click.echo(line)
     if outputs.file is not None and summary.frames:
+        click.echo(size_line(outputs.file, summary.frames))
         for line in saved_lines(outputs.file, summary.frames):
             click.echo(line)
         if report is not None:
@@ -319,3 +329,11 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
         click.echo(f"Serving at {outputs.page} until Ctrl-C.")
         outputs.wait_while_serving()
     return ExitCode.OK
+
+
+def size_line(file: Path, frames: int) -> str:
+    """What a frame's bytes go to."""
+    from inspector.sizes import sizes_by_group
+
+    parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
+    return f"Kilobytes a frame: {', '.join(parts)}."

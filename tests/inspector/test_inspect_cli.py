@@ -164,3 +164,29 @@ def test_report_keeps_the_recording_where_no_other_place_is_named(invoke: Invoke
     }
     invoke("folder", str(own_folder), "--range", "2/0.2", "--save", "own.rrd", "--report", "other")
     assert Path("own.rrd").read_bytes() == Path("other/recording.rrd").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--color", "error"), "has none: give --range or --miscalibrate"),
+        (("--log", "curves,pictures"), "'pictures' is no part of a frame; choose from curves,"),
+        (("--log", "curves", "--detail", "full"), "belong together"),
+        (("--detail", "custom"), "belong together"),
+    ],
+)
+def test_contents_that_make_no_sense_are_wrong_usage(
+    invoke: Invoke, own_folder: Path, options: tuple[str, ...], sentence: str
+) -> None:
+    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd", *options)
+    assert code == 2
+    assert sentence in " ".join(err.split())
+    assert not Path("own.rrd").exists()
+
+
+def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--frames", "0", "--save", "own.rrd", "--log", "overlays,scene")
+    assert code == 0
+    assert "Kilobytes a frame: " in out
+    assert "3D scene" in out
+    assert "hourglass" not in out

@@ -8,6 +8,7 @@ from types import ModuleType
 import numpy as np
 from PIL import Image
 
+from calibnet.geometry import project
 from inspector.channel_grid import GAP, HEADER, HIGHEST, LOWEST, channel_grid, palette_png, slice_grid
 from inspector.colors import EMPTY, depth_colors, flow_colors
 from inspector.contents import Coloring
@@ -34,7 +35,9 @@ def test_flow_colors_tell_directions_apart_and_leave_zero_white() -> None:
 
 def test_overlay_keeps_the_nearest_point_of_each_cell_and_draws_it_last(fakes: ModuleType) -> None:
     frame = fakes.make_frame(0)
-    overlay = make_overlay(frame, frame.camera_from_lidar, Thinning(cells_across=40, pixel=0.25))
+    trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
+    projection = Observation(frame, trace).projected(frame.camera_from_lidar)
+    overlay = make_overlay(projection, frame.camera, Thinning(cells_across=40, pixel=0.25))
     in_camera = frame.points[:, :3] @ frame.camera_from_lidar[:3, :3].T + frame.camera_from_lidar[:3, 3]
     pixels = in_camera @ frame.camera.matrix.T
     pixels = pixels[:, :2] / pixels[:, 2:]
@@ -102,19 +105,34 @@ def test_an_edge_is_a_point_that_stands_before_something_farther() -> None:
 def test_error_colours_tell_pixels_from_the_reference(fakes: ModuleType) -> None:
     frame = fakes.make_frame(0)
     trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
-    paint = make_painter(Observation(frame, trace, frame.camera_from_lidar), Coloring.ERROR)
-    thinning = Thinning(cells_across=40, pixel=0.25)
-    right = make_overlay(frame, frame.camera_from_lidar, thinning, paint).colors.astype(int)
-    wrong = make_overlay(frame, trace.initial, thinning, paint).colors.astype(int)
+    observation = Observation(frame, trace, frame.camera_from_lidar)
+    paint, thinning = make_painter(observation, Coloring.ERROR), Thinning(cells_across=40, pixel=0.25)
+    right, wrong = (
+        make_overlay(observation.projected(extrinsic), frame.camera, thinning, paint).colors.astype(int)
+        for extrinsic in (frame.camera_from_lidar, trace.initial)
+    )
     assert (right == right[0]).all() and right[0, 2] > right[0, 0]  # blue: in place
     assert np.median(wrong[:, 0] - wrong[:, 2]) > 50  # red: far off
 
 
-def test_edges_stand_out_by_size_and_are_the_same_under_every_extrinsic(fakes: ModuleType) -> None:
+def test_edges_stand_out_by_size(fakes: ModuleType) -> None:
     frame = fakes.make_frame(0)
     trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
-    paint = make_painter(Observation(frame, trace), Coloring.EDGE)
-    overlay = make_overlay(frame, frame.camera_from_lidar, Thinning(cells_across=400, pixel=0.25), paint)
+    observation = Observation(frame, trace)
+    projection = observation.projected(frame.camera_from_lidar)
+    thinning, paint = Thinning(cells_across=400, pixel=0.25), make_painter(observation, Coloring.EDGE)
+    overlay = make_overlay(projection, frame.camera, thinning, paint)
     large = overlay.sizes == overlay.sizes.max()
     assert 0.0 < large.mean() < 0.5
     assert (overlay.colors[large] == overlay.colors[large][0]).all()
+
+
+def test_a_projection_keeps_its_points_and_goes_far_to_near(fakes: ModuleType) -> None:
+    frame = fakes.make_frame(0)
+    trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
+    projection = Observation(frame, trace).projected(trace.initial)
+    exact = project(frame.points, trace.initial, frame.camera)
+    assert (np.diff(projection.depth) <= 0).all()
+    assert set(projection.index) == set(exact.index)
+    order = np.argsort(projection.index)
+    np.testing.assert_array_equal(projection.pixels[order], exact.pixels)

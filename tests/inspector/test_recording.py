@@ -163,14 +163,16 @@ def test_without_reference_nothing_claims_to_know_it(record: Callable[..., Any],
     assert "No reference" in row.as_py()[0]
 
 
-def test_overview_keeps_every_view_but_the_raw_volumes(record: Callable[..., Any], tmp_path: Path) -> None:
+def test_overview_keeps_every_view_but_the_raw_volumes_and_coarse_scales(
+    record: Callable[..., Any], tmp_path: Path
+) -> None:
     file = tmp_path / "overview.rrd"
     record(file, detail="overview", length=5)
     paths = {str(column.entity_path).lstrip("/") for column in RrdReader(file).store().schema().component_columns()}
-    volumes = {
-        path for path in expected_streams() if path.endswith(("cost_volume", "/probability", "slices", "slices/marks"))
-    }
-    assert expected_streams().keys() - paths == volumes
+    raw = ("cost_volume", "/probability", "slices", "slices/marks")
+    left_out = {path for path in expected_streams() if path.endswith(raw) or "scale_16" in path or "scale_32" in path}
+    assert expected_streams().keys() - paths == left_out
+    assert not [path for path in paths if "scale_16" in path or "scale_32" in path]
 
 
 def test_the_cloud_has_colours_through_every_extrinsic(full_recording: Path, read: Read) -> None:
