@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.evaluation.metrics import Metrics
-from calibnet.geometry import PoseError, pose_error, rotation_from_vector, rotation_vector, transform
+from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry.median import median_pose
 from calibnet.geometry.se3 import Matrix
 from inspector.recorded_run import RecordedFrame, RecordedRun
 
@@ -85,7 +86,7 @@ class Figures:
         """
         frames = run.frames
         corrected = [frame.corrected for frame in frames]
-        median = median_extrinsic(corrected)
+        median = median_pose(corrected)
         yardsticks = [median if frame.reference is None else frame.reference for frame in frames]
         one_mount = float(np.ptp(yardsticks, axis=0).max()) < SAME_MOUNT
 
@@ -184,18 +185,6 @@ class Figures:
 def misplacement_cm(error: PoseError) -> float:
     """How far a point `DISTANCE_M` away is misplaced at most, in centimetres."""
     return float(np.radians(error.rotation_deg)) * 100.0 * DISTANCE_M + error.translation_cm
-
-
-def median_extrinsic(extrinsics: Sequence[Matrix]) -> Matrix:
-    """The middle of several extrinsics, component by component: half of them may be wrong and it stays.
-
-    Rotations are compared as rotation vectors relative to the first, which is exact enough for
-    extrinsics of one mount.
-    """
-    first = extrinsics[0][:3, :3]
-    vectors = np.array([rotation_vector(extrinsic[:3, :3] @ first.T) for extrinsic in extrinsics])
-    translations = np.array([extrinsic[:3, 3] for extrinsic in extrinsics])
-    return transform(rotation_from_vector(np.median(vectors, axis=0)) @ first, np.median(translations, axis=0))
 
 
 def _rounded(error: PoseError) -> dict[str, float]:

@@ -18,7 +18,7 @@ from calibnet.errors import CalibnetError
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.recorded_run import RecordedRun, read_run
-from inspector.report.metrics import Figures, median_extrinsic, misplacement_cm
+from inspector.report.metrics import Figures, misplacement_cm
 from inspector.report.pictures import PICTURE_WIDTH, draw_overlay
 from inspector.report.verdict import headline, verdict
 from inspector.report.write import write_report
@@ -157,13 +157,6 @@ def test_text_of_the_recording_stays_text(known: RecordedRun, tmp_path: Path) ->
     assert "alert" in page
     assert page.count("<script>") == 1
     assert '"1"' not in page
-
-
-def test_median_extrinsic_stays_where_most_frames_are(known: RecordedRun) -> None:
-    reference = known.frames[0].reference
-    assert reference is not None
-    median = median_extrinsic([known.frames[0].initial, known.frames[1].initial, *[reference] * 3])
-    np.testing.assert_allclose(median, reference, atol=1e-9)
 
 
 def test_points_are_drawn_where_they_were_recorded() -> None:
