@@ -10,6 +10,7 @@ import rerun.blueprint as rrb
 
 from inspector import entities
 from inspector.contents import Part
+from inspector.drive_logging import drive_tab
 from inspector.observation import Grid, Layout, StageLayout
 from inspector.views import (
     LEGEND_HEIGHT,
@@ -48,6 +49,8 @@ def make_blueprint(layout: Layout) -> rrb.Blueprint:
         tabs.append(rrb.Tabs(*(hourglass_page(stage) for stage in inside), name="Hourglass"))
     if Part.SCENE in parts:
         tabs.append(scene_tab(layout))
+    if layout.as_one:
+        tabs.append(drive_tab(layout.has_reference))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=FRAMES_PER_SECOND),

@@ -12,11 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
+from calibnet.sequence_estimate import SequenceEstimate
 from inspector import entities
 from inspector.blueprint import make_blueprint
 from inspector.contents import Part
+from inspector.drive_logging import log_drive
 from inspector.frame_logging import log_curve_styles, log_frame
 from inspector.legends import log_legends
 from inspector.observation import Layout, Observation
@@ -68,6 +72,7 @@ class Recording:
         """
         self._contents = layout.contents
         self._frames = self._unflushed = 0
+        self._seconds: dict[int, float] = {}
         self._stream = Stream(
             entities.APPLICATION_ID, description.recording_id, description.title, sinks, make_blueprint(layout)
         )
@@ -85,6 +90,7 @@ class Recording:
         frame = observation.frame
         self._rec.set_time(entities.FRAME, sequence=frame.index)
         self._rec.set_time(entities.TIME, duration=frame.timestamp)
+        self._seconds[frame.index] = frame.timestamp
         log_frame(self._rec, observation, self._contents)
         log_stages(self._rec, observation, self._contents)
         log_scene(self._rec, observation, self._contents)
@@ -94,6 +100,10 @@ class Recording:
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
             self._unflushed = 0
             self._stream.flush()
+
+    def log_drive(self, estimate: SequenceEstimate, reference: NDArray[np.float64] | None) -> None:
+        """Log what all frames together make of the extrinsic."""
+        log_drive(self._rec, estimate, reference, self._seconds)
 
     def close(self) -> None:
         """Flush and write the footer; nothing, where nothing can be written any more."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from dataclasses import dataclass
 from typing import Protocol
@@ -21,10 +22,13 @@ from rich.progress import (
 from rich.text import Text
 
 from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError
 from calibnet.interruption import StopRequest
+from calibnet.sequence_estimate import SequenceEstimate
 from calibnet.trace import CascadeTrace
 from inspector.contents import Contents
+from inspector.drive_logging import drive_sentence
 from inspector.observation import Layout, Observation, Skipped
 from inspector.outputs import Outputs
 from inspector.recording import Recording, RunDescription
@@ -46,6 +50,12 @@ class Calibrator(Protocol):
         """Run the stages on one frame."""
         ...
 
+    def calibrate_sequence(
+        self, frames: PickedFrames, initial: NDArray[np.float64], observer: Callable[[int, int], None] | None = None
+    ) -> SequenceEstimate:
+        """Estimate one extrinsic from all frames."""
+        ...
+
 
 @dataclass(frozen=True)
 class Session:
@@ -60,6 +70,7 @@ class Session:
         description: what the recording says about itself.
         contents: what is logged of each frame.
         console: where progress is shown.
+        as_one: after the frames, also solve all of them as one drive.
     """
 
     sequence: Sequence
@@ -70,6 +81,7 @@ class Session:
     description: RunDescription
     contents: Contents
     console: Console
+    as_one: bool = False
 
     def run(self) -> Summary:
         """Calibrate and record every frame; stop at the first that cannot be read.
@@ -91,11 +103,13 @@ class Session:
                         break
                     observation = self._observe(position)
                     if recording is None:
-                        layout = Layout.of(observation, self.contents)
+                        layout = Layout.of(observation, self.contents, self.as_one)
                         recording = Recording(self.outputs.open(), self.description, layout)
                     self.outputs.check_space()
                     recording.log(observation)
                     summary.add(observation)
+                if self.as_one and recording is not None and not summary.interrupted:
+                    summary.drive = self._solve_as_one(recording, progress, stop)
         except KeyboardInterrupt:
             summary.interrupted = True
         except CalibnetError as error:
@@ -109,6 +123,22 @@ class Session:
         frame = self.sequence[position]
         trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
         return Observation(frame, trace, self.start.reference(frame), tuple(self.cascade.skipped))
+
+    def _solve_as_one(self, recording: Recording, progress: Progress, stop: StopRequest) -> str:
+        """Estimate one extrinsic from all frames and log how it converges; returns the result in words."""
+        frames = PickedFrames(self.sequence, self.positions)
+        first = frames[0]
+        initial, reference = self.start.initial(first), self.start.reference(first)
+        task = progress.add_task("whole drive as one", total=None)
+
+        def advance(read: int, total: int) -> None:
+            progress.update(task, completed=read, total=total)
+            if stop.requested:
+                raise KeyboardInterrupt
+
+        estimate = self.cascade.calibrate_sequence(frames, initial, advance)
+        recording.log_drive(estimate, reference)
+        return drive_sentence(estimate, reference, initial)
 
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:

@@ -17,6 +17,7 @@ class Summary:
 
     frames: int = 0
     interrupted: bool = False
+    drive: str = ""
     started: float = field(default_factory=time.monotonic)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
@@ -48,6 +49,8 @@ class Summary:
             )
         else:
             lines.append(f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with.")
+        if self.drive:
+            lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
         lines.append(f"Cascade, median milliseconds: {times}.")
         return lines

@@ -6,6 +6,6 @@ imported when a sequence of it is opened.
 
 from calibnet.datasets.frame import Frame, Sequence
 from calibnet.datasets.registry import DATASETS, dataset_names, open_sequence
-from calibnet.datasets.selection import SelectedFrames, select_frames
+from calibnet.datasets.selection import PickedFrames, select_frames
 
-__all__ = ["DATASETS", "Frame", "SelectedFrames", "Sequence", "dataset_names", "open_sequence", "select_frames"]
+__all__ = ["DATASETS", "Frame", "PickedFrames", "Sequence", "dataset_names", "open_sequence", "select_frames"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sized
+from collections.abc import Sequence as Positions
 
 from calibnet.datasets.frame import Frame, Sequence
 from calibnet.errors import ConfigError, DatasetError
@@ -41,12 +42,11 @@ def select_frames(sequence: Sized, text: str = ":") -> list[int]:
     return selected
 
 
-class SelectedFrames:
+class PickedFrames:
     """A `Sequence` of some positions of another."""
 
-    def __init__(self, sequence: Sequence, text: str = ":") -> None:
-        """Choose by ``text`` as `select_frames` does, with its errors."""
-        self.sequence, self.positions = sequence, select_frames(sequence, text)
+    def __init__(self, sequence: Sequence, positions: Positions[int]) -> None:
+        self.sequence, self.positions = sequence, positions
         self.name, self.rig = sequence.name, sequence.rig
 
     def __len__(self) -> int:

@@ -39,7 +39,7 @@ class Trainer:
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP, FINAL_RATE = 0.03, 0.02
-    RESIDUALS = 400  # errors of the stages before, measured when the run starts
+    RESIDUALS = 200  # errors of the stages before, measured when the run starts
     POSE_RAMP = 2000  # samples over which the pose's losses fade in after the warm-up
 
     def __init__(self, options: TrainingOptions, observer: Observer, resume: bool = False) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.datasets import DATASETS, SelectedFrames, Sequence, open_sequence
+from calibnet.datasets import DATASETS, PickedFrames, Sequence, open_sequence, select_frames
 from inspector.cli.options import FOLDER, FRAMES, RANGE, STAGES
 from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
 
@@ -72,7 +72,8 @@ def evaluate(
     """
     names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [
-        SelectedFrames(sequence, frames) for sequence in open_sequences(dataset, root, names, camera)
+        PickedFrames(sequence, select_frames(sequence, frames))
+        for sequence in open_sequences(dataset, root, names, camera)
     ]
     prepare_json(json_file)
 

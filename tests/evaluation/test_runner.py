@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from calibnet.datasets import Frame, SelectedFrames
+from calibnet.datasets import Frame, PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.runner import Run, draw_miscalibration, evaluate
 from calibnet.geometry import (
@@ -125,7 +125,7 @@ def test_nothing_measured_is_an_error() -> None:
 def test_frame_selection_and_observer() -> None:
     seen: list[Run] = []
     drives = [Drive([10, 11, 12, 13]), Drive([0, 1, 2, 3], name="other", rig="other rig")]
-    sequences = [SelectedFrames(drive, "1:4:2") for drive in drives]
+    sequences = [PickedFrames(drive, [1, 3]) for drive in drives]
     evaluation = evaluate(ShrinkingCascade(), sequences, BOUNDS, 1, 0, observer=seen.append)
     assert [(run.sequence, run.frame) for run in seen] == [
         ("test/drive", 11),
