@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 from dataclasses import dataclass
+from importlib.metadata import version
 
 import click
 
@@ -41,6 +42,9 @@ COMMANDS = {
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
+    "benchmark": LazyCommand(
+        "inspector.cli.benchmark:benchmark", "Milliseconds of the cascade by part, stage and frame."
+    ),
     "info": LazyCommand("inspector.cli.model:info", "Parameters and multiply-adds of a network, by module."),
 }
 """Every command, in the order in which ``--help`` lists them."""
@@ -64,8 +68,16 @@ class LazyGroup(click.Group):
             formatter.write_dl([(name, lazy.help) for name, lazy in COMMANDS.items()])
 
 
+def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
+    """Print the package's version and those of what results depend on, without importing any of it."""
+    if asked:
+        others = ", ".join(f"{name} {version(name)}" for name in ("rerun-sdk", "torch"))
+        click.echo(f"calib-inspect {__version__} ({others})")
+        ctx.exit()
+
+
 @click.group("calib-inspect", cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="calib-inspect")
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_versions, help="Versions.")
 def cli() -> None:
     """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
 

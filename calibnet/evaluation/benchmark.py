@@ -1,0 +1,168 @@
+"""How long a cascade takes: by part, by stage and by frame, the median of many."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import torch
+
+from calibnet.cascade import Cascade, Stage
+from calibnet.datasets import Frame
+from calibnet.evaluation.runner import draw_miscalibration
+from calibnet.precision import autocast, has_fast_bf16
+from calibnet.training.samples import collate, make_sample, plain
+
+BATCHES = (1, 4)
+"""Frames at once of the networks' throughput."""
+WARM_UP = 3
+"""Runs that do not count: memory is got and kernels are chosen in them."""
+
+
+@dataclass(frozen=True)
+class StageTime:
+    """One stage.
+
+    Attributes:
+        number: 1 to 5.
+        range: for instance ``"5/0.5"``.
+        milliseconds: median of a frame.
+        parts: medians by part: projection, lidar_features, cost_volumes, hourglass, displacement, pose.
+        batches: milliseconds a frame of the network alone, image features included, by frames at once.
+    """
+
+    number: int
+    range: str
+    milliseconds: float
+    parts: dict[str, float]
+    batches: dict[int, float]
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What was measured, on what.
+
+    Attributes:
+        cascade: milliseconds from frame to extrinsic, all stages, median.
+        shared: medians of what is done once a frame: resizing and, where stages share it, the image branch.
+        stages: one by one.
+        frames: number of runs that the medians are over.
+        machine: CPU or GPU, threads and precision.
+    """
+
+    cascade: float
+    shared: dict[str, float]
+    stages: tuple[StageTime, ...]
+    frames: int
+    machine: dict[str, Any]
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Medians by part, summed over the stages, with what is done once."""
+        total = dict(self.shared)
+        for stage in self.stages:
+            for part, milliseconds in stage.parts.items():
+                total[part] = total.get(part, 0.0) + milliseconds
+        return total
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that JSON files hold."""
+        return {
+            "cascade_ms_per_frame": self.cascade,
+            "parts_ms_per_frame": self.parts,
+            "shared_ms_per_frame": self.shared,
+            "stages": [
+                {
+                    "number": stage.number,
+                    "range": stage.range,
+                    "ms_per_frame": stage.milliseconds,
+                    "parts_ms_per_frame": stage.parts,
+                    "batch_ms_per_frame": {str(size): value for size, value in stage.batches.items()},
+                }
+                for stage in self.stages
+            ],
+            "frames": self.frames,
+            **self.machine,
+        }
+
+
+def benchmark(
+    cascade: Cascade, frames: list[Frame], repeats: int, observer: Callable[[], None] | None = None
+) -> Benchmark:
+    """Run every frame ``repeats`` times from miscalibrations of the first stage's range, then the networks in batches.
+
+    Args:
+        cascade: what to time.
+        frames: in memory, so that no disk is timed; of one camera.
+        repeats: runs a frame that count.
+        observer: called after every run.
+    """
+    bounds = cascade.stages[0].range
+    totals: list[float] = []
+    traces = []
+    for run in range(WARM_UP + repeats * len(frames)):
+        frame = frames[run % len(frames)]
+        initial = draw_miscalibration(bounds, 0, run, 0) @ frame.camera_from_lidar
+        started = time.perf_counter()
+        trace = cascade.calibrate(frame, initial)
+        if run >= WARM_UP:
+            totals.append(1000 * (time.perf_counter() - started))
+            traces.append(trace)
+        if observer is not None:
+            observer()
+    stages = []
+    for position, stage in enumerate(cascade.stages):
+        timed = [trace.stages[position].milliseconds for trace in traces]
+        parts = {part: median(times[part] for times in timed) for part in timed[0]}
+        whole = median(sum(times.values()) for times in timed)
+        batches = {size: batch_time(cascade, stage, frames, size) for size in BATCHES}
+        stages.append(StageTime(stage.number, str(stage.range), whole, parts, batches))
+    shared = {part: median(trace.milliseconds[part] for trace in traces) for part in traces[0].milliseconds}
+    return Benchmark(median(totals), shared, tuple(stages), len(totals), describe_machine(cascade.device))
+
+
+def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -> float:
+    """Milliseconds a frame of one stage's network on ``size`` frames at once."""
+    config = stage.network.config
+    small = [plain(frame, config.input_height, config.input_width, config.scales[-1]) for frame in frames]
+    samples = [make_sample(small[number % len(small)], np.eye(4), config.volume_scales) for number in range(size)]
+    inputs = collate(samples)[0].to(cascade.device)
+    times = []
+    with torch.inference_mode(), autocast(cascade.device):
+        for run in range(WARM_UP + 5):
+            started = time.perf_counter()
+            correction = stage.network(inputs).pose.correction
+            correction.cpu()  # waits for a GPU
+            if run >= WARM_UP:
+                times.append(1000 * (time.perf_counter() - started) / size)
+    return median(times)
+
+
+def describe_machine(device: torch.device) -> dict[str, Any]:
+    """What the figures depend on besides the code."""
+    return {
+        "device": torch.cuda.get_device_name(device) if device.type == "cuda" else processor(),
+        "instructions": torch.backends.cpu.get_cpu_capability(),
+        "threads": torch.get_num_threads(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "precision": "bf16" if has_fast_bf16(device) else "float32",
+        "torch": torch.__version__,
+    }
+
+
+def processor() -> str:
+    """The CPU's name."""
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        found = re.search(r"^model name\s*:\s*(.+)$", information.read_text(), re.MULTILINE)
+        if found:
+            return found[1]
+    return platform.processor() or platform.machine()

@@ -1,0 +1,89 @@
+"""``calib-inspect benchmark``: milliseconds of the cascade by part, stage and frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from inspector.cli.options import FOLDER, STAGES
+from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from calibnet.evaluation.benchmark import Benchmark
+
+SCENES = 4
+"""Frames of the synthetic world that are timed in turn: a scan of KITTI's size each."""
+
+
+@click.command()
+@click.option(
+    "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Runs of each of {SCENES} frames."
+)
+@click.option("--threads", type=click.IntRange(1), help="Of the CPU.  [default: all cores]")
+@click.option("--stages", type=STAGES, default="1-5", show_default=True, help="Stages to run.")
+@click.option("--preset", default="compact", show_default=True, help="Network to time.")
+@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
+def benchmark(
+    repeats: int,
+    threads: int | None,
+    stages: tuple[int, ...],
+    preset: str,
+    weights: Path | None,
+    json_file: str | None,
+) -> None:
+    """Time the cascade on frames of the synthetic world with a scanner like KITTI's.
+
+    Times are medians of single frames from memory to extrinsic, projection included; besides, each stage's
+    network on several frames at once.
+    """
+    prepare_json(json_file)
+    import torch
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from calibnet.cascade import Cascade
+    from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
+    from calibnet.evaluation import benchmark as timing
+
+    if threads is not None:
+        torch.set_num_threads(threads)
+    cascade = Cascade.load(preset, stages, weights)
+    for skipped in cascade.skipped:
+        click.echo(skipped.reason, err=True)
+    frames = list(SyntheticSequence(seed=0, length=SCENES, rig=KITTI_LIKE))
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("timing", total=timing.WARM_UP + repeats * SCENES)
+        result = timing.benchmark(cascade, frames, repeats, lambda: progress.advance(task))
+    report(result, console_beside(json_file))
+    write_json(json_file, result.as_dict())
+
+
+def report(result: Benchmark, console: Console) -> None:
+    """Print the machine, a row a stage with its parts, and the whole."""
+    from rich import box
+    from rich.table import Table
+
+    machine = result.machine
+    console.print(
+        f"{machine['device']}, {machine['threads']} threads on {machine['cores']} cores, {machine['instructions']}, "
+        f"{machine['precision']}, torch {machine['torch']}; median of {result.frames} frames",
+        highlight=False,
+        soft_wrap=True,
+    )
+    table = Table(title="Milliseconds a frame", title_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column("")
+    columns = list(result.stages[0].parts)
+    sizes = list(result.stages[0].batches)
+    for heading in ["all", *(part.replace("_", " ") for part in columns), *(f"network x{size}" for size in sizes)]:
+        table.add_column(heading, justify="right")
+    for stage in result.stages:
+        numbers = [stage.milliseconds, *(stage.parts[part] for part in columns), *stage.batches.values()]
+        table.add_row(f"stage {stage.number} ({stage.range})", *(f"{number:.1f}" for number in numbers))
+    console.print(table)
+    shared = ", ".join(f"{part.replace('_', ' ')} {value:.1f}" for part, value in result.shared.items())
+    console.print(f"Once a frame: {shared}. The whole cascade: {result.cascade:.1f} ms a frame.", highlight=False)
