@@ -14,14 +14,20 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
+    from calibnet.training.options import TrainingOptions
     from calibnet.training.progress import Observer, Progress
     from calibnet.training.validation import ValidationFigures
 
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network to train.")
+@click.option("--range", "bounds", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
 @click.option(
-    "--range", "bounds", type=RANGE, required=True, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1."
+    "--all",
+    "every_stage",
+    is_flag=True,
+    help="Train all five stages, one after the other; --minutes or --samples is the budget of all. Stages whose "
+    "weights are in --output already are done.",
 )
 @click.option(
     "--data",
@@ -92,7 +98,8 @@ if TYPE_CHECKING:
 )
 def train(
     preset: str,
-    bounds: MiscalibrationRange,
+    bounds: MiscalibrationRange | None,
+    every_stage: bool,
     data: tuple[str, ...],
     validate: tuple[str, ...],
     synthetic: float,
@@ -112,7 +119,7 @@ def train(
     resume: bool,
     save: Path | None,
 ) -> None:
-    r"""Train one stage of the cascade and write its weights.
+    r"""Train one stage of the cascade, or all of them, and write the weights.
 
     Uses CUDA, and several GPUs, where there are any. Checkpoints every two minutes; an interrupted run
     continues with --resume.
@@ -120,16 +127,20 @@ def train(
     \b
     calib-inspect train --range 5/0.5 --minutes 60 \\
       --data kitti-raw:KITTI/raw --data folder:RIGS --validate kitti-raw:KITTI/raw:2011_09_26/0048
+    calib-inspect train --all --minutes 600 --resume --data kitti-raw:KITTI/raw --data folder:RIGS
     """
     if (minutes is None) == (samples is None):
         raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
 
+    if (bounds is not None) == every_stage:
+        raise click.UsageError("Give either --range, the stage to train, or --all.")
+
     from calibnet.training.options import TrainingOptions
-    from calibnet.training.trainer import Trainer
+    from calibnet.training.schedule import all_stages
 
     options = TrainingOptions(
         preset=preset,
-        range=str(bounds),
+        range=str(bounds or ""),
         output=str(output),
         data=list(data),
         validate=list(validate),
@@ -150,13 +161,31 @@ def train(
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False)
+    steps = all_stages(options) if every_stage else [options]
+    if not steps:
+        console.print(f"All five stages have their weights in {output}; remove those to train again.")
+    for number, step in enumerate(steps, start=1):
+        if every_stage:
+            console.print(f"Stage ±{step.range}, {number} of {len(steps)} to go", style="bold")
+        train_stage(step, console, save and stage_file(save, step.range, every_stage), resume)
+
+
+def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:
+    """One stage to its weights, watched on the console and, if asked for, in a recording."""
+    from calibnet.training.trainer import Trainer
+
     observers: list[Observer] = [ConsoleObserver(console)]
     if save is not None:
         from inspector.training_log import TrainingLog
 
-        observers.append(TrainingLog(save, f"{preset} ±{bounds}"))
+        observers.append(TrainingLog(save, f"{options.preset} ±{options.range}"))
     path = Trainer(options, Observers(observers), resume).run()
     console.print(f"Weights with their training record: {path}")
+
+
+def stage_file(save: Path, stage: str, every_stage: bool) -> Path:
+    """The recording of one stage's training: with --all, each has its own."""
+    return save.with_stem(f"{save.stem}-{stage.replace('/', '-')}") if every_stage else save
 
 
 class Observers:

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
+from calibnet.training.residuals import residual_errors, stages_before, within
+from calibnet.training.samples import Source, TrainingSamples
+from calibnet.weights import save_network, weights_path
+from tests.network.tiny import TINY, tiny_network
+from tests.training.scene import Scenes
+
+
+@pytest.fixture
+def data() -> TrainingSamples:
+    return TrainingSamples([Source(Scenes(), 1.0)], RANGES[3], TINY.scales, TINY.input_height * TINY.input_width, 2, 0)
+
+
+def test_residuals_are_what_the_stages_leave_and_half_of_what_is_drawn(data: TrainingSamples) -> None:
+    networks = [tiny_network(seed=1, stage=3)]
+    wide = MiscalibrationRange(30, 5)
+    data.residuals = residual_errors(networks, data, wide, 6)
+    assert len(data.residuals) == 6
+    for one, again in zip(data.residuals, residual_errors(networks, data, wide, 6), strict=True):
+        np.testing.assert_array_equal(one, again)
+    generator = np.random.default_rng(0)
+    drawn = [data.draw(generator) for _ in range(400)]
+    repeated = np.mean([any(delta is residual for residual in data.residuals) for delta in drawn])
+    assert 0.4 < repeated < 0.6
+
+
+def test_lost_frames_are_left_out() -> None:
+    assert within(miscalibration([0, 0, 2.9], [0.5, 0, 0]), RANGES[3])
+    assert not within(miscalibration([0, 0, 3.1], [0, 0, 0]), RANGES[3])
+    assert not within(miscalibration([0, 0, 0], [0, 0.7, 0]), RANGES[3])
+    assert not within(np.full((4, 4), np.nan), RANGES[3])
+
+
+def test_stages_before_are_those_of_wider_ranges_that_have_weights(tmp_path: Path) -> None:
+    for number in (1, 3, 5):
+        network = tiny_network(seed=number, stage=number)
+        save_network(weights_path("tiny", RANGES[number - 1], tmp_path), network, network.state_dict(), {})
+    before = stages_before("tiny", RANGES[3], tmp_path)
+    assert [network.bounds for network in before] == [RANGES[0], RANGES[2]]
