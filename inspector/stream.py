@@ -40,7 +40,7 @@ class Stream:
             application_id: recordings with the same one share their layout in a viewer.
             recording_id: the same for the same data.
             title: for the viewer's list of recordings.
-            sinks: Rerun sinks, see `inspector.outputs`.
+            sinks: Rerun sinks, see `inspector.outputs`; without any, everything goes to stdout.
             blueprint: the layout.
         """
         rr.set_strict_mode(True)
@@ -51,7 +51,10 @@ class Stream:
             recording_id=recording_id,
             batcher_config=rr.ChunkBatcherConfig(flush_tick=timedelta(days=1), flush_num_bytes=FLUSH_BYTES),
         )
-        self.rec.set_sinks(*sinks, default_blueprint=blueprint)
+        if sinks:
+            self.rec.set_sinks(*sinks, default_blueprint=blueprint)
+        else:
+            self.rec.stdout(default_blueprint=blueprint)
         self.rec.set_log_time_enabled(False)
         self.rec.send_recording_name(title)
 

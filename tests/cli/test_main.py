@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+from importlib.metadata import version
 from pathlib import Path
 
 import click
@@ -51,12 +52,14 @@ def test_every_command_exists_and_explains_itself(name: str, capsys: pytest.Capt
 
 def test_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
     assert errors.run(cli, ["--version"]) == 0
-    assert __version__ in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert __version__ in out
+    assert f"rerun-sdk {version('rerun-sdk')}, torch {version('torch')}" in out
 
 
 def test_the_console_script_is_the_root_group() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["scripts"] == {"calib-inspect": "inspector.cli.main:main"}
+    assert project["scripts"]["calib-inspect"] == "inspector.cli.main:main"
 
 
 @pytest.mark.parametrize("arguments", [["no-such-command"], ["evaluate"], ["--no-such-option"]])

@@ -1,0 +1,103 @@
+"""``rerun-importer-calib-inspect``: makes ``rerun FOLDER`` open KITTI sequences and own sensors.
+
+The viewer calls every ``rerun-importer-*`` on the PATH with every path it is asked to open. One that does
+not know the path has to say so by an exit code, at once and without a word; the others write a
+recording to stdout. Ours calibrates some frames from all over the sequence as the commands do.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+
+INCOMPATIBLE = 66
+"""Rerun's exit code for "not mine", written out because importing Rerun takes longer than finding out."""
+MOST_FRAMES = 24
+"""So many frames at most: the viewer waits for them, and `calib-inspect seq` records them all."""
+RANGE = "5/0.5"
+RAW_DRIVE = re.compile(r"(\d{4}_\d{2}_\d{2})_drive_(\d{4})_(?:sync|extract)")
+
+
+class Recognised(NamedTuple):
+    """A folder that we can read.
+
+    Attributes:
+        dataset: as `calibnet.datasets.open_sequence` names it.
+        root: the dataset's folder.
+        options: which part of it.
+        as_is: whether its extrinsic is a guess to be corrected, and no reference.
+    """
+
+    dataset: str
+    root: Path
+    options: dict[str, str]
+    as_is: bool
+
+
+def recognise(path: Path) -> Recognised | None:
+    """What a path holds, told by the names in it alone; None for everything else."""
+    if not path.is_dir():
+        return None
+    path = path.resolve()
+    if path.parent.name == "sequences" and _holds(path, "image_2", "velodyne", "calib.txt"):
+        return Recognised("kitti-odometry", path.parent.parent, {"sequence": path.name}, False)
+    drive = RAW_DRIVE.fullmatch(path.name)
+    if drive and _holds(path, "image_02", "velodyne_points") and _holds(path.parent, "calib_cam_to_cam.txt"):
+        return Recognised("kitti-raw", path.parent.parent, {"date": drive[1], "drive": drive[2]}, False)
+    if _holds(path, "calibration.yaml", "images", "clouds"):
+        return Recognised("folder", path, {}, True)
+    return None
+
+
+def import_folder(found: Recognised) -> None:
+    """Calibrate and write the recording to stdout.
+
+    Raises:
+        CalibnetError: the folder cannot be read or nothing of it calibrated.
+    """
+    from rich.console import Console
+
+    from calibnet.cascade import Cascade, spread
+    from calibnet.datasets import open_sequence
+    from calibnet.geometry import MiscalibrationRange
+    from inspector.contents import Contents, Detail
+    from inspector.outputs import Outputs
+    from inspector.recording import RunDescription
+    from inspector.session import Session
+    from inspector.start import Start
+
+    sequence: Sequence = open_sequence(found.dataset, found.root, **found.options)
+    positions = spread(len(sequence), MOST_FRAMES)
+    start = Start(MiscalibrationRange.parse(RANGE), as_is=found.as_is)
+    title = f"{sequence.name}, {len(positions)} of {len(sequence)} frames"
+    identity = {"sequence": sequence.name, "rig": sequence.rig, "detail": str(Detail.OVERVIEW)}
+    description = RunDescription(title, identity)
+    contents, quiet = Contents.of(Detail.OVERVIEW), Console(quiet=True)
+    Session(
+        sequence, positions, Cascade.load(stages=start.stages), start, Outputs(), description, contents, quiet
+    ).run()
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    found = None
+    with contextlib.suppress(OSError, IndexError):
+        found = recognise(Path(sys.argv[1]))
+    if found is None:
+        sys.exit(INCOMPATIBLE)
+    from calibnet.errors import CalibnetError
+
+    try:
+        import_folder(found)
+    except (CalibnetError, OSError):
+        sys.exit(INCOMPATIBLE)
+
+
+def _holds(folder: Path, *names: str) -> bool:
+    return all((folder / name).exists() for name in names)
