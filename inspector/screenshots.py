@@ -93,7 +93,11 @@ class HeadlessViewer:
         self.client.set_blueprint(blueprint, "recording")
 
     def picture(self) -> bytes:
-        """The window as PNG, once it stays the same: data arrives in the viewer bit by bit."""
+        """The window as PNG, once it stays the same: data arrives in the viewer bit by bit.
+
+        Raises:
+            ConfigError: the viewer does not answer.
+        """
         previous, deadline = b"", time.monotonic() + PATIENCE_S
         while time.monotonic() < deadline:
             with contextlib.suppress(TimeoutError):
@@ -102,6 +106,8 @@ class HeadlessViewer:
                     break
                 previous = current
             time.sleep(PAUSE_S)
+        if not previous:
+            raise ConfigError("The viewer did not answer; the machine may be too busy: try again.")
         return previous
 
     def complaints(self) -> dict[str, list[Any]]:

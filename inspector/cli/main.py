@@ -83,6 +83,9 @@ def cli() -> None:
 
     Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 a check failed, 2 wrong
     usage, 3 bad input or environment, 130 interrupted.
+
+    Completion in bash: eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"; zsh_source and
+    fish_source for the others.
     """
 
 

@@ -135,3 +135,21 @@ def test_ctrl_c_exits_130_without_traceback() -> None:
     stderr = process.communicate(timeout=60)[1]
     assert process.returncode == 130
     assert stderr.strip() == "calib-inspect: Interrupted."
+
+
+@pytest.mark.parametrize(
+    ("words", "completions"),
+    [
+        ("calib-inspect se", ["seq"]),
+        ("calib-inspect seq --col", ["--color"]),
+        ("calib-inspect seq --color e", ["edge", "error"]),
+    ],
+)
+def test_shell_completion_knows_commands_options_and_values(
+    words: str, completions: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("_CALIB_INSPECT_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    errors.run(cli, [])
+    assert [line.partition(",")[2] for line in capsys.readouterr().out.splitlines()] == completions
