@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.errors import CalibrationError
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, depth_image, project, transform
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.se3 import Matrix, rotation_from_vector
@@ -37,18 +36,14 @@ class EdgeAlignment:
         self.bounds = bounds
 
     def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
-        """Refine ``initial`` on one frame.
-
-        Raises:
-            CalibrationError: hardly a point at a depth discontinuity falls into the image.
-        """
+        """Refine ``initial`` on one frame; it stays as it is where hardly a depth edge falls into the image."""
         from scipy.optimize import minimize
 
         camera = frame.camera.resized(WIDTH, max(1, round(frame.camera.height * WIDTH / frame.camera.width)))
         pull = edge_pull(frame, camera)
         points = discontinuities(frame.points, initial, camera)
         if len(points) < MINIMUM_POINTS:
-            raise CalibrationError(f"Frame {frame.index} ({frame.source}) has no depth edges to align.")
+            return self._trace(camera, initial, np.eye(4))
 
         def cost(vector: NDArray[np.float64]) -> float:
             seen = project(points, correction(vector) @ initial, camera)
@@ -61,9 +56,10 @@ class EdgeAlignment:
         found = minimize(
             cost, np.zeros(6), method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 600, "xatol": 1e-4}
         )
-        change = correction(found.x)
-        stage = StageTrace(1, self.bounds, initial, change @ initial, change)
-        return CascadeTrace(camera, initial, (stage,))
+        return self._trace(camera, initial, correction(found.x))
+
+    def _trace(self, camera: PinholeCamera, initial: Matrix, change: Matrix) -> CascadeTrace:
+        return CascadeTrace(camera, initial, (StageTrace(1, self.bounds, initial, change @ initial, change),))
 
 
 def correction(vector: NDArray[np.float64]) -> Matrix:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -13,9 +15,10 @@ import numpy as np
 import pytest
 import yaml
 
-from calibnet.datasets import Frame
+from calibnet.datasets import Frame, Sequence
 from calibnet.geometry import RANGES, invert, miscalibration
 from calibnet.geometry.se3 import Matrix
+from calibnet.sequence_estimate import SequenceEstimate
 from calibnet.trace import CascadeTrace, StageTrace
 from inspector.cli.errors import run
 from inspector.cli.main import cli
@@ -42,6 +45,11 @@ class KnownCascade:
             for number in self.loaded["stages"]
         ]
         return CascadeTrace(frame.camera, initial, tuple(stages))
+
+    def calibrate_sequence(
+        self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
+    ) -> SequenceEstimate:
+        return SequenceEstimate(miscalibration([0, 0.25, 0], [0, 0, 0]) @ CAMERA_FROM_LIDAR, np.eye(6), len(frames))
 
 
 @pytest.fixture(autouse=True)
@@ -83,14 +91,32 @@ def test_folder_to_table_and_json(rig: Path, tmp_path: Path, capsys: pytest.Capt
     assert content["initial"]["rotation_deg"]["mean"] > 1.5
     assert [stage["range"] for stage in content["stages"]] == ["5/0.5", "2/0.2", "1/0.1"]
     assert content["stages"][0]["rotation_deg"]["yaw"] == pytest.approx(1.0)
+    assert content["sequence"]["rotation_deg"]["pitch"] == pytest.approx(0.25)
+    assert content["references"]["no correction"] == content["initial"]
+    assert set(content["references"]) == {"no correction", "edge alignment"}
+    assert "audit" not in content
     assert KnownCascade.loaded == {"preset": "compact", "stages": (3, 4, 5)}
     printed, said = capsys.readouterr()
     assert "Stage 1 has no weights." in said
     rows = [line.split()[:2] for line in printed.splitlines() if line.strip().startswith(("initial", "stage"))]
     assert [row[0] for row in rows[:4]] == ["initial", "stage", "stage", "stage"]
+    assert "edge alignment" in printed and "sequence as one" in printed
     assert "100.0%" in printed  # within 2 degrees and 5 cm
     assert max(len(line) for line in printed.splitlines()[1:]) <= 80
     assert list(tmp_path.glob("new/*")) == [out]
+
+
+def test_audit_and_names_after_the_option(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(rig, rig.parent / "other")
+    out = tmp_path / "audit.json"
+    where = ["--dataset", "folder", "--root", str(rig.parent), "--sequences", "rig", "other"]
+    assert run(cli, ["evaluate", *where, "--audit", "--no-classical", "--no-drives", "--json", str(out)]) == 0
+    content = json.loads(out.read_text())
+    assert [Path(name).name for name in content["sequences"]] == ["rig", "other"] and content["frames"] == 6
+    assert set(content["audit"]) == {"swapped", "grey", "thinned"} and content["sequence"] is None
+    assert content["audit"]["grey"]["rotation_deg"]["yaw"] == pytest.approx(1.0)
+    assert {Path(name).name for name in content["audit_images"].split(", ")} == {"rig", "other"}
+    assert "with a grey image" in " ".join(capsys.readouterr().out.split())
 
 
 def test_same_seed_same_figures_whatever_the_frames(rig: Path, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,43 +11,15 @@ from calibnet.evaluation.runner import Run, draw_miscalibration, evaluate
 from calibnet.geometry import (
     RANGES,
     MiscalibrationRange,
-    PinholeCamera,
     invert,
     miscalibration,
     pose_error,
-    transform,
 )
 from calibnet.geometry.se3 import Matrix
 from calibnet.trace import CascadeTrace, StageTrace
+from tests.evaluation.drive import CAMERA, REFERENCE, Drive
 
-CAMERA = PinholeCamera(64, 32, np.array([[50.0, 0, 31.5], [0, 50.0, 15.5], [0, 0, 1]]))
-REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.1, -0.2, -0.3])
 BOUNDS = MiscalibrationRange(5, 0.5)
-
-
-@dataclass
-class Drive:
-    """Frames numbered as given, without files."""
-
-    numbers: list[int]
-    name: str = "test/drive"
-    rig: str = "test rig"
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def __getitem__(self, position: int) -> Frame:
-        return Frame(
-            index=self.numbers[position],
-            timestamp=0.1 * position,
-            image=np.zeros((32, 64, 3), np.uint8),
-            points=np.zeros((1, 4), np.float32),
-            camera=CAMERA,
-            camera_from_lidar=REFERENCE,
-        )
-
-    def __iter__(self) -> Iterator[Frame]:
-        return (self[position] for position in range(len(self)))
 
 
 @dataclass

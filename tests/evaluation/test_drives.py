@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from calibnet.datasets import Sequence
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.drives import evaluate_drives, shares_mount
+from calibnet.geometry import MiscalibrationRange, miscalibration, pose_error
+from calibnet.geometry.se3 import Matrix
+from calibnet.sequence_estimate import SequenceEstimate
+from tests.evaluation.drive import REFERENCE, Drive
+
+BOUNDS = MiscalibrationRange(5, 0.5)
+
+
+class Solver:
+    """Ends half a degree of yaw beside the truth, or fails."""
+
+    def __init__(self, fails: bool = False) -> None:
+        self.fails, self.initials = fails, list[Matrix]()
+
+    def calibrate_sequence(
+        self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
+    ) -> SequenceEstimate:
+        self.initials.append(initial)
+        if self.fails:
+            raise CalibrationError("no frame")
+        if observer is not None:
+            observer(0, len(frames))
+        return SequenceEstimate(miscalibration([0, 0, 0.5], [0, 0, 0]) @ REFERENCE, np.eye(6), len(frames))
+
+
+def test_every_drive_is_solved_from_every_miscalibration() -> None:
+    solver, told = Solver(), []
+    drives: list[Sequence] = [Drive([0, 1, 2]), Drive([0, 1], "other")]
+    metrics = evaluate_drives(solver, drives, BOUNDS, 3, 7, lambda *seen: told.append(seen))
+    assert metrics is not None and metrics.rotation_deg.yaw == pytest.approx(0.5)
+    assert len({initial.tobytes() for initial in solver.initials}) == 6
+    assert told == [("test/drive", 0, 3)] * 3 + [("other", 0, 2)] * 3
+    again = Solver()
+    evaluate_drives(again, drives, BOUNDS, 3, 7)
+    np.testing.assert_array_equal(again.initials, solver.initials)
+
+
+def test_a_drive_that_cannot_be_solved_keeps_its_initial_error() -> None:
+    solver = Solver(fails=True)
+    metrics = evaluate_drives(solver, [Drive([0, 1])], BOUNDS, 1, 0)
+    assert metrics is not None
+    assert metrics.rotation_deg.mean == pytest.approx(pose_error(solver.initials[0], REFERENCE).rotation_deg)
+
+
+def test_frames_of_several_mounts_are_no_drive() -> None:
+    assert shares_mount(Drive([0, 1, 2]))
+    assert not shares_mount(Drive([0, 1, 2], moving=True))
+    assert not shares_mount(Drive([0]))
+    assert evaluate_drives(Solver(), [Drive([0, 1], moving=True)], BOUNDS, 1, 0) is None
