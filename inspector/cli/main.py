@@ -77,15 +77,24 @@ def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None
 
 
 @click.group("calib-inspect", cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_versions, help="Versions.")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_versions,
+    help="Print this version and those of rerun and torch.",
+)
 def cli() -> None:
     """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
 
     Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 a check failed, 2 wrong
     usage, 3 bad input or environment, 130 interrupted.
 
-    Completion in bash: eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"; zsh_source and
-    fish_source for the others.
+    Completion in bash (zsh_source and fish_source for the others):
+
+    \b
+      eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"
     """
 
 
