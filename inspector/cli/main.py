@@ -76,7 +76,16 @@ def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None
         ctx.exit()
 
 
-@click.group("calib-inspect", cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+COMPLETION = (
+    "\b\n"  # click keeps the lines of such a paragraph as they are
+    "Completion in bash (zsh_source and fish_source for the others):\n"
+    '  eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"'
+)
+
+
+@click.group(
+    "calib-inspect", cls=LazyGroup, epilog=COMPLETION, context_settings={"help_option_names": ["-h", "--help"]}
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -90,11 +99,6 @@ def cli() -> None:
 
     Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 a check failed, 2 wrong
     usage, 3 bad input or environment, 130 interrupted.
-
-    Completion in bash (zsh_source and fish_source for the others):
-
-    \b
-      eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"
     """
 
 
