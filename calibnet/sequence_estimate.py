@@ -110,7 +110,7 @@ class Consensus:
             offsets = vectors - mean
             distances = np.einsum("ni,nij,nj->n", offsets, informations, offsets)
             weights = 1 / (1 + distances / (OUTLIER**2 * max(float(np.median(distances)), 1e-12)))
-        covariance: NDArray[np.float64] = np.linalg.inv(normal)
+        covariance = np.linalg.inv(normal).astype(np.float64)
         if len(vectors) > 1:
             freedom = 6 * (weights.sum() - weights.max())
             covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))

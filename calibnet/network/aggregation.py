@@ -46,13 +46,15 @@ class WindowConv(nn.Module):
         return y.reshape(batch, -1, height, width, channels).permute(0, 4, 1, 2, 3)
 
 
-def pointwise(conv: nn.Conv3d, volume: Tensor) -> Tensor:
+def pointwise(conv: nn.Module, volume: Tensor) -> Tensor:
     """A 1x1x1 convolution as a product over the channels, which lie last in memory: ``[B, C, D, h, w]``."""
+    assert isinstance(conv, nn.Conv3d)
     return F.linear(volume.permute(0, 2, 3, 4, 1), conv.weight.flatten(1), conv.bias).permute(0, 4, 1, 2, 3)
 
 
-def spatial(conv: nn.Conv3d, volume: Tensor) -> Tensor:
+def spatial(conv: nn.Module, volume: Tensor) -> Tensor:
     """A 1x3x3 convolution of stride 2, with the window in the batch: ``[B, C, D, h, w] -> [B, C', D, h/2, w/2]``."""
+    assert isinstance(conv, nn.Conv3d)
     batch, channels, window, height, width = volume.shape
     images = volume.permute(0, 2, 3, 4, 1).reshape(-1, height, width, channels).permute(0, 3, 1, 2)
     halved = F.conv2d(images, conv.weight.squeeze(2), conv.bias, stride=2, padding=1).permute(0, 2, 3, 1)
@@ -172,7 +174,7 @@ class Aggregation(nn.Module):
             ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by itself, and
             what the hourglass adds to it.
         """
-        before = [pointwise(enter[0], volume).relu() for enter, volume in zip(self.enter, volumes, strict=True)]
+        before = [pointwise(enter.get_submodule("0"), volume).relu() for enter, volume in zip(self.enter, volumes, strict=True)]
         after = before
         for hourglass in self.hourglasses:
             after = hourglass(after)

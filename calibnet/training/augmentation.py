@@ -91,7 +91,8 @@ def photometric(image: NDArray[np.uint8], generator: Generator) -> NDArray[np.ui
 
     pixels = image.astype(np.float32) / 255.0
     if generator.random() < 0.2:
-        pixels = cv2.cvtColor(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
+        grey = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY)
+        pixels = np.repeat(grey[..., None], 3, axis=2).astype(np.float32)
     elif generator.random() < 0.6:
         pixels = pixels * generator.uniform(0.8, 1.2, 3).astype(np.float32)
     pixels = np.clip(pixels, 0, 1) ** np.float32(np.exp(generator.uniform(-0.5, 0.5)))
