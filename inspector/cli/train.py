@@ -119,7 +119,7 @@ def train(
     resume: bool,
     save: Path | None,
 ) -> None:
-    r"""Train one stage of the cascade, or all of them, and write the weights.
+    """Train one stage of the cascade, or all of them, and write the weights.
 
     Uses CUDA, and several GPUs, where there are any. Checkpoints every two minutes; an interrupted run
     continues with --resume.
@@ -128,7 +128,7 @@ def train(
     calib-inspect train --range 5/0.5 --minutes 60 \\
       --data kitti-raw:KITTI/raw --data folder:RIGS --validate kitti-raw:KITTI/raw:2011_09_26/0048
     calib-inspect train --all --minutes 600 --resume --data kitti-raw:KITTI/raw --data folder:RIGS
-    """
+    """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
     if (minutes is None) == (samples is None):
         raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
 

@@ -9,6 +9,8 @@ from string import Template
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
+from inspector.contents import Coloring
+from inspector.recorded_run import RecordedRun
 from inspector.report.charts import charts, series_styles
 from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.pictures import depth_scale
@@ -55,6 +57,15 @@ class Example(NamedTuple):
     pictures: Mapping[str, str]
 
 
+COLORINGS = {
+    Coloring.DEPTH: "coloured by depth. Where the calibration is right, colours jump on the edges of the picture.",
+    Coloring.INTENSITY: "coloured by the laser’s intensity: where the calibration is right, lane paint and signs agree.",
+    Coloring.EDGE: "pink before something farther: where the calibration is right, pink lies on outlines.",
+    Coloring.ERROR: "coloured by how many pixels they are off the reference, from dark (0) to bright (20 and more).",
+}
+"""What the points' colours stand for, and what to look for."""
+
+
 def make_page(figures: Figures, examples: Sequence[Example], recording: str, recording_bytes: int) -> str:
     """Fill the template.
 
@@ -80,7 +91,8 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         serve_command=escape(SERVE_COMMAND.format(recording=recording)),
         ranking=escape(_ranking(figures)),
         examples="\n".join(_example(figures, example) for example in examples),
-        depth_scale=depth_scale(),
+        coloring=COLORINGS[_coloring(run)],
+        scale=_scale(run),
         stages_title=f"{figures.measure} after every stage",
         stages_table=stages_table(figures),
         axes_table=axes_table(figures),
@@ -90,6 +102,17 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         size=f"{recording_bytes / 1e6:.1f} MB",
         script=_resource("page.js"),
     )
+
+
+def _coloring(run: RecordedRun) -> Coloring:
+    """What the recorded points' colours stand for; recordings from before there was a choice show depth."""
+    return Coloring(run.settings.get("color", Coloring.DEPTH))
+
+
+def _scale(run: RecordedRun) -> str:
+    if _coloring(run) is not Coloring.DEPTH:
+        return ""
+    return f'<div class="depth"><span>Depth</span>{depth_scale()}</div>'
 
 
 def _resource(name: str) -> str:
