@@ -174,7 +174,10 @@ class Aggregation(nn.Module):
             ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by itself, and
             what the hourglass adds to it.
         """
-        before = [pointwise(enter.get_submodule("0"), volume).relu() for enter, volume in zip(self.enter, volumes, strict=True)]
+        before = [
+            pointwise(enter.get_submodule("0"), volume).relu()
+            for enter, volume in zip(self.enter, volumes, strict=True)
+        ]
         after = before
         for hourglass in self.hourglasses:
             after = hourglass(after)

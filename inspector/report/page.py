@@ -59,7 +59,7 @@ class Example(NamedTuple):
 
 COLORINGS = {
     Coloring.DEPTH: "coloured by depth. Where the calibration is right, colours jump on the edges of the picture.",
-    Coloring.INTENSITY: "coloured by the laser’s intensity: where the calibration is right, lane paint and signs agree.",
+    Coloring.INTENSITY: "coloured by the laser’s intensity: where the calibration is right, paint and signs agree.",
     Coloring.EDGE: "pink before something farther: where the calibration is right, pink lies on outlines.",
     Coloring.ERROR: "coloured by how many pixels they are off the reference, from dark (0) to bright (20 and more).",
 }
