@@ -87,6 +87,6 @@ def drive_sentence(
     skipped = f", {estimate.skipped} more could not be used" if estimate.skipped else ""
     return (
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
-        f"{error.translation_cm:.1f} cm; its own standard deviation is {estimate.rotation_deg:.2f}° / "
-        f"{estimate.translation_cm:.1f} cm."
+        f"{error.translation_cm:.1f} cm; by the frames' scatter it is sure to {estimate.rotation_deg:.2f}° / "
+        f"{estimate.translation_cm:.1f} cm, not counting what all of them get wrong."
     )

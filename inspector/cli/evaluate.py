@@ -249,6 +249,8 @@ def audit_sentence(evaluation: Evaluation) -> str:
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:
     """One row for the initial error and one a stage; per axis the mean absolute error."""
     table = plain_table(title)
+    largest = max(max(figures.values()) for _, figures in rows)
+    decimals = min(decimals, max(0, 4 - len(f"{largest:.0f}")))  # numbers wider than that would not fit
     for heading in rows[0][1]:
         table.add_column(heading, justify="right")
     for name, figures in rows:

@@ -39,7 +39,7 @@ from inspector.start import Start
 outputs = Outputs(Path(sys.argv[2]))
 session = Session(fakes.FakeSequence(100_000), range(100_000), fakes.FakeCascade(), Start(MiscalibrationRange(5, 0.5)),
                   outputs, RunDescription("fake/00", {"seed": 0}), Contents.of(Detail.FULL), Console(quiet=True))
-sys.exit(finish(session.run(), outputs))
+sys.exit(finish(session.run(), outputs, None))
 """
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from math import prod
 
@@ -8,7 +9,7 @@ import torch
 from torch import nn
 
 from calibnet.geometry import RANGES
-from calibnet.network.config import load_preset
+from calibnet.network.config import NetworkConfig, load_preset
 from calibnet.network.counting import ModuleCost, count
 from calibnet.network.network import CalibrationNetwork
 from tests.network.tiny import random_inputs, tiny_network
@@ -57,8 +58,21 @@ def test_multiply_adds_are_those_of_layers_and_matrix_products() -> None:
         config.window**4 * channels * h * w
         for channels, (h, w) in zip(config.channels_at_scales[:-1], sizes[1:], strict=True)
     )
-    assert costs["hourglass"].multiply_adds == pytest.approx(
-        layers["aggregation"] + config.hourglasses * refined, rel=0.01
+    fusing = config.hourglasses * (refined + between_scales(config, sizes))
+    # what is no layer of its own but a product: into the volumes, and the score of every displacement
+    inputs = config.groups + 2 * config.concat_channels
+    ends = sum(
+        config.window**2 * h * w * channels * (inputs + 1)
+        for channels, (h, w) in zip(config.channels_at_scales, sizes, strict=True)
+    )
+    assert costs["hourglass"].multiply_adds == pytest.approx(layers["aggregation"] + fusing + ends, rel=0.01)
+
+
+def between_scales(config: NetworkConfig, sizes: list[tuple[int, int]]) -> int:
+    """Multiply-adds of one hourglass's 1x3x3 convolutions down and 1x1x1 convolutions up, all at the coarse size."""
+    return sum(
+        config.window**2 * h * w * fine * coarse * (9 + 1)
+        for (fine, coarse), (h, w) in zip(itertools.pairwise(config.channels_at_scales), sizes[1:], strict=True)
     )
 
 
