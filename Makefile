@@ -1,6 +1,7 @@
 # make demo   install what is missing, run the main job on the synthetic world
 # make test   install what is missing, run the tests (PYTEST_ARGS=... to choose some)
 # make lint   ruff and mypy
+# make pictures  take the pictures of README.md and docs/ anew, in the real viewer
 # make clean  remove what these made
 #
 # Needs Python 3.11 or newer (PYTHON=... to choose one). Installs into .venv, nothing into the system,
@@ -13,7 +14,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 DEMO_ARGS ?=
 PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile
 
-.PHONY: demo test lint clean libraries viewer-libraries
+PICTURES := overview cascade-all-stages cost-volumes-stage-3-which hourglass-stage-3 3d-side-by-side whole-drive
+
+.PHONY: demo test lint pictures clean libraries viewer-libraries
 
 demo: libraries $(VENV)/installed
 	$(BIN)/calib-inspect demo $(DEMO_ARGS)
@@ -25,6 +28,10 @@ lint: $(VENV)/installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+
+pictures: viewer-libraries $(VENV)/installed
+	$(BIN)/calib-inspect demo --sequence-estimate --headless --save recordings/pictures.rrd
+	$(BIN)/calib-inspect pictures recordings/pictures.rrd --out docs/pictures --size 1366x768 $(PICTURES:%=--tab %)
 
 clean:
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache

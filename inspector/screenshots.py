@@ -9,7 +9,7 @@ import contextlib
 import re
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -119,15 +119,17 @@ class HeadlessViewer:
         return blueprint
 
 
-def take_pictures(recording: Path, folder: Path, size: tuple[int, int], frame: int, wanted: str = "") -> Iterator[Path]:
-    """Take a picture of every page whose name contains ``wanted``; yield each file when it is written.
+def take_pictures(
+    recording: Path, folder: Path, size: tuple[int, int], frame: int, wanted: Sequence[str] = ()
+) -> Iterator[Path]:
+    """Take a picture of every page, or of those that are wanted; yield each file when it is written.
 
     Args:
         recording: an ``.rrd`` of ours.
         folder: where the pictures go; created if need be.
         size: width and height in pixels.
         frame: which frame to show.
-        wanted: part of a page's name, for instance ``"Overview"``.
+        wanted: parts of pages' names, for instance ``"Overview"`` or ``"cost volumes stage 3"``.
 
     Raises:
         ConfigError: the viewer does not start or does not load the recording.
@@ -137,9 +139,10 @@ def take_pictures(recording: Path, folder: Path, size: tuple[int, int], frame: i
         viewer.open(recording)
         viewer.show_time(entities.FRAME, frame)
         for page in viewer.pages():
-            if wanted.lower() in " ".join(page).lower():
+            stem = file_stem(page)
+            if not wanted or any(file_stem((part,)) in stem for part in wanted):
                 viewer.show(page)
-                file = folder / f"{file_stem(page)}.png"
+                file = folder / f"{stem}.png"
                 file.write_bytes(viewer.picture())
                 yield file
 

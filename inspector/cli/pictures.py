@@ -30,8 +30,8 @@ class SizeType(click.ParamType[tuple[int, int]]):
 @click.option("--out", type=FOLDER, required=True, metavar="DIR", help="Folder of the pictures; created if need be.")
 @click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Of the viewer's window.")
 @click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first]")
-@click.option("--tab", "wanted", default="", metavar="TEXT", help="Only tabs whose name contains this.")
-def pictures(recording: Path, out: Path, size: tuple[int, int], frame: int | None, wanted: str) -> None:
+@click.option("--tab", "wanted", multiple=True, metavar="TEXT", help="Only tabs whose name contains this. Repeatable.")
+def pictures(recording: Path, out: Path, size: tuple[int, int], frame: int | None, wanted: tuple[str, ...]) -> None:
     """Take a picture of every tab of a recording in the real viewer, without a window.
 
     Needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers).
