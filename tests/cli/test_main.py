@@ -127,7 +127,9 @@ def test_a_closed_pipe_ends_quietly() -> None:
 
 
 def test_ctrl_c_exits_130_without_traceback() -> None:
-    wait = "def wait():\n    print('ready', flush=True)\n    import time\n    time.sleep(60)\n"
+    # a shell starts what it runs in the background with this signal ignored, and children inherit that
+    wait = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    wait += "def wait():\n    print('ready', flush=True)\n    import time\n    time.sleep(60)\n"
     process = start(wait + "sys.exit(run(click.Command('c', callback=wait)))", stdout=-1, stderr=-1)
     assert process.stdout is not None
     process.stdout.readline()
