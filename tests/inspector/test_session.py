@@ -42,6 +42,9 @@ session = Session(fakes.FakeSequence(100_000), range(100_000), fakes.FakeCascade
 sys.exit(finish(session.run(), outputs, None))
 """
 
+SEVERAL_FRAMES = 16_000_000
+"""Bytes of a file that has more than two frames in full detail, of some 3 MB each."""
+
 
 def start_long_run(file: Path) -> subprocess.Popen[str]:
     """Record for ever; return once a few frames are on disk."""
@@ -49,7 +52,7 @@ def start_long_run(file: Path) -> subprocess.Popen[str]:
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
     deadline = time.monotonic() + 60.0
-    while not file.exists() or file.stat().st_size < 4_000_000:
+    while not file.exists() or file.stat().st_size < SEVERAL_FRAMES:
         assert process.poll() is None, process.communicate()[1]
         assert time.monotonic() < deadline, "nothing was recorded"
         time.sleep(0.05)
