@@ -12,6 +12,7 @@ from calibnet.errors import ConfigError
 
 Head = Literal["geometric", "regression"]
 Normalization = Literal["group", "batch"]
+ImageEncoder = Literal["own", "efficientnet-lite0"]
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class NetworkConfig:
     convolve_finest: bool  # 3-D convolutions at the finest scale as well, which holds most of their work
     context_channels: int  # of the 2-D network that turns volumes into displacements
     head: Head
+    image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -73,6 +75,18 @@ class NetworkConfig:
             (
                 self.normalization not in get_args(Normalization),
                 f"normalization must be one of {', '.join(get_args(Normalization))}",
+            ),
+            (
+                self.image_encoder not in get_args(ImageEncoder),
+                f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
+            ),
+            (
+                self.image_encoder != "own" and self.share_extractor,
+                "a pretrained image_encoder takes pictures only: share_extractor must be false with it",
+            ),
+            (
+                self.image_encoder != "own" and len(self.widths) < 4,
+                "a pretrained image_encoder has four levels, so there must be four widths or more",
             ),
         ):
             if wrong:

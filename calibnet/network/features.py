@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from calibnet.network import efficientnet
 from calibnet.network.config import NetworkConfig
 from calibnet.network.layers import ConvBlock, ResidualBlock
 
@@ -48,33 +50,40 @@ def lidar_channels(lidar: Tensor) -> Tensor:
 
 
 class Trunk(nn.Module):
-    """Encoder from 1/2 to 1/32 and decoder back to the finest scale of the cost volumes."""
+    """Encoder from 1/2 to 1/32 and decoder back to the finest scale of the cost volumes.
 
-    def __init__(self, config: NetworkConfig) -> None:
+    The encoder's finer levels may be those of another network, the ``pretrained`` ones, which start at the image;
+    ours start behind a stem.
+    """
+
+    def __init__(self, config: NetworkConfig, pretrained: Sequence[nn.Module] = (), channels: Sequence[int] = ()) -> None:
         super().__init__()
         self.config = config
-        norm, widths = config.normalization, config.widths
+        norm = config.normalization
+        widths = [*channels, *config.widths[len(channels) :]]
         strides = [2 ** (level + 1) for level in range(len(widths))]
         self.levels = [strides.index(scale) for scale in config.scales]
         deepest = self.levels[-1] if config.multi_scale_features else self.levels[0]
-        self.encoder = nn.ModuleList(
+        own = (
             nn.Sequential(
                 *([ConvBlock(widths[level - 1], width, norm, stride=2)] if level else []),
                 *(ResidualBlock(width, norm) for _ in range(blocks)),
             )
             for level, (width, blocks) in enumerate(zip(widths, config.blocks, strict=True))
-            if level <= deepest
+            if level >= len(pretrained)
         )
-        channels = config.feature_channels
+        self.encoder = nn.ModuleList([*pretrained, *own][: deepest + 1])
+        self.pretrained = min(len(pretrained), deepest + 1)
+        features = config.feature_channels
         if config.multi_scale_features:
-            self.lateral = nn.ModuleList(nn.Conv2d(widths[level], channels, 1) for level in self.levels)
-            self.smooth = nn.ModuleList(ConvBlock(channels, channels, norm) for _ in self.levels)
+            self.lateral = nn.ModuleList(nn.Conv2d(widths[level], features, 1) for level in self.levels)
+            self.smooth = nn.ModuleList(ConvBlock(features, features, norm) for _ in self.levels)
         else:
-            self.lateral = nn.ModuleList([nn.Conv2d(widths[self.levels[0]], channels, 1)])
-        self.project = nn.ModuleList(nn.Conv2d(channels, channels, 1) for _ in config.volume_scales)
+            self.lateral = nn.ModuleList([nn.Conv2d(widths[self.levels[0]], features, 1)])
+        self.project = nn.ModuleList(nn.Conv2d(features, features, 1) for _ in config.volume_scales)
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """``[B, widths[0], H/2, W/2]`` to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""
+        """``[B, widths[0], H/2, W/2]``, or the image, to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""
         encoded = []
         for stage in self.encoder:
             x = stage(x)
@@ -99,10 +108,24 @@ class FeatureExtractor(nn.Module):
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
-        self.image_stem = ConvBlock(IMAGE_CHANNELS, config.widths[0], config.normalization, stride=2)
+        if config.image_encoder == "efficientnet-lite0":
+            self.image_stem: nn.Module = nn.Identity()
+            self.image_trunk = Trunk(config, efficientnet.efficientnet_levels(), efficientnet.WIDTHS)
+        else:
+            self.image_stem = ConvBlock(IMAGE_CHANNELS, config.widths[0], config.normalization, stride=2)
+            self.image_trunk = Trunk(config)
         self.lidar_stem = ConvBlock(LIDAR_CHANNELS, config.widths[0], config.normalization, stride=2)
-        self.image_trunk = Trunk(config)
         self.lidar_trunk = self.image_trunk if config.share_extractor else Trunk(config)
+
+    def pretrained_levels(self) -> nn.ModuleList:
+        """The levels of the image branch that have weights from elsewhere; none if the image encoder is our own."""
+        return self.image_trunk.encoder[: self.image_trunk.pretrained]
+
+    def load_pretrained(self) -> None:
+        """Give those levels their weights."""
+        if levels := self.pretrained_levels():
+            state = efficientnet.load_weights()
+            levels.load_state_dict({name: state[name] for name in levels.state_dict()})
 
     def image(self, image: Tensor) -> list[Tensor]:
         """RGB 0..255 ``[B, 3, H, W]`` to features ``[B, C, H/s, W/s]``, fine to coarse."""

@@ -26,4 +26,4 @@ class TrainingOptions:
     train_image_branch: bool = False  # of an initialised stage; frozen, all stages share it, computed once a frame
     after: str | None = None  # folder of the stages before, whose errors are half of the miscalibrations drawn
     scene_cache: str | None = None
-    warm_up: int = 12_000  # samples with which a run from scratch first trains the features alone, a third of the cost
+    warm_up: int | None = None  # samples that first train the features alone; by default none for an initialised stage

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import torch
 from lightning_fabric import Fabric
@@ -38,7 +38,9 @@ class Trainer:
     """Trains one stage within its budget; `run` ends with the weights on disk."""
 
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
-    WARM_UP, FINAL_RATE = 0.03, 0.02
+    WARM_UP = 6000  # samples with which a run from scratch first trains the features alone, at a third of the cost
+    RATE_RAMP, FINAL_RATE = 0.03, 0.02  # share of the budget in which the learning rate rises; what it falls to
+    PRETRAINED_RATE = 0.3  # relative learning rate of what was learned on a million pictures
     RESIDUALS = 200  # errors of the stages before, measured when the run starts
     POSE_RAMP = 2000  # samples over which the pose's losses fade in after the warm-up
 
@@ -56,7 +58,7 @@ class Trainer:
         self.folder = Path(options.output)
         self.network = CalibrationNetwork(load_preset(options.preset), self.bounds)
         config = self.network.config
-        self.from_scratch = options.initialize is None
+        self.network.features.load_pretrained()
         if options.initialize:
             self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
             if config.share_image_branch and not options.train_image_branch:
@@ -66,7 +68,11 @@ class Trainer:
             options.data, options.validate, options.synthetic, options.scenes, options.seed,
             Path(options.scene_cache) if options.scene_cache else None,
         )  # fmt: skip
-        self.warm_up = options.warm_up if self.from_scratch and config.hybrid_loss else 0
+        self.warm_up = self.WARM_UP if options.initialize is None else 0
+        if options.warm_up is not None:
+            self.warm_up = options.warm_up
+        if not config.hybrid_loss:
+            self.warm_up = 0
         if options.samples:
             self.warm_up = min(self.warm_up, options.samples // 3)
         area = config.input_height * config.input_width
@@ -77,9 +83,8 @@ class Trainer:
             before = stages_before(options.preset, self.bounds, Path(options.after))
             if before:
                 self.data.residuals = residual_errors(before, self.data, self.bounds, self.RESIDUALS)
-        self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.998))
-        trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
-        optimizer = torch.optim.AdamW(trained, lr=options.learning_rate, weight_decay=1e-4)
+        self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.995))
+        optimizer = torch.optim.AdamW(self._parameters(), lr=options.learning_rate, weight_decay=1e-4)
         self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None
         self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
         self.model.mark_forward_method("match")
@@ -108,6 +113,16 @@ class Trainer:
         if self.options.samples:
             return min(1.0, self.samples / self.options.samples)
         return min(1.0, self.seconds / (60 * (self.options.minutes or math.inf)))
+
+    def _parameters(self) -> list[dict[str, Any]]:
+        """What is trained, and at which relative learning rate."""
+        pretrained = set(self.network.features.pretrained_levels().parameters())
+        trained = [parameter for parameter in self.network.parameters() if parameter.requires_grad]
+        groups = (
+            {"params": [p for p in trained if p not in pretrained], "relative": 1.0},
+            {"params": [p for p in trained if p in pretrained], "relative": self.PRETRAINED_RATE},
+        )
+        return [group for group in groups if group["params"]]
 
     def run(self) -> Path:
         """Train until the budget is used; returns the weights' path."""
@@ -162,10 +177,10 @@ class Trainer:
         return not stopping
 
     def _step(self, inputs: NetworkInputs, target: Target) -> Losses:
-        rate = self.options.learning_rate * min(1.0, (self.share + 1e-3) / self.WARM_UP)
+        rate = self.options.learning_rate * min(1.0, (self.share + 1e-3) / self.RATE_RAMP)
         cosine = 0.5 * (1 + math.cos(math.pi * self.share))
         for group in self.optimizer.param_groups:
-            group["lr"] = rate * (self.FINAL_RATE + (1 - self.FINAL_RATE) * cosine)
+            group["lr"] = group["relative"] * rate * (self.FINAL_RATE + (1 - self.FINAL_RATE) * cosine)
         losses = self._losses(inputs, target)
         if not torch.isfinite(losses.total):
             raise CalibrationError(

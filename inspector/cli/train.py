@@ -67,9 +67,8 @@ if TYPE_CHECKING:
 @click.option(
     "--warm-up",
     type=click.IntRange(0),
-    default=12_000,
-    show_default=True,
-    help="Samples with which a run from scratch first trains its features alone; a third of --samples at most.",
+    help="Samples that first train the features alone; a third of --samples at most.  "
+    "[default: 6000, none with --initialize]",
 )
 @click.option("--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that prepare samples.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
@@ -109,7 +108,7 @@ def train(
     samples: int | None,
     batch: int,
     learning_rate: float,
-    warm_up: int,
+    warm_up: int | None,
     workers: int,
     seed: int,
     initialize: Path | None,

@@ -1,0 +1,81 @@
+"""The convolutional part of EfficientNet-Lite0, the image encoder that starts from ImageNet (not of the paper).
+
+Real frames with a calibrated LiDAR are few, pictures are many: features that were learned on a million pictures see
+edges and objects at once and on any camera, where features learned from the calibration data alone need an hour to
+see anything. EfficientNet-Lite (Tan and Le, 2019, its form for phones) has neither squeeze-and-excitation nor swish,
+so its batch norms fold into its convolutions, and what is left is cheap on a CPU.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch.nn.functional as F
+from safetensors.torch import load_file
+from torch import Tensor, nn
+
+LEVELS = (
+    ((1, 16, 3, 1, 1),),  # 1/2, after a stem of 32 channels
+    ((2, 24, 3, 2, 6),),  # 1/4
+    ((2, 40, 5, 2, 6),),  # 1/8
+    ((3, 80, 3, 2, 6), (3, 112, 5, 1, 6)),  # 1/16
+)
+"""Blocks of each level: how many, channels, kernel, stride of the first, expansion."""
+
+WIDTHS = tuple(level[-1][1] for level in LEVELS)
+"""Channels at 1/2, 1/4, 1/8 and 1/16. The blocks at 1/32, three quarters of its parameters, are left out."""
+
+WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensors"
+"""ImageNet weights, Apache-2.0; docs/training.md says how the file was made."""
+
+
+class SameConv(nn.Conv2d):
+    """Convolution with TensorFlow's padding, which is one wider at the far side where the stride is 2."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
+        if self.stride[0] == 2:
+            total = self.kernel_size[0] - 2
+            x = F.pad(x, [total // 2, total - total // 2] * 2)
+        return super().forward(x)
+
+
+def same_conv(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> SameConv:
+    """A convolution with the bias that its batch norm was folded into."""
+    return SameConv(inputs, outputs, kernel, stride, padding=0 if stride == 2 else kernel // 2, groups=groups)
+
+
+class InvertedResidual(nn.Module):
+    """Widen, filter every channel on its own, narrow; with a skip where the shape stays: ``[B, C, H, W]``."""
+
+    def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, expansion: int) -> None:
+        super().__init__()
+        width = inputs * expansion
+        self.expand = same_conv(inputs, width, 1) if expansion > 1 else None
+        self.depthwise = same_conv(width, width, kernel, stride, groups=width)
+        self.narrow = same_conv(width, outputs, 1)
+        self.skip = stride == 1 and inputs == outputs
+
+    def forward(self, x: Tensor) -> Tensor:
+        """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
+        wide = x if self.expand is None else F.relu6(self.expand(x))
+        y = self.narrow(F.relu6(self.depthwise(wide)))
+        return x + y if self.skip else y
+
+
+def efficientnet_levels() -> list[nn.Sequential]:
+    """The encoder's levels from the image to 1/16, to be run one after the other; random until weights are loaded."""
+    levels, channels = [], 32
+    for position, groups in enumerate(LEVELS):
+        modules: list[nn.Module] = [] if position else [same_conv(3, channels, 3, 2), nn.ReLU6()]
+        for number, width, kernel, stride, expansion in groups:
+            for block in range(number):
+                modules.append(InvertedResidual(channels, width, kernel, 1 if block else stride, expansion))
+                channels = width
+        levels.append(nn.Sequential(*modules))
+    return levels
+
+
+def load_weights() -> dict[str, Tensor]:
+    """The ImageNet weights of `efficientnet_levels`, as an ``nn.ModuleList`` of them names its parameters."""
+    return {name: tensor.float() for name, tensor in load_file(WEIGHTS).items()}
