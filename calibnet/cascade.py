@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resiz
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
 from calibnet.network.pose import prior_information
 from calibnet.precision import autocast
-from calibnet.sequence_estimate import Consensus, SequenceEstimate
+from calibnet.sequence_estimate import Consensus, Estimate, SequenceEstimate
 from calibnet.stage_detail import stage_detail
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.weights import load_network, weights_path
@@ -182,36 +183,61 @@ class Cascade:
         """
         if not len(frames):
             raise ValueError("There are no frames to calibrate.")
-        some = spread(len(frames), FRAMES_UNTIL_LAST_PASS)
-        passes = [(stage, some) for stage in self.stages] + [(self.stages[-1], some)] * (REPROJECTIONS - 1)
-        passes.append((self.stages[-1], list(range(len(frames)))))
-        total, read = sum(len(positions) for _, positions in passes), 0
+        some, everything = spread(len(frames), FRAMES_UNTIL_LAST_PASS), list(range(len(frames)))
+        last = self.stages[-1]
+        rehearsals = [*self.stages, *[last] * (REPROJECTIONS - 1)]
+        total = len(rehearsals) * len(some) + len(everything)
+        number = itertools.count()
+
+        def read(position: int) -> Frame:
+            if observer is not None:
+                observer(next(number), total)
+            return frames[position]
+
+        kept = set(spread(len(everything), LONGEST_HISTORY))
+        history: list[tuple[int, Estimate]] = []
+
+        def note(frame: Frame, consensus: Consensus, count: int) -> None:
+            if count in kept:
+                history.append((frame.index, consensus.estimate()))
+
         extrinsic = initial
-        for stage, positions in passes:
-            single, failure = Cascade([stage]), None
-            consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
-            kept = set(spread(len(positions), LONGEST_HISTORY))
-            history = []
-            for count, position in enumerate(positions):
-                if observer is not None:
-                    observer(read, total)
-                read += 1
-                frame = frames[position]
-                try:
-                    trace = single.calibrate(frame, extrinsic).stages[0]
-                except CalibrationError as error:
-                    failure = error
-                    continue
-                consensus.add(trace.correction, trace.information)
-                if positions is passes[-1][1] and count in kept:
-                    history.append((frame.index, consensus.estimate()))
-            if failure is not None and not len(consensus):
-                raise failure
-            estimate = consensus.estimate()
-            extrinsic = estimate.camera_from_lidar
+        for stage in rehearsals:
+            extrinsic = self._agree(stage, read, some, extrinsic).estimate().camera_from_lidar
+        consensus = self._agree(last, read, everything, extrinsic, note)
+        estimate = consensus.estimate()
         return SequenceEstimate(
-            extrinsic, estimate.covariance, estimate.frames, tuple(history), len(positions) - len(consensus)
+            estimate.camera_from_lidar,
+            estimate.covariance,
+            estimate.frames,
+            tuple(history),
+            len(everything) - len(consensus),
         )
+
+    def _agree(
+        self,
+        stage: Stage,
+        read: Callable[[int], Frame],
+        positions: list[int],
+        extrinsic: NDArray[np.float64],
+        note: Callable[[Frame, Consensus, int], None] | None = None,
+    ) -> Consensus:
+        """What one stage makes of some frames of a drive; ``note`` is told after each that it could calibrate."""
+        single, failure = Cascade([stage]), None
+        consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
+        for count, position in enumerate(positions):
+            frame = read(position)
+            try:
+                trace = single.calibrate(frame, extrinsic).stages[0]
+            except CalibrationError as error:
+                failure = error
+                continue
+            consensus.add(trace.correction, trace.information)
+            if note is not None:
+                note(frame, consensus, count)
+        if failure is not None and not len(consensus):
+            raise failure
+        return consensus
 
     def _run(
         self,

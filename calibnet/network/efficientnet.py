@@ -30,19 +30,19 @@ WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensor
 
 
 class SameConv(nn.Conv2d):
-    """Convolution with TensorFlow's padding, which is one wider at the far side where the stride is 2."""
+    """Convolution of an even size with TensorFlow's padding, which is one wider at the far side where the stride is 2.
+
+    Padded alike at both sides by one more, it computes that too, behind one row and one column which are dropped:
+    cheaper than padding a wide input first.
+    """
+
+    def __init__(self, inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> None:
+        super().__init__(inputs, outputs, kernel, stride, padding=(kernel + stride - 1) // 2, groups=groups)
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
-        if self.stride[0] == 2:
-            total = self.kernel_size[0] - 2
-            x = F.pad(x, [total // 2, total - total // 2] * 2)
-        return super().forward(x)
-
-
-def same_conv(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> SameConv:
-    """A convolution with the bias that its batch norm was folded into."""
-    return SameConv(inputs, outputs, kernel, stride, padding=0 if stride == 2 else kernel // 2, groups=groups)
+        y = super().forward(x)
+        return y if self.stride[0] == 1 else y[:, :, 1:, 1:]
 
 
 class InvertedResidual(nn.Module):
@@ -51,15 +51,15 @@ class InvertedResidual(nn.Module):
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, expansion: int) -> None:
         super().__init__()
         width = inputs * expansion
-        self.expand = same_conv(inputs, width, 1) if expansion > 1 else None
-        self.depthwise = same_conv(width, width, kernel, stride, groups=width)
-        self.narrow = same_conv(width, outputs, 1)
+        self.expand = SameConv(inputs, width, 1) if expansion > 1 else None
+        self.depthwise = SameConv(width, width, kernel, stride, groups=width)
+        self.narrow = SameConv(width, outputs, 1)
         self.skip = stride == 1 and inputs == outputs
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
-        wide = x if self.expand is None else F.relu6(self.expand(x))
-        y = self.narrow(F.relu6(self.depthwise(wide)))
+        wide = x if self.expand is None else F.relu6(self.expand(x), inplace=True)
+        y = self.narrow(F.relu6(self.depthwise(wide), inplace=True))
         return x + y if self.skip else y
 
 
@@ -67,7 +67,7 @@ def efficientnet_levels() -> list[nn.Sequential]:
     """The encoder's levels from the image to 1/16, to be run one after the other; random until weights are loaded."""
     levels, channels = [], 32
     for position, groups in enumerate(LEVELS):
-        modules: list[nn.Module] = [] if position else [same_conv(3, channels, 3, 2), nn.ReLU6()]
+        modules: list[nn.Module] = [] if position else [SameConv(3, channels, 3, 2), nn.ReLU6(inplace=True)]
         for number, width, kernel, stride, expansion in groups:
             for block in range(number):
                 modules.append(InvertedResidual(channels, width, kernel, 1 if block else stride, expansion))

@@ -56,11 +56,10 @@ class Trunk(nn.Module):
     ours start behind a stem.
     """
 
-    def __init__(self, config: NetworkConfig, pretrained: Sequence[nn.Module] = (), channels: Sequence[int] = ()) -> None:
+    def __init__(self, config: NetworkConfig, pretrained: Sequence[nn.Module] = (), their_widths: Sequence[int] = ()):
         super().__init__()
         self.config = config
-        norm = config.normalization
-        widths = [*channels, *config.widths[len(channels) :]]
+        norm, widths = config.normalization, [*their_widths, *config.widths[len(their_widths) :]]
         strides = [2 ** (level + 1) for level in range(len(widths))]
         self.levels = [strides.index(scale) for scale in config.scales]
         deepest = self.levels[-1] if config.multi_scale_features else self.levels[0]
@@ -83,7 +82,7 @@ class Trunk(nn.Module):
         self.project = nn.ModuleList(nn.Conv2d(features, features, 1) for _ in config.volume_scales)
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """``[B, widths[0], H/2, W/2]``, or the image, to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""
+        """Stem or image to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""
         encoded = []
         for stage in self.encoder:
             x = stage(x)

@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
+from calibnet.errors import ConfigError
+from calibnet.network import efficientnet
 from calibnet.network.features import FeatureExtractor, lidar_channels
 from calibnet.network.layers import group_count, norm2d
 from tests.network.tiny import TINY
@@ -65,3 +67,65 @@ def test_every_scale_sees_the_context_of_the_coarser_ones() -> None:
     changed[:, :, 120:, 120:] = 255.0
     difference = extractor.image(image)[0] - extractor.image(changed)[0]
     assert difference[:, :, 8, 8].abs().max() > 0, "a cell 56 px away, beyond the receptive field at 1/8"
+
+
+PRETRAINED = replace(TINY, image_encoder="efficientnet-lite0", widths=(8, 8, 16, 16, 24))
+
+
+@pytest.mark.parametrize("multi_scale", [True, False])
+def test_the_pretrained_encoder_feeds_the_same_pyramid(multi_scale: bool) -> None:
+    extractor = FeatureExtractor(replace(PRETRAINED, multi_scale_features=multi_scale)).eval()
+    extractor.load_pretrained()
+    features = extractor.image(torch.zeros(2, 3, 64, 96, dtype=torch.uint8))
+    assert [tuple(feature.shape) for feature in features] == [(2, 16, 8, 12), (2, 16, 4, 6), (2, 16, 2, 3)]
+    assert len(extractor.pretrained_levels()) == (4 if multi_scale else 3), "no level below the ones that are used"
+
+
+def test_the_pretrained_levels_have_the_widths_they_promise_and_outputs_of_unit_size() -> None:
+    extractor = FeatureExtractor(PRETRAINED)
+    extractor.load_pretrained()
+    x = torch.nn.functional.interpolate(torch.randn(1, 3, 8, 16, generator=torch.Generator().manual_seed(1)), (64, 128))
+    for level, width in zip(extractor.pretrained_levels(), efficientnet.WIDTHS, strict=True):
+        x = level(x)
+        assert x.shape[1] == width
+        assert 0.3 < x.std() < 3.0, "the file holds outputs scaled to about unit variance"
+    assert x.shape[-2:] == (4, 8)
+
+
+def test_random_levels_become_the_pretrained_ones_and_nothing_else_changes() -> None:
+    torch.manual_seed(4)
+    extractor = FeatureExtractor(PRETRAINED)
+    before = {name: parameter.clone() for name, parameter in extractor.named_parameters()}
+    extractor.load_pretrained()
+    changed = {name for name, parameter in extractor.named_parameters() if not parameter.equal(before[name])}
+    levels = tuple(f"image_trunk.encoder.{level}." for level in range(4))
+    assert changed == {name for name in before if name.startswith(levels)}
+
+
+def test_without_a_pretrained_encoder_there_is_nothing_to_load() -> None:
+    extractor = FeatureExtractor(TINY)
+    extractor.load_pretrained()
+    assert len(extractor.pretrained_levels()) == 0
+
+
+def test_strided_convolutions_pad_as_tensorflow_does() -> None:
+    # TensorFlow pads an even size with stride 2 at its far side only: output 0 sees input 0, 1, 2
+    layer = efficientnet.SameConv(1, 1, 3, stride=2)
+    with torch.no_grad():
+        layer.weight.fill_(1.0)
+        layer.bias.zero_()  # type: ignore[union-attr]
+        rows = layer(torch.arange(4.0).view(1, 1, 1, 4).expand(1, 1, 4, 4))[0, 0]
+    assert rows.tolist() == [[9.0, 15.0], [6.0, 10.0]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"image_encoder": "resnet"}, "image_encoder must be one of own, efficientnet-lite0"),
+        ({"share_extractor": True}, "share_extractor must be false"),
+        ({"widths": (8, 8, 16), "blocks": (0, 0, 1), "scales": (2, 4, 8)}, "four widths or more"),
+    ],
+)
+def test_a_pretrained_encoder_that_cannot_be_is_refused(changes: dict[str, object], sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence):
+        replace(PRETRAINED, **changes)  # type: ignore[arg-type]
