@@ -49,8 +49,14 @@ def skew(vector: Tensor) -> Tensor:
 
 
 def rotation_from_vector(vector: Tensor) -> Tensor:
-    """Rodrigues: rotation vectors ``[B, 3]`` in radians to ``[B, 3, 3]``; smooth at zero."""
-    return torch.linalg.matrix_exp(skew(vector))
+    """Rodrigues: rotation vectors ``[B, 3]`` in radians to ``[B, 3, 3]``; has a gradient at zero."""
+    turns = vector.norm(dim=-1)[:, None, None] / math.pi
+    cross = skew(vector)
+    return (
+        torch.eye(3, device=vector.device)
+        + torch.sinc(turns) * cross
+        + 0.5 * torch.sinc(turns / 2) ** 2 * cross @ cross
+    )
 
 
 def rotation_from_quaternion(quaternion: Tensor) -> Tensor:
@@ -148,9 +154,9 @@ class GeometricHead(nn.Module):
             residual = target - project_points(moved, intrinsics)
             weight = occupied / (scale * torch.sqrt(scale**2 + residual.detach() ** 2))
             jacobian = projection_jacobian(moved, intrinsics)  # [B, N, 2, 6]
-            weighted = jacobian * weight[..., None]
-            normal = torch.einsum("bnci,bncj->bij", weighted, jacobian)
-            gradient = torch.einsum("bnci,bnc->bi", weighted, residual)
+            weighted = (jacobian * weight[..., None]).flatten(1, 2).transpose(1, 2)  # [B, 6, 2N]
+            normal = weighted @ jacobian.flatten(1, 2)
+            gradient = (weighted @ residual.flatten(1)[..., None])[..., 0]
             gradient = gradient - self.prior * torch.cat([translation, rotation_vector(rotation)], dim=-1)
             information = normal + prior
             step = torch.linalg.solve(information, gradient)
@@ -170,12 +176,11 @@ def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
     """Derivative ``[B, N, 2, 6]`` of the pixel by a left perturbation ``(translation, rotation)``."""
     x, y, depth = points.unbind(-1)
     inverse = 1.0 / depth.clamp(min=MINIMUM_DEPTH)
-    fx, fy = intrinsics[:, None, 0, 0], intrinsics[:, None, 1, 1]
-    zero = torch.zeros_like(x)
-    du = torch.stack([fx * inverse, zero, -fx * x * inverse**2], dim=-1)
-    dv = torch.stack([zero, fy * inverse, -fy * y * inverse**2], dim=-1)
-    by_point = torch.stack([du, dv], dim=-2)  # [B, N, 2, 3]
-    return torch.cat([by_point, -by_point @ skew(points)], dim=-1)
+    x, y, zero = x * inverse, y * inverse, torch.zeros_like(x)
+    du = torch.stack([inverse, zero, -x * inverse, -x * y, 1 + x * x, -y], dim=-1)
+    dv = torch.stack([zero, inverse, -y * inverse, -1 - y * y, x * y, x], dim=-1)
+    focal = intrinsics.diagonal(dim1=1, dim2=2)[:, None, :2, None]
+    return torch.stack([du, dv], dim=-2) * focal
 
 
 HEADS: dict[str, type[RegressionHead] | type[GeometricHead]] = {
