@@ -139,7 +139,7 @@ class TrainingSamples(Dataset[Sample]):
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
-    RESIDUAL_SHARE = 0.5  # of the miscalibrations, when the errors of the stages before are known
+    RESIDUAL_SHARE = 0.7  # of the miscalibrations, when the errors of the stages before are known
     LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
     def __init__(
@@ -215,7 +215,7 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
-        """A miscalibration: one that the stages before leave behind or anywhere in the range, half and half.
+        """A miscalibration: one that the stages before leave behind or anywhere in the range, seven of ten the former.
 
         Sometimes a small one, as a stage must also know when to stop.
         """
