@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -18,7 +18,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.network.config import load_preset
-from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
+from calibnet.network.inputs import LidarInput, lidar_input, resize_image
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
 from calibnet.network.pose import prior_information
 from calibnet.precision import autocast
@@ -67,6 +67,13 @@ class Frames(Protocol):
         ...
 
 
+class View(NamedTuple):
+    """A frame's image at the size some stages want: ``[1, 3, H, W]``, and its features if those stages share them."""
+
+    image: Tensor
+    features: list[Tensor] | None
+
+
 class Clock:
     """Wall time by part, in milliseconds."""
 
@@ -93,7 +100,6 @@ class Cascade:
         if not stages:
             reasons = " ".join(stage.reason for stage in self.skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
-        self.config = stages[0].network.config
         self.device = next(stages[0].network.parameters()).device
         self.shares_image_branch = all(_same_image_branch(stages[0].network, stage.network) for stage in stages[1:])
 
@@ -148,20 +154,31 @@ class Cascade:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
         clock = Clock(self.device)
-        camera = input_camera(frame.camera, self.config.input_height, self.config.input_width, self.config.scales[-1])
-        image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
-        clock("resize")
-        features: list[Tensor] | None = None
         extrinsic, traces = initial, []
         with torch.inference_mode(), autocast(self.device):
+            views = self._views(frame, clock)
+            for stage in self.stages:
+                camera = stage.network.input_camera(frame.camera)
+                trace = self._run(stage, frame, camera, views[camera.width, camera.height], extrinsic, detail)
+                extrinsic = trace.after
+                traces.append(trace)
+        return CascadeTrace(initial, tuple(traces), clock.parts)
+
+    def _views(self, frame: Frame, clock: Clock) -> dict[tuple[int, int], View]:
+        """The image at every size that a stage wants, with its features where the stages share them."""
+        views: dict[tuple[int, int], View] = {}
+        for stage in self.stages:
+            camera = stage.network.input_camera(frame.camera)
+            if (camera.width, camera.height) in views:
+                continue
+            image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
+            clock("resize")
+            features = None
             if self.shares_image_branch:
                 features = self.stages[0].network.features.image(image)
                 clock("image_features")
-            for stage in self.stages:
-                trace = self._run(stage, frame, camera, image, features, extrinsic, detail)
-                extrinsic = trace.after
-                traces.append(trace)
-        return CascadeTrace(camera, initial, tuple(traces), clock.parts)
+            views[camera.width, camera.height] = View(image, features)
+        return views
 
     def calibrate_sequence(
         self, frames: Frames, initial: NDArray[np.float64], observer: Callable[[int, int], None] | None = None
@@ -244,8 +261,7 @@ class Cascade:
         stage: Stage,
         frame: Frame,
         camera: PinholeCamera,
-        image: Tensor,
-        features: list[Tensor] | None,
+        view: View,
         before: NDArray[np.float64],
         detail: bool,
     ) -> StageTrace:
@@ -259,7 +275,8 @@ class Cascade:
                 "(x right, y down, z forward)."
             )
         clock("projection")
-        output = stage.network(self._inputs(image, lidar, camera), features, keep_activations=detail, clock=clock)
+        inputs = self._inputs(view.image, lidar, camera)
+        output = stage.network(inputs, view.features, keep_activations=detail, clock=clock)
         estimate = output.pose.correction[0].double().cpu().numpy()
         if not np.isfinite(estimate).all():
             raise CalibrationError(
@@ -270,6 +287,7 @@ class Cascade:
         return StageTrace(
             stage.number,
             stage.range,
+            camera,
             before,
             correction @ before,
             correction,

@@ -1,7 +1,7 @@
 """What the cascade tells about itself: every picture, curve and table is made from these types.
 
-Arrays are NumPy, so that readers need no torch. Pixels are those of the network's input camera
-(`CascadeTrace.camera`), whose image is the frame's, resized.
+Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's input camera
+(`StageTrace.camera`), whose image is the frame's, resized.
 """
 
 from __future__ import annotations
@@ -62,6 +62,7 @@ class StageTrace:
 
     Attributes:
         number: 1 (coarsest) to 5 (finest).
+        camera: the network's input camera (the frame's, resized).
         range: the miscalibration the stage was trained for.
         before: ``camera_from_lidar`` it started from, 4x4.
         after: ``camera_from_lidar`` it arrived at, ``correction @ before``.
@@ -74,6 +75,7 @@ class StageTrace:
 
     number: int
     range: MiscalibrationRange
+    camera: PinholeCamera
     before: NDArray[np.float64] = field(repr=False)
     after: NDArray[np.float64] = field(repr=False)
     correction: NDArray[np.float64] = field(repr=False)
@@ -87,13 +89,11 @@ class CascadeTrace:
     """A whole run on one frame.
 
     Attributes:
-        camera: the network's input camera (the frame's, resized).
         initial: ``camera_from_lidar`` the run started from, 4x4.
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (resizing, image features).
     """
 
-    camera: PinholeCamera
     initial: NDArray[np.float64] = field(repr=False)
     stages: tuple[StageTrace, ...]
     milliseconds: dict[str, float] = field(default_factory=dict)

@@ -30,7 +30,7 @@ class StartingPoints:
     @classmethod
     def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
         """The scan as the stage found it; the network's image is the frame's, resized."""
-        camera, reference, frame = observation.trace.camera, observation.reference, observation.frame
+        camera, reference, frame = stage.camera, observation.reference, observation.frame
         projection = observation.projected(stage.before)
         scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
         pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers

@@ -58,7 +58,7 @@ def test_stages_follow_one_another(trace: CascadeTrace) -> None:
 
 
 def test_detail_has_the_shapes_and_units_of_the_contract(trace: CascadeTrace, frame: Frame) -> None:
-    camera = trace.camera
+    camera = trace.stages[0].camera
     assert camera.width % 32 == camera.height % 32 == 0
     window = 2 * TINY.radius + 1
     for stage in trace.stages:

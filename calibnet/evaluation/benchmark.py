@@ -132,7 +132,7 @@ def benchmark(
 def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -> float:
     """Milliseconds a frame of one stage's network on ``size`` frames at once."""
     config = stage.network.config
-    small = [plain(frame, config.input_height, config.input_width, config.scales[-1]) for frame in frames]
+    small = [plain(frame, stage.network.input_camera(frame.camera)) for frame in frames]
     samples = [make_sample(small[number % len(small)], np.eye(4), config.volume_scales) for number in range(size)]
     inputs = collate(samples)[0].to(cascade.device)
     times = []

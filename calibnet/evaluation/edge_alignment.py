@@ -59,7 +59,7 @@ class EdgeAlignment:
         return self._trace(camera, initial, correction(found.x))
 
     def _trace(self, camera: PinholeCamera, initial: Matrix, change: Matrix) -> CascadeTrace:
-        return CascadeTrace(camera, initial, (StageTrace(1, self.bounds, initial, change @ initial, change),))
+        return CascadeTrace(initial, (StageTrace(1, self.bounds, camera, initial, change @ initial, change),))
 
 
 def correction(vector: NDArray[np.float64]) -> Matrix:

@@ -9,6 +9,7 @@ from importlib import resources
 from typing import Any, Literal, get_args
 
 from calibnet.errors import ConfigError
+from calibnet.geometry import RANGES, MiscalibrationRange
 
 Head = Literal["geometric", "regression"]
 Normalization = Literal["group", "batch"]
@@ -42,6 +43,7 @@ class NetworkConfig:
     context_channels: int  # of the 2-D network that turns volumes into displacements
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
+    zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -77,6 +79,10 @@ class NetworkConfig:
                 f"normalization must be one of {', '.join(get_args(Normalization))}",
             ),
             (
+                len(self.zooms) != len(RANGES) or min(self.zooms) <= 0,
+                f"zooms has one positive number a stage, {len(RANGES)} in all",
+            ),
+            (
                 self.image_encoder not in get_args(ImageEncoder),
                 f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
             ),
@@ -91,6 +97,14 @@ class NetworkConfig:
         ):
             if wrong:
                 raise ConfigError(f"Preset {self.name!r}: {message}.")
+
+    def zoom(self, bounds: MiscalibrationRange) -> float:
+        """Size of the image of the stage with this range, relative to the input's.
+
+        A wide range is about coarse things, and its search window has to reach far; a narrow one is about fractions
+        of a cell.
+        """
+        return dict(zip(RANGES, self.zooms, strict=True)).get(bounds, 1.0)
 
     @property
     def volume_scales(self) -> tuple[int, ...]:

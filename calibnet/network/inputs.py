@@ -25,7 +25,7 @@ class LidarInput(NamedTuple):
     cells: list[NDArray[np.float32]]
 
 
-def input_camera(camera: PinholeCamera, height: int, width: int, coarsest: int) -> PinholeCamera:
+def input_camera(camera: PinholeCamera, height: float, width: float, coarsest: int) -> PinholeCamera:
     """The camera of the resized image: the area of ``height`` x ``width``, the frame's own aspect.
 
     Both sides are rounded to multiples of the coarsest stride, so the two focal lengths may scale by

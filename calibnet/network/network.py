@@ -8,12 +8,13 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.network.aggregation import Aggregation
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
 from calibnet.network.displacement import DisplacementDecoder, DisplacementField
 from calibnet.network.features import FeatureExtractor
+from calibnet.network.inputs import input_camera
 from calibnet.network.layers import channels_last
 from calibnet.network.pose import HEADS, Pose
 
@@ -82,6 +83,11 @@ class CalibrationNetwork(nn.Module):
         self.displacement = DisplacementDecoder(config)
         self.pose = HEADS[config.head](config, bounds)
         channels_last(self)
+
+    def input_camera(self, camera: PinholeCamera) -> PinholeCamera:
+        """The camera of this stage's image of a frame."""
+        config, zoom = self.config, self.config.zoom(self.bounds)
+        return input_camera(camera, zoom * config.input_height, zoom * config.input_width, config.scales[-1])
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""

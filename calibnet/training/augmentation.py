@@ -33,7 +33,7 @@ def mirror(frame: Frame) -> Frame:
     )
 
 
-def virtual_camera(frame: Frame, height: int, width: int, generator: Generator) -> Frame:
+def virtual_camera(frame: Frame, height: int, width: int, generator: Generator, magnification: float = 1.0) -> Frame:
     """The frame as seen by a turned camera with another lens, at the network's input size.
 
     One homography ``K' R K^-1``: turning a camera about its centre and changing its lens moves no
@@ -42,7 +42,9 @@ def virtual_camera(frame: Frame, height: int, width: int, generator: Generator) 
     import cv2
 
     zoom = np.exp(generator.uniform(np.log(0.85), np.log(1.5)))
-    scale = max(width / frame.camera.width, height / frame.camera.height) * zoom
+    filling = max(width / frame.camera.width, height / frame.camera.height)
+    # a magnified part of a picture needs its pixels
+    scale = filling * min(zoom * magnification, max(zoom, 1 / filling))
     # averaging down first: the warp only interpolates, and would alias
     near = frame.camera.resized(round(frame.camera.width * scale), round(frame.camera.height * scale))
     image = resize_image(frame.image, near)
@@ -105,7 +107,9 @@ def photometric(image: NDArray[np.uint8], generator: Generator) -> NDArray[np.ui
     return (np.clip(pixels, 0, 1) * 255).astype(np.uint8)
 
 
-def augment(frame: Frame, height: int, width: int, generator: Generator, strength: float = 1.0) -> Frame:
+def augment(
+    frame: Frame, height: int, width: int, generator: Generator, strength: float = 1.0, magnification: float = 1.0
+) -> Frame:
     """All of the above, drawn at random, at the network's input size.
 
     Args:
@@ -115,10 +119,11 @@ def augment(frame: Frame, height: int, width: int, generator: Generator, strengt
         generator: of everything random.
         strength: thinning and colours come with this probability; the camera always varies, since features
             that know where a cell is on a known rig need not look at what is in it.
+        magnification: how much larger than to fill that size the picture is on average, and cut.
     """
     if generator.random() < 0.5:
         frame = mirror(frame)
-    frame = virtual_camera(frame, height, width, generator)
+    frame = virtual_camera(frame, height, width, generator, magnification)
     if generator.random() < strength:
         frame = replace(frame, points=thin_scan(frame.points, generator))
     if generator.random() < strength:

@@ -24,6 +24,6 @@ class TrainingOptions:
     workers: int = 1
     initialize: str | None = None  # weights file of a neighbouring stage
     train_image_branch: bool = False  # of an initialised stage; frozen, all stages share it, computed once a frame
-    after: str | None = None  # folder of the stages before, whose errors are half of the miscalibrations drawn
+    after: str | None = None  # folder of the stages before, whose errors are most of the miscalibrations drawn
     scene_cache: str | None = None
     warm_up: int | None = None  # samples that first train the features alone; by default none for an initialised stage

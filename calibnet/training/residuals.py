@@ -12,7 +12,7 @@ from calibnet.geometry import RANGES, MiscalibrationRange, sample_miscalibration
 from calibnet.geometry.miscalibration import bounds_of
 from calibnet.network.network import CalibrationNetwork
 from calibnet.precision import autocast
-from calibnet.training.samples import TrainingSamples, collate, make_sample
+from calibnet.training.samples import TrainingSamples, collate, make_sample, plain
 from calibnet.weights import load_network, weights_path
 
 LARGEST_ROTATION, LARGEST_TRANSLATION = 1.5, 3.0
@@ -40,10 +40,11 @@ def residual_errors(
     generator = np.random.default_rng([data.seed, 4])
     residuals = []
     for number in range(count):
-        frame = data.draw_frame(number, generator, 1.0)
+        frame = data.draw_frame(number, generator, 1.0, whole=True)
         delta = sample_miscalibration(networks[0].bounds, generator)
         for network in networks:
-            inputs, _ = collate([make_sample(frame, delta, network.config.volume_scales)])
+            seen = plain(frame, network.input_camera(frame.camera))
+            inputs, _ = collate([make_sample(seen, delta, network.config.volume_scales)])
             device = next(network.parameters()).device
             with torch.inference_mode(), autocast(device):
                 delta = network(inputs.to(device)).pose.correction[0].double().cpu().numpy() @ delta

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -21,7 +21,7 @@ from calibnet.geometry import (
     transform_points,
 )
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.network.inputs import LidarInput, input_camera, lidar_input, resize_image
+from calibnet.network.inputs import LidarInput, lidar_input, resize_image
 from calibnet.network.network import NetworkInputs
 from calibnet.training.augmentation import augment
 from calibnet.training.losses import Target
@@ -94,12 +94,9 @@ def make_sample(
     )
 
 
-def plain(frame: Frame, height: int, width: int, coarsest: int) -> Frame:
-    """The frame at the size inference uses, not augmented."""
-    camera = input_camera(frame.camera, height, width, coarsest)
-    return Frame(
-        frame.index, frame.timestamp, resize_image(frame.image, camera), frame.points, camera, frame.camera_from_lidar
-    )
+def plain(frame: Frame, camera: PinholeCamera) -> Frame:
+    """The frame as a network sees it whose ``input_camera`` is given, not augmented."""
+    return replace(frame, image=resize_image(frame.image, camera), camera=camera)
 
 
 def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
@@ -147,19 +144,22 @@ class TrainingSamples(Dataset[Sample]):
         sources: Many[Source],
         bounds: MiscalibrationRange,
         scales: tuple[int, ...],
-        area: int,
+        area: float,
         batch: int,
         seed: int,
         warm_up: int = 0,
+        magnification: float = 1.0,
     ) -> None:
         """A stream whose first ``warm_up`` samples are for the features alone.
 
         They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random.
         Miscalibrations scatter around none, so "the match is where the cell is" is a good guess that
         features pick up from the image's borders, and then stay with; the displacement makes it a bad one.
+
+        A stage whose image is larger than ``area`` by the square of ``magnification`` is trained on cuttings of it.
         """
         self.sources, self.bounds, self.scales = list(sources), bounds, scales
-        self.batch, self.seed, self.warm_up = batch, seed, warm_up
+        self.batch, self.seed, self.warm_up, self.magnification = batch, seed, warm_up, magnification
         weights = np.array([source.weight for source in sources], dtype=np.float64)
         self.probability = weights / weights.sum()
         factor = (area / (160 * 512)) ** 0.5
@@ -200,11 +200,12 @@ class TrainingSamples(Dataset[Sample]):
             f"{frame.source}; check that the training data's calibration fits its scans."
         )
 
-    def draw_frame(self, number: int, generator: np.random.Generator, strength: float) -> Frame:
-        """An augmented frame at the size of sample ``number``."""
+    def draw_frame(self, number: int, generator: np.random.Generator, strength: float, whole: bool = False) -> Frame:
+        """An augmented frame at the size of sample ``number``; ``whole`` keeps the magnification out of it."""
         source = self.draw_source(generator, strength)
         frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
-        return augment(frame, *self.shape(number), generator, strength)
+        magnification = 1.0 if whole else self.magnification
+        return augment(frame, *self.shape(number), generator, strength, magnification)
 
     def draw_source(self, generator: np.random.Generator, strength: float) -> int:
         """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the strength."""

@@ -37,7 +37,7 @@ SCHEDULE = (
     Step(NARROWEST, 0.08, NARROW, 0.4),
 )
 """Each stage but the first keeps the first one's image branch, so that it is computed once a frame, and
-half of its miscalibrations are what the stages before it leave behind."""
+most of its miscalibrations are what the stages before it leave behind."""
 
 
 def all_stages(options: TrainingOptions) -> list[TrainingOptions]:

@@ -75,9 +75,10 @@ class Trainer:
             self.warm_up = 0
         if options.samples:
             self.warm_up = min(self.warm_up, options.samples // 3)
-        area = config.input_height * config.input_width
+        zoom = config.zoom(self.bounds)
+        area = config.input_height * config.input_width * min(zoom, 1.0) ** 2
         self.data = TrainingSamples(
-            sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up
+            sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
         )
         if options.after:
             before = stages_before(options.preset, self.bounds, Path(options.after))

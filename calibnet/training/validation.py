@@ -34,7 +34,7 @@ class Validation:
         self.samples: list[Sample] = []
         for sequence in sequences:
             for frame in sequence:
-                small = plain(frame, config.input_height, config.input_width, config.scales[-1])
+                small = plain(frame, network.input_camera(frame.camera))
                 self.samples += [
                     make_sample(small, sample_miscalibration(network.bounds, generator), config.volume_scales)
                     for _ in range(repeats)

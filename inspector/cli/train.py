@@ -83,7 +83,7 @@ if TYPE_CHECKING:
     help="Also train the image branch of an initialised stage.  [default: frozen, as all stages share it]",
 )
 @click.option(
-    "--after", type=FOLDER, help="Folder of the stages before: half of the miscalibrations are what they leave behind."
+    "--after", type=FOLDER, help="Folder of the stages before: most miscalibrations are then what they leave behind."
 )
 @click.option(
     "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."

@@ -41,10 +41,10 @@ class KnownCascade:
     def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
         after = miscalibration([0, 0, 1.0], [0, 0, 0]) @ frame.camera_from_lidar
         stages = [
-            StageTrace(number, RANGES[number - 1], initial, after, after @ invert(initial))
+            StageTrace(number, RANGES[number - 1], frame.camera, initial, after, after @ invert(initial))
             for number in self.loaded["stages"]
         ]
-        return CascadeTrace(frame.camera, initial, tuple(stages))
+        return CascadeTrace(initial, tuple(stages))
 
     def calibrate_sequence(
         self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None

@@ -39,9 +39,9 @@ class ShrinkingCascade:
         ]
         stages, before = [], initial
         for number, after in steps:
-            stages.append(StageTrace(number, RANGES[number - 1], before, after, after @ invert(before)))
+            stages.append(StageTrace(number, RANGES[number - 1], CAMERA, before, after, after @ invert(before)))
             before = after
-        return CascadeTrace(CAMERA, initial, tuple(stages))
+        return CascadeTrace(initial, tuple(stages))
 
 
 def test_every_stage_is_measured_against_the_reference() -> None:

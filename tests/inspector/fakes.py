@@ -104,8 +104,10 @@ class FakeCascade:
             details = self._detail(frame, camera, before, number) if detail else None
             correction = current @ invert(before)
             timing = {"projection": float(np.random.default_rng().uniform(1, 3))}
-            stages.append(StageTrace(number, RANGES[number - 1], before, current, correction, timing, None, details))
-        return CascadeTrace(camera, initial, tuple(stages), {"features": 3.0})
+            stages.append(
+                StageTrace(number, RANGES[number - 1], camera, before, current, correction, timing, None, details)
+            )
+        return CascadeTrace(initial, tuple(stages), {"features": 3.0})
 
     def _detail(self, frame: Frame, camera: PinholeCamera, before: NDArray[np.float64], seed: int) -> StageDetail:
         projection = project(frame.points, before, camera)

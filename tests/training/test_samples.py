@@ -9,7 +9,7 @@ import torch
 from calibnet.errors import DatasetError
 from calibnet.geometry import RANGES, bounds_of, invert, miscalibration
 from calibnet.network.displacement import DisplacementField
-from calibnet.network.inputs import lidar_input
+from calibnet.network.inputs import input_camera, lidar_input
 from calibnet.network.pose import GeometricHead
 from calibnet.training.losses import true_displacement
 from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, plain, visible_cells
@@ -124,7 +124,8 @@ def test_collated_samples_keep_their_order_and_types() -> None:
 
 
 def test_plain_frames_have_the_size_of_inference() -> None:
-    frame = plain(make_frame(0, 621, 188), 160, 512, 32)
+    large = make_frame(0, 621, 188)
+    frame = plain(large, input_camera(large.camera, 160, 512, 32))
     assert frame.image.shape == (frame.camera.height, frame.camera.width, 3)
     assert frame.image.shape[0] % 32 == frame.image.shape[1] % 32 == 0
     assert np.array_equal(frame.camera_from_lidar, REFERENCE)

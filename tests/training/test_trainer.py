@@ -17,6 +17,7 @@ from safetensors.torch import load_file
 
 from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsError
 from calibnet.geometry import RANGES, miscalibration
+from calibnet.network.inputs import input_camera
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training import trainer as trainer_module
 from calibnet.training.losses import feature_loss
@@ -65,7 +66,8 @@ def options(folder: Path, batches: int = 4, **changes: Any) -> TrainingOptions:
 def held_out_matching(network: CalibrationNetwork) -> float:
     """The features' loss on scenes that are not trained on."""
     generator = np.random.default_rng(5)
-    frames = [plain(make_frame(seed), TINY.input_height, TINY.input_width, 32) for seed in range(90, 96)]
+    large = [make_frame(seed) for seed in range(90, 96)]
+    frames = [plain(frame, input_camera(frame.camera, TINY.input_height, TINY.input_width, 32)) for frame in large]
     inputs, target = collate(
         [
             make_sample(
