@@ -155,6 +155,19 @@ def test_image_features_are_computed_once_where_the_branch_is_shared(
     np.testing.assert_allclose(together.corrected, apart.corrected, atol=1e-9)
 
 
+def test_stages_see_the_image_at_their_own_sizes(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = count_image_features(monkeypatch)
+    zooming = cascade((1, 2, 3, 4, 5), zooms=(0.5, 0.5, 1.0, 2.0, 2.0))
+    trace = zooming.calibrate(frame, INITIAL, detail=True)
+    assert len(calls) == 3, "one run of the image branch a size, not a stage"
+    areas = [stage.camera.width * stage.camera.height for stage in trace.stages]
+    assert areas[0] == areas[1] < areas[2] < areas[3] == areas[4]
+    assert areas[2] == pytest.approx(64 * 128, rel=0.5) and areas[3] == pytest.approx(128 * 256, rel=0.3)
+    for stage in trace.stages:
+        assert stage.detail is not None and stage.detail.depth.shape == (stage.camera.height, stage.camera.width)
+        assert stage.detail.scales[0].volume.shape[2:] == (stage.camera.height // 8, stage.camera.width // 8)
+
+
 def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_image_features(monkeypatch)
     different = cascade(shared=False)
@@ -190,7 +203,7 @@ def test_too_few_points_are_one_sentence(frame: Frame) -> None:
 def test_small_and_large_images_run(frame: Frame) -> None:
     for width, height in ((90, 30), (500, 500), (700, 120)):
         view = make_frame(0, width, height)
-        camera = cascade((5,)).calibrate(view, INITIAL).camera
+        camera = cascade((5,)).calibrate(view, INITIAL).stages[0].camera
         assert camera.width * camera.height == pytest.approx(64 * 128, rel=0.5)
 
 

@@ -140,3 +140,21 @@ def test_augmentation_is_a_function_of_the_generator() -> None:
     assert np.array_equal(one.image, two.image) and np.array_equal(one.points, two.points)
     assert np.array_equal(one.camera_from_lidar, two.camera_from_lidar)
     assert not np.array_equal(one.image, other.image)
+
+
+def test_a_magnified_camera_cuts_a_part_and_keeps_points_on_the_picture() -> None:
+    before = ramp_frame(2)
+    for seed in range(4):
+        after = virtual_camera(before, 96, 320, np.random.default_rng(seed), magnification=1.6)
+        assert_points_stay_on_the_picture(before, after)
+        assert after.image.shape == (96, 320, 3)
+
+
+def test_magnifying_stops_at_the_pixels_that_there_are() -> None:
+    before = ramp_frame(2)
+    native = before.camera.matrix[0, 0] / 0.96
+    for seed in range(30):
+        after = virtual_camera(before, 160, 512, np.random.default_rng(seed), magnification=5.0)
+        enlarged = after.camera.matrix[0, 0] > 1.05 * native
+        unmagnified = virtual_camera(before, 160, 512, np.random.default_rng(seed))
+        assert not enlarged or after.camera.matrix[0, 0] == unmagnified.camera.matrix[0, 0]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
+from calibnet.network.network import NetworkInputs, NetworkOutput
 from calibnet.training.residuals import residual_errors, stages_before, within
 from calibnet.training.samples import Source, TrainingSamples
 from calibnet.weights import save_network, weights_path
@@ -18,7 +19,7 @@ def data() -> TrainingSamples:
     return TrainingSamples([Source(Scenes(), 1.0)], RANGES[3], TINY.scales, TINY.input_height * TINY.input_width, 2, 0)
 
 
-def test_residuals_are_what_the_stages_leave_and_half_of_what_is_drawn(data: TrainingSamples) -> None:
+def test_residuals_are_what_the_stages_leave_and_most_of_what_is_drawn(data: TrainingSamples) -> None:
     networks = [tiny_network(seed=1, stage=3)]
     wide = MiscalibrationRange(30, 5)
     data.residuals = residual_errors(networks, data, wide, 6)
@@ -28,7 +29,7 @@ def test_residuals_are_what_the_stages_leave_and_half_of_what_is_drawn(data: Tra
     generator = np.random.default_rng(0)
     drawn = [data.draw(generator) for _ in range(400)]
     repeated = np.mean([any(delta is residual for residual in data.residuals) for delta in drawn])
-    assert 0.4 < repeated < 0.6
+    assert 0.6 < repeated < 0.8
 
 
 def test_lost_frames_are_left_out() -> None:
@@ -44,3 +45,25 @@ def test_stages_before_are_those_of_wider_ranges_that_have_weights(tmp_path: Pat
         save_network(weights_path("tiny", RANGES[number - 1], tmp_path), network, network.state_dict(), {})
     before = stages_before("tiny", RANGES[3], tmp_path)
     assert [network.bounds for network in before] == [RANGES[0], RANGES[2]]
+
+
+def test_stages_before_see_the_whole_frame_at_their_own_size(data: TrainingSamples) -> None:
+    data.magnification = 3.0
+    zooming = tiny_network(seed=1, stage=3, zooms=(1.0, 1.0, 2.0, 1.0, 1.0))
+    sizes: list[tuple[int, int]] = []
+    forward = zooming.forward
+
+    def watched(inputs: NetworkInputs) -> NetworkOutput:
+        sizes.append((inputs.image.shape[2], inputs.image.shape[3]))
+        focal.append(float(inputs.intrinsics[0, 0, 0]) / inputs.image.shape[3])
+        return forward(inputs)
+
+    focal: list[float] = []
+    zooming.forward = watched  # type: ignore[method-assign, assignment]
+    residual_errors([zooming], data, MiscalibrationRange(30, 5), 4)
+    assert all(height * width > 3 * TINY.input_height * TINY.input_width for height, width in sizes)
+    wide = [data.draw_frame(n, np.random.default_rng(n), 1.0, whole=True) for n in range(20)]
+    near = [data.draw_frame(n, np.random.default_rng(n), 1.0) for n in range(20)]
+    lens = [[float(f.camera.matrix[0, 0] / f.camera.width) for f in frames] for frames in (wide, near)]
+    assert np.median(lens[1]) > 1.5 * np.median(lens[0]), "magnified cuttings show a narrower view"
+    assert max(focal) < np.median(lens[1]), "the stages before are not given cuttings"
