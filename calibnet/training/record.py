@@ -33,7 +33,8 @@ def training_record(
         "torch": torch.__version__,
         "commit": _commit(),
         "validation": figures._asdict() if figures else None,
-        "licence_note": "Trained on KITTI (CC BY-NC-SA 3.0), nuScenes, RELLIS-3D and other frames: see the README.",
+        "licence_note": "Trained on KITTI (CC BY-NC-SA 3.0), nuScenes, RELLIS-3D and other frames, the image branch "
+        "of compact from EfficientNet-Lite0 (Apache-2.0): see the README.",
     }
 
 
