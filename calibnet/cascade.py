@@ -159,7 +159,10 @@ class Cascade:
             views = self._views(frame, clock)
             for stage in self.stages:
                 camera = stage.network.input_camera(frame.camera)
-                trace = self._run(stage, frame, camera, views[camera.width, camera.height], extrinsic, detail)
+                view = views[camera.width, camera.height]
+                trace = self._run(stage, frame, camera, view, extrinsic, detail)
+                for _ in range(stage.network.rounds - 1):
+                    trace = trace.followed_by(self._run(stage, frame, camera, view, trace.after, False))
                 extrinsic = trace.after
                 traces.append(trace)
         return CascadeTrace(initial, tuple(traces), clock.parts)

@@ -6,7 +6,7 @@ Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class StageTrace:
         milliseconds: wall time by part, for instance ``{"projection": 2.1, "cost_volumes": 3.0}``.
         information: ``[6, 6]`` inverse covariance of the correction's ``(translation m, rotation rad)`` as the
             network states it, or None from a head that does not.
-        detail: intermediate results, or None when they were not asked for.
+        detail: intermediate results of its first round, or None when they were not asked for.
     """
 
     number: int
@@ -82,6 +82,17 @@ class StageTrace:
     milliseconds: dict[str, float] = field(default_factory=dict)
     information: NDArray[np.float64] | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
+
+    def followed_by(self, again: StageTrace) -> StageTrace:
+        """This and a second round of the same stage as one; the detail stays that of the first look."""
+        parts = dict.fromkeys([*self.milliseconds, *again.milliseconds])  # in their order
+        return replace(
+            self,
+            after=again.after,
+            correction=again.correction @ self.correction,
+            milliseconds={part: self.milliseconds.get(part, 0.0) + again.milliseconds.get(part, 0.0) for part in parts},
+            information=again.information,
+        )
 
 
 @dataclass(frozen=True, eq=False)

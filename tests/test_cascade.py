@@ -168,6 +168,21 @@ def test_stages_see_the_image_at_their_own_sizes(frame: Frame, monkeypatch: pyte
         assert stage.detail.scales[0].volume.shape[2:] == (stage.camera.height // 8, stage.camera.width // 8)
 
 
+def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = cascade((3,)).calibrate(frame, INITIAL, detail=True)
+    second = cascade((3,)).calibrate(frame, first.corrected)
+    calls = count_image_features(monkeypatch)
+    both = cascade((3,), rounds=(1, 1, 2, 1, 1)).calibrate(frame, INITIAL, detail=True)
+    assert len(calls) == 1, "the image is the same in both rounds"
+    (stage,) = both.stages
+    np.testing.assert_allclose(stage.after, second.corrected, atol=1e-9)
+    np.testing.assert_allclose(stage.correction @ INITIAL, stage.after, atol=1e-9)
+    assert not np.allclose(stage.after, first.corrected, atol=1e-4)
+    assert stage.detail is not None and first.stages[0].detail is not None
+    np.testing.assert_array_equal(stage.detail.depth, first.stages[0].detail.depth)
+    assert stage.milliseconds.keys() == first.stages[0].milliseconds.keys()
+
+
 def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_image_features(monkeypatch)
     different = cascade(shared=False)

@@ -44,6 +44,7 @@ class NetworkConfig:
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
+    rounds: tuple[int, ...] = (1,) * len(RANGES)  # times that each stage runs, on the scan projected anew
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -83,6 +84,10 @@ class NetworkConfig:
                 f"zooms has one positive number a stage, {len(RANGES)} in all",
             ),
             (
+                len(self.rounds) != len(RANGES) or min(self.rounds) < 1,
+                f"rounds has one number of at least 1 a stage, {len(RANGES)} in all",
+            ),
+            (
                 self.image_encoder not in get_args(ImageEncoder),
                 f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
             ),
@@ -105,6 +110,10 @@ class NetworkConfig:
         of a cell.
         """
         return dict(zip(RANGES, self.zooms, strict=True)).get(bounds, 1.0)
+
+    def rounds_of(self, bounds: MiscalibrationRange) -> int:
+        """How often the stage with this range runs; a second look costs its time again, but from much nearer."""
+        return dict(zip(RANGES, self.rounds, strict=True)).get(bounds, 1)
 
     @property
     def volume_scales(self) -> tuple[int, ...]:

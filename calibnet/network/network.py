@@ -89,6 +89,11 @@ class CalibrationNetwork(nn.Module):
         config, zoom = self.config, self.config.zoom(self.bounds)
         return input_camera(camera, zoom * config.input_height, zoom * config.input_width, config.scales[-1])
 
+    @property
+    def rounds(self) -> int:
+        """How often this stage runs, one after the other."""
+        return self.config.rounds_of(self.bounds)
+
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""
         features = zip(self.features.lidar(inputs.lidar), self.features.image(inputs.image), strict=True)

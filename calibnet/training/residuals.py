@@ -38,11 +38,12 @@ def residual_errors(
         count: frames to run; what is lost altogether is left out of the result.
     """
     generator = np.random.default_rng([data.seed, 4])
+    looks = [network for network in networks for _ in range(network.rounds)]
     residuals = []
     for number in range(count):
         frame = data.draw_frame(number, generator, 1.0, whole=True)
         delta = sample_miscalibration(networks[0].bounds, generator)
-        for network in networks:
+        for network in looks:
             seen = plain(frame, network.input_camera(frame.camera))
             inputs, _ = collate([make_sample(seen, delta, network.config.volume_scales)])
             device = next(network.parameters()).device

@@ -43,6 +43,7 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
         ({"normalization": "layer"}, "group, batch"),
         ({"zooms": [1.0, 1.0]}, "one positive number a stage, 5 in all"),
         ({"zooms": [0.0, 1.0, 1.0, 1.0, 1.0]}, "one positive number a stage"),
+        ({"rounds": [1, 1, 1, 0, 1]}, "one number of at least 1 a stage, 5 in all"),
         ({"widths": 8}, "mine.toml"),
     ],
 )
@@ -59,7 +60,9 @@ def test_missing_keys_are_named() -> None:
         parse_config(values, "mine.toml")
 
 
-def test_each_range_has_its_zoom_and_others_have_none() -> None:
-    config = replace(TINY, zooms=(0.5, 0.6, 1.0, 1.5, 2.0))
+def test_each_range_has_its_zoom_and_rounds_and_others_have_none() -> None:
+    config = replace(TINY, zooms=(0.5, 0.6, 1.0, 1.5, 2.0), rounds=(3, 2, 1, 1, 2))
+    assert [config.rounds_of(bounds) for bounds in RANGES] == [3, 2, 1, 1, 2]
+    assert config.rounds_of(MiscalibrationRange(7, 0.7)) == 1
     assert [config.zoom(bounds) for bounds in RANGES] == [0.5, 0.6, 1.0, 1.5, 2.0]
     assert config.zoom(MiscalibrationRange(7, 0.7)) == 1.0
