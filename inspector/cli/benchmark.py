@@ -64,7 +64,7 @@ def benchmark(
 
 
 def report(result: Benchmark, console: Console) -> None:
-    """Print the machine, a row a stage with its parts, and the whole."""
+    """Print the machine, a row a part and a column a stage, and the whole."""
     from rich import box
     from rich.table import Table
 
@@ -77,13 +77,14 @@ def report(result: Benchmark, console: Console) -> None:
     )
     table = Table(title="Milliseconds a frame", title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("")
-    columns = list(result.stages[0].parts)
-    sizes = list(result.stages[0].batches)
-    for heading in ["all", *(part.replace("_", " ") for part in columns), *(f"network x{size}" for size in sizes)]:
-        table.add_column(heading, justify="right")
     for stage in result.stages:
-        numbers = [stage.milliseconds, *(stage.parts[part] for part in columns), *stage.batches.values()]
-        table.add_row(f"stage {stage.number} ({stage.range})", *(f"{number:.1f}" for number in numbers))
+        table.add_column(f"stage {stage.number}\n{stage.range}", justify="right")
+    rows = {part.replace("_", " "): [stage.parts[part] for stage in result.stages] for part in result.stages[0].parts}
+    rows["the whole stage"] = [stage.milliseconds for stage in result.stages]
+    for size in result.stages[0].batches:
+        rows[f"network alone, {size} at once"] = [stage.batches[size] for stage in result.stages]
+    for name, numbers in rows.items():
+        table.add_row(name, *(f"{number:.1f}" for number in numbers))
     console.print(table)
     shared = ", ".join(f"{part.replace('_', ' ')} {value:.1f}" for part, value in result.shared.items())
     console.print(f"Once a frame: {shared}. The whole cascade: {result.cascade:.1f} ms a frame.", highlight=False)
