@@ -68,10 +68,10 @@ class Frames(Protocol):
 
 
 class View(NamedTuple):
-    """A frame's image at the size some stages want: ``[1, 3, H, W]``, and its features if those stages share them."""
+    """A frame's image at the size some stages want: ``[1, 3, H, W]``, and what their image branch makes of it."""
 
     image: Tensor
-    features: list[Tensor] | None
+    features: list[Tensor]
 
 
 class Clock:
@@ -101,7 +101,7 @@ class Cascade:
             reasons = " ".join(stage.reason for stage in self.skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
         self.device = next(stages[0].network.parameters()).device
-        self.shares_image_branch = all(_same_image_branch(stages[0].network, stage.network) for stage in stages[1:])
+        self.image_branches = _image_branches([stage.network for stage in stages])
 
     @classmethod
     def load(
@@ -157,9 +157,9 @@ class Cascade:
         extrinsic, traces = initial, []
         with torch.inference_mode(), autocast(self.device):
             views = self._views(frame, clock)
-            for stage in self.stages:
+            for stage, branch in zip(self.stages, self.image_branches, strict=True):
                 camera = stage.network.input_camera(frame.camera)
-                view = views[camera.width, camera.height]
+                view = views[branch, camera.width, camera.height]
                 trace = self._run(stage, frame, camera, view, extrinsic, detail)
                 for _ in range(stage.network.rounds - 1):
                     trace = trace.followed_by(self._run(stage, frame, camera, view, trace.after, False))
@@ -167,20 +167,20 @@ class Cascade:
                 traces.append(trace)
         return CascadeTrace(initial, tuple(traces), clock.parts)
 
-    def _views(self, frame: Frame, clock: Clock) -> dict[tuple[int, int], View]:
-        """The image at every size that a stage wants, with its features where the stages share them."""
-        views: dict[tuple[int, int], View] = {}
-        for stage in self.stages:
+    def _views(self, frame: Frame, clock: Clock) -> dict[tuple[int, int, int], View]:
+        """The image at every size that a stage wants, and its features: once for all stages that share them.
+
+        By image branch, width and height.
+        """
+        views: dict[tuple[int, int, int], View] = {}
+        for stage, branch in zip(self.stages, self.image_branches, strict=True):
             camera = stage.network.input_camera(frame.camera)
-            if (camera.width, camera.height) in views:
+            if (branch, camera.width, camera.height) in views:
                 continue
             image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
             clock("resize")
-            features = None
-            if self.shares_image_branch:
-                features = self.stages[0].network.features.image(image)
-                clock("image_features")
-            views[camera.width, camera.height] = View(image, features)
+            views[branch, camera.width, camera.height] = View(image, stage.network.features.image(image))
+            clock("image_features")
         return views
 
     def calibrate_sequence(
@@ -319,6 +319,15 @@ def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     exact = matrix.copy()
     exact[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
     return exact
+
+
+def _image_branches(networks: list[CalibrationNetwork]) -> list[int]:
+    """For each network the position of the first one whose image branch would compute the same features."""
+    branches: list[int] = []
+    for position, network in enumerate(networks):
+        known = (earlier for earlier in sorted(set(branches)) if _same_image_branch(networks[earlier], network))
+        branches.append(next(known, position))
+    return branches
 
 
 def _same_image_branch(one: CalibrationNetwork, other: CalibrationNetwork) -> bool:

@@ -146,10 +146,9 @@ def test_image_features_are_computed_once_where_the_branch_is_shared(
 ) -> None:
     calls = count_image_features(monkeypatch)
     shared = cascade()
-    assert shared.shares_image_branch
     together = shared.calibrate(frame, INITIAL)
     assert len(calls) == 1
-    shared.shares_image_branch = False
+    shared.image_branches = [0, 1, 2]
     apart = shared.calibrate(frame, INITIAL)
     assert len(calls) == 1 + 3
     np.testing.assert_allclose(together.corrected, apart.corrected, atol=1e-9)
@@ -186,17 +185,28 @@ def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch:
 def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_image_features(monkeypatch)
     different = cascade(shared=False)
-    assert not different.shares_image_branch
-    assert different.calibrate(frame, INITIAL).milliseconds.keys() == {"resize"}
+    trace = different.calibrate(frame, INITIAL)
     assert len(calls) == 3
+    before = INITIAL
+    for stage in different.stages:
+        before = Cascade([stage]).calibrate(frame, before).corrected
+    np.testing.assert_allclose(trace.corrected, before, atol=1e-9)
+
+
+def test_neighbours_share_an_image_branch_of_their_own() -> None:
+    """A stage may have its branch trained further while the stages at other image sizes keep theirs."""
+    seeds = {1: 0, 2: 0, 3: 1, 4: 0, 5: 1}
+    networks = {number: tiny_network(seed, stage=number) for number, seed in seeds.items()}
+    stages = [Stage(number, RANGES[number - 1], network) for number, network in networks.items()]
+    assert Cascade(stages).image_branches == [0, 0, 2, 0, 2]
 
 
 def test_networks_of_other_sizes_do_not_share() -> None:
     wide = tiny_network(stage=4, widths=(8, 8, 16, 16, 24))
     deep = tiny_network(stage=5, blocks=(0, 0, 2, 0, 0))
     first = Stage(3, RANGES[2], tiny_network(stage=3))
-    assert not Cascade([first, Stage(4, RANGES[3], wide)]).shares_image_branch
-    assert not Cascade([first, Stage(5, RANGES[4], deep)]).shares_image_branch
+    assert Cascade([first, Stage(4, RANGES[3], wide)]).image_branches == [0, 1]
+    assert Cascade([first, Stage(5, RANGES[4], deep)]).image_branches == [0, 1]
 
 
 @pytest.mark.parametrize("detail", [True, False])

@@ -30,37 +30,46 @@ class Step:
 WIDEST, WIDE, MIDDLE, NARROW, NARROWEST = RANGES
 SCHEDULE = (
     # the middle range first: most of the truth lies within the finest window there, so every scale learns to match
-    Step(MIDDLE, 0.60, None, 1.0),
+    Step(MIDDLE, 0.55, None, 1.0),
     Step(WIDEST, 0.12, MIDDLE, 0.6),
-    Step(WIDE, 0.08, MIDDLE, 0.6),
-    Step(NARROW, 0.12, MIDDLE, 0.6),
+    Step(WIDE, 0.08, WIDEST, 0.6),
+    # and again, now that there are stages before it whose errors it can be shown
+    Step(MIDDLE, 0.06, MIDDLE, 0.5),
+    Step(NARROW, 0.11, MIDDLE, 0.6),
     Step(NARROWEST, 0.08, NARROW, 0.4),
 )
-"""Each stage but the first keeps the first one's image branch, so that it is computed once a frame, and
+"""Each step but the first keeps the first one's image branch, so that it is computed once a frame and size, and
 most of its miscalibrations are what the stages before it leave behind."""
+
+FEATURES = "features"
+"""Folder, within the output's, of the first step's weights: a start for the others, none of the five stages."""
 
 
 def all_stages(options: TrainingOptions) -> list[TrainingOptions]:
-    """What to train, in order; stages that have their weights in the output folder already are left out.
+    """What to train, in order; steps that have their weights in the output folder already are left out.
 
     Args:
         options: of the whole: its budget is shared out, its range is not looked at.
     """
-    folder = Path(options.output)
+    whole = Path(options.output)
+    folders = [whole if step.neighbour else whole / FEATURES for step in SCHEDULE]
+    paths = [weights_path(options.preset, step.bounds, folder) for step, folder in zip(SCHEDULE, folders, strict=True)]
 
-    def path(bounds: MiscalibrationRange) -> Path:
-        return weights_path(options.preset, bounds, folder)
+    def latest(bounds: MiscalibrationRange, position: int) -> Path:
+        """Weights of a stage as they are before the step at this position."""
+        return next(paths[earlier] for earlier in reversed(range(position)) if SCHEDULE[earlier].bounds == bounds)
 
     return [
         replace(
             options,
             range=str(step.bounds),
+            output=str(folders[position]),
             minutes=options.minutes and options.minutes * step.share,
             samples=options.samples and max(options.batch, round(options.samples * step.share)),
             learning_rate=options.learning_rate * step.learning_rate,
-            initialize=str(path(step.neighbour)) if step.neighbour else options.initialize,
-            after=str(folder) if step.neighbour else None,
+            initialize=str(latest(step.neighbour, position)) if step.neighbour else options.initialize,
+            after=str(whole) if step.neighbour else None,
         )
-        for step in SCHEDULE
-        if not path(step.bounds).is_file()
+        for position, step in enumerate(SCHEDULE)
+        if not paths[position].is_file()
     ]

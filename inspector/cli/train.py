@@ -165,8 +165,8 @@ def train(
         console.print(f"All five stages have their weights in {output}; remove those to train again.")
     for number, step in enumerate(steps, start=1):
         if every_stage:
-            console.print(f"Stage ±{step.range}, {number} of {len(steps)} to go", style="bold")
-        train_stage(step, console, save and stage_file(save, step.range, every_stage), resume)
+            console.print(f"Stage ±{step.range}, {number} of {len(steps)} to go, in {step.output}", style="bold")
+        train_stage(step, console, save and step_file(save, step, output) if every_stage else save, resume)
 
 
 def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:
@@ -182,9 +182,10 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
     console.print(f"Weights with their training record: {path}")
 
 
-def stage_file(save: Path, stage: str, every_stage: bool) -> Path:
-    """The recording of one stage's training: with --all, each has its own."""
-    return save.with_stem(f"{save.stem}-{stage.replace('/', '-')}") if every_stage else save
+def step_file(save: Path, step: TrainingOptions, output: Path) -> Path:
+    """The recording of one step of --all, named after the range and the folder within the output's."""
+    parts = [save.stem, *Path(step.output).relative_to(output).parts, step.range.replace("/", "-")]
+    return save.with_stem("-".join(parts))
 
 
 class Observers:
