@@ -278,7 +278,7 @@ class Cascade:
                 "(x right, y down, z forward)."
             )
         clock("projection")
-        inputs = self._inputs(view.image, lidar, camera)
+        inputs = self._inputs(view.image, lidar.without_top(lidar.empty_rows), camera)
         output = stage.network(inputs, view.features, keep_activations=detail, clock=clock)
         estimate = output.pose.correction[0].double().cpu().numpy()
         if not np.isfinite(estimate).all():

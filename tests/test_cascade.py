@@ -12,7 +12,7 @@ from torch import Tensor
 from calibnet.cascade import Cascade, SkippedStage, Stage, orthonormal
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
-from calibnet.geometry import RANGES, depth_image, invert, miscalibration
+from calibnet.geometry import RANGES, depth_image, invert, miscalibration, project
 from calibnet.network.features import FeatureExtractor
 from calibnet.trace import CascadeTrace
 from calibnet.weights import save_network, weights_path
@@ -165,6 +165,34 @@ def test_stages_see_the_image_at_their_own_sizes(frame: Frame, monkeypatch: pyte
     for stage in trace.stages:
         assert stage.detail is not None and stage.detail.depth.shape == (stage.camera.height, stage.camera.width)
         assert stage.detail.scales[0].volume.shape[2:] == (stage.camera.height // 8, stage.camera.width // 8)
+
+
+def test_rows_above_the_scan_are_spared_and_still_in_the_detail(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    heights: list[int] = []
+    original = FeatureExtractor.lidar
+
+    def seen(self: FeatureExtractor, lidar: Tensor) -> list[Tensor]:
+        heights.append(lidar.shape[2])
+        return original(self, lidar)
+
+    monkeypatch.setattr(FeatureExtractor, "lidar", seen)
+    wide = make_frame(3, 128, 64)
+    low = project(wide.points, INITIAL, wide.camera)
+    scan = wide.points[low.index[low.pixels[:, 1] > 40]]
+    stage = cascade((3,)).calibrate(replace(wide, points=scan), INITIAL, detail=True).stages[0]
+    empty = stage.camera.height // 2
+    assert heights == [stage.camera.height - empty]
+    detail = stage.detail
+    assert detail is not None and detail.depth.shape == (stage.camera.height, stage.camera.width)
+    assert not detail.displacement[: empty // 8].any() and detail.displacement[empty // 8 :].any()
+    assert detail.confidence.shape == detail.displacement.shape[:2] == detail.scales[0].occupied.shape
+    for scale in detail.scales:
+        rows = empty // scale.stride
+        assert not scale.occupied[:rows].any() and scale.occupied[rows:].any()
+        for array in (scale.volume, scale.probability, scale.before, scale.after):
+            assert array.shape[-2:] == scale.occupied.shape
+            assert not array[..., :rows, :].any() and array[..., rows:, :].any()
+        assert scale.best.shape[:2] == scale.occupied.shape and not scale.best[:rows].any()
 
 
 def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:

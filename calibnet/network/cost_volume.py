@@ -19,6 +19,14 @@ TEMPERATURE = 14.0
 """Cosines of unit-norm features become logits times this."""
 
 
+def surroundings(image: Tensor, height: int, radius: int) -> Tensor:
+    """What the windows of the lowest ``height`` rows see of an image: ``[B, C, height + 2r, w + 2r]``.
+
+    Zeros beside it; above, the rows that are there.
+    """
+    return F.pad(image, [radius] * 4)[:, :, image.shape[2] - height :]
+
+
 def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """Group-wise correlation of every LiDAR cell with the window of image cells around it.
 
@@ -27,8 +35,8 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     CPU, and the product of all pairs of cells three times the memory.
 
     Args:
-        lidar: ``[B, C, h, w]``.
-        image: ``[B, C, h, w]``.
+        lidar: ``[B, C, h, w]``, of all of the image or of its lowest rows, where the scan is.
+        image: ``[B, C, H, w]``, ``H >= h``.
         radius: of the window, in cells.
         groups: number of channel groups, each summed on its own.
 
@@ -37,7 +45,8 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """
     batch, channels, height, width = lidar.shape
     window, padded = 2 * radius + 1, width + 2 * radius
-    rows = F.pad(image, [radius] * 4).reshape(batch * groups, channels // groups, height + 2 * radius, padded)
+    rows = surroundings(image, height, radius)
+    rows = rows.reshape(batch * groups, channels // groups, height + 2 * radius, padded)
     rows = rows.unfold(2, window, 1).permute(0, 2, 1, 4, 3).flatten(3)  # [B*G, h, C/G, Dy * (w + 2r)]
     cells = lidar.reshape(batch * groups, channels // groups, height, width).permute(0, 2, 3, 1)
     products = cells @ rows  # [B*G, h, w, Dy * (w + 2r)]
@@ -58,7 +67,9 @@ def band_index(width: int, radius: int) -> Tensor:
 def concatenate(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
     """Concatenation volume ``[B, D, h, w, 2C]`` of features ``[B, C, h, w]``."""
     window = 2 * radius + 1
-    moved = F.pad(image, [radius] * 4).unfold(2, window, 1).unfold(3, window, 1)  # [B, C, h, w, Dy, Dx]
+    moved = (
+        surroundings(image, lidar.shape[2], radius).unfold(2, window, 1).unfold(3, window, 1)
+    )  # [B, C, h, w, Dy, Dx]
     moved = moved.permute(0, 4, 5, 2, 3, 1).flatten(1, 2)
     fixed = lidar.permute(0, 2, 3, 1)[:, None].expand_as(moved)
     return torch.cat([fixed, moved], dim=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from calibnet.geometry import PinholeCamera, project
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.se3 import Matrix
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class LidarInput(NamedTuple):
@@ -23,6 +25,26 @@ class LidarInput(NamedTuple):
 
     image: NDArray[np.float32]
     cells: list[NDArray[np.float32]]
+
+    @property
+    def empty_rows(self) -> int:
+        """Rows of the coarsest scale, from the top, that hold no point; all but one if there is none at all.
+
+        Scanners look down more than cameras do: often a quarter of the picture and more.
+        """
+        occupied = (self.cells[-1][2] > 0).any(axis=1)
+        return int(occupied.argmax()) if occupied.any() else len(occupied) - 1
+
+    def without_top(self, rows: int) -> LidarInput:
+        """Without so many rows of the coarsest scale: nothing is lost if they are empty, and work is saved."""
+        return LidarInput(
+            below(self.image, rows, self.cells[-1]), [below(cells, rows, self.cells[-1]) for cells in self.cells]
+        )
+
+
+def below(array: NDArray[Scalar], rows: int, coarsest: NDArray[np.float32]) -> NDArray[Scalar]:
+    """``[..., H, W]`` of any scale without its top, given in rows of ``coarsest [3, h, w]``."""
+    return array[..., rows * (array.shape[-2] // coarsest.shape[-2]) :, :]
 
 
 def input_camera(camera: PinholeCamera, height: float, width: float, coarsest: int) -> PinholeCamera:

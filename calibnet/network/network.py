@@ -24,9 +24,10 @@ class NetworkInputs(NamedTuple):
 
     Attributes:
         image: ``[B, 3, H, W]`` RGB 0..255, any dtype.
-        lidar: ``[B, 2, H, W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1.
+        lidar: ``[B, 2, H', W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1. Of the lowest
+            ``H'`` rows, a multiple of the coarsest stride: those above them, which hold no point, may be left out.
         intrinsics: ``[B, 3, 3]`` float32.
-        cells: per scale, fine to coarse, ``[B, 3, H/s, W/s]`` float32: the nearest LiDAR point of
+        cells: per scale, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR point of
             each cell in the camera frame, zeros where there is none.
     """
 

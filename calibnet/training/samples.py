@@ -21,7 +21,7 @@ from calibnet.geometry import (
     transform_points,
 )
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.network.inputs import LidarInput, lidar_input, resize_image
+from calibnet.network.inputs import LidarInput, below, lidar_input, resize_image
 from calibnet.network.network import NetworkInputs
 from calibnet.training.augmentation import augment
 from calibnet.training.losses import Target
@@ -100,7 +100,10 @@ def plain(frame: Frame, camera: PinholeCamera) -> Frame:
 
 
 def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
-    """Stack samples of one input size."""
+    """Stack samples of one input size, without the rows at the top that hold no point in any of them."""
+    top = min(sample.lidar.empty_rows for sample in samples)
+    scans = [sample.lidar.without_top(top) for sample in samples]
+    visible = [[below(mask, top, s.lidar.cells[-1]) for mask in s.visible] for s in samples]
 
     def stack(arrays: Many[NDArray[np.generic]]) -> torch.Tensor:
         return torch.from_numpy(np.stack(arrays))
@@ -108,13 +111,13 @@ def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
     scales = range(len(samples[0].visible))
     inputs = NetworkInputs(
         stack([s.image for s in samples]).permute(0, 3, 1, 2),
-        stack([s.lidar.image for s in samples]),
+        stack([scan.image for scan in scans]),
         stack([s.intrinsics for s in samples]),
-        [stack([s.lidar.cells[scale] for s in samples]) for scale in scales],
+        [stack([scan.cells[scale] for scan in scans]) for scale in scales],
     )
     truth = stack([s.correction for s in samples])
     shift = stack([s.shift for s in samples])
-    return inputs, Target(truth, shift, [stack([s.visible[scale] for s in samples]) for scale in scales])
+    return inputs, Target(truth, shift, [stack([masks[scale] for masks in visible]) for scale in scales])
 
 
 @dataclass(frozen=True)

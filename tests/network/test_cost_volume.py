@@ -45,6 +45,14 @@ def test_correlation_equals_a_loop_of_shifted_products(radius: int, groups: int,
     torch.testing.assert_close(mine, theirs)
 
 
+def test_the_lowest_rows_see_the_image_above_them() -> None:
+    generator = torch.Generator().manual_seed(1)
+    lidar, image = torch.randn(2, 2, 6, 5, 7, generator=generator)
+    low = lidar[:, :, 3:]
+    torch.testing.assert_close(correlate(low, image, 2, 3), correlate(lidar, image, 2, 3)[:, :, 3:])
+    torch.testing.assert_close(concatenate(low, image, 2), concatenate(lidar, image, 2)[:, :, 3:])
+
+
 def test_correlation_gradients_are_those_of_finite_differences() -> None:
     torch.manual_seed(0)
     lidar, image = (torch.randn(1, 4, 2, 3, dtype=torch.float64, requires_grad=True) for _ in range(2))

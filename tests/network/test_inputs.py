@@ -85,3 +85,24 @@ def test_no_point_in_view_gives_empty_inputs() -> None:
         lidar = lidar_input(points, CAMERA_FROM_LIDAR, camera(64, 32), (8, 16, 32))
         assert not lidar.image.any() and not any(cells.any() for cells in lidar.cells)
         assert lidar.image.dtype == np.float32 and all(cells.dtype == np.float32 for cells in lidar.cells)
+
+
+def test_rows_above_the_scan_can_be_left_out() -> None:
+    points, view = scan(3000), camera(128, 128)
+    whole = lidar_input(points, CAMERA_FROM_LIDAR, view, (8, 16, 32))
+    assert whole.empty_rows == 0
+    low = points[project(points, CAMERA_FROM_LIDAR, view).index]
+    pixel = project(low, CAMERA_FROM_LIDAR, view)
+    low = low[pixel.index[pixel.pixels[:, 1] > 70]]
+    scanned = lidar_input(low, CAMERA_FROM_LIDAR, view, (8, 16, 32))
+    assert scanned.empty_rows == 2, "of four rows of 32 pixels, those above pixel 64"
+    part = scanned.without_top(2)
+    np.testing.assert_array_equal(part.image, scanned.image[:, 64:])
+    for scale, cells, cut in zip((8, 16, 32), scanned.cells, part.cells, strict=True):
+        np.testing.assert_array_equal(cut, cells[:, 64 // scale :])
+        assert not cells[:, : 64 // scale].any()
+
+
+def test_a_scan_out_of_view_keeps_a_row() -> None:
+    empty = lidar_input(np.zeros((0, 4), np.float32), CAMERA_FROM_LIDAR, camera(128, 128), (8, 16, 32))
+    assert empty.empty_rows == 3 and empty.without_top(3).cells[-1].shape == (3, 1, 4)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from calibnet.datasets.frame import Frame
 from calibnet.errors import DatasetError
-from calibnet.geometry import RANGES, bounds_of, invert, miscalibration
+from calibnet.geometry import RANGES, bounds_of, invert, miscalibration, project
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.inputs import input_camera, lidar_input
 from calibnet.network.pose import GeometricHead
@@ -33,6 +34,12 @@ def same(one: Sample, other: Sample) -> bool:
             strict=True,
         )
     )
+
+
+def lowered(frame: Frame, row: int) -> Frame:
+    """The frame with only those points that, miscalibrated by DELTA, fall below a row of its image."""
+    projection = project(frame.points, DELTA @ frame.camera_from_lidar, frame.camera)
+    return replace(frame, points=frame.points[projection.index[projection.pixels[:, 1] > row]])
 
 
 def test_a_sample_is_a_function_of_seed_and_number() -> None:
@@ -121,6 +128,19 @@ def test_collated_samples_keep_their_order_and_types() -> None:
     assert [tuple(mask.shape) for mask in target.visible] == [(2, 8, 16), (2, 4, 8), (2, 2, 4)]
     assert np.array_equal(inputs.image[1].permute(1, 2, 0).numpy(), frames[1].image)
     assert np.array_equal(inputs.cells[0][1].numpy(), samples[1].lidar.cells[0])
+
+
+def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
+    frames = [make_frame(seed, 128, 128) for seed in range(2)]
+    samples = [make_sample(lowered(frame, row), DELTA, SCALES) for frame, row in zip(frames, (100, 70), strict=True)]
+    assert [sample.lidar.empty_rows for sample in samples] == [3, 2]
+    inputs, target = collate(samples)
+    assert inputs.image.shape == (2, 3, 128, 128) and inputs.lidar.shape == (2, 2, 64, 128)
+    for scale, cells, mask, position in zip(SCALES, inputs.cells, target.visible, range(3), strict=True):
+        assert cells.shape[2:] == mask.shape[1:] == (64 // scale, 128 // scale)
+        for number, sample in enumerate(samples):
+            assert np.array_equal(cells[number].numpy(), sample.lidar.cells[position][:, 64 // scale :])
+            assert np.array_equal(mask[number].numpy(), sample.visible[position][64 // scale :])
 
 
 def test_plain_frames_have_the_size_of_inference() -> None:
