@@ -160,9 +160,12 @@ class Cascade:
             for stage, branch in zip(self.stages, self.image_branches, strict=True):
                 camera = stage.network.input_camera(frame.camera)
                 view = views[branch, camera.width, camera.height]
-                trace = self._run(stage, frame, camera, view, extrinsic, detail)
+                look = trace = self._run(stage, frame, camera, view, extrinsic, detail)
                 for _ in range(stage.network.rounds - 1):
-                    trace = trace.followed_by(self._run(stage, frame, camera, view, trace.after, False))
+                    if stage.network.is_settled(look.correction):
+                        break
+                    look = self._run(stage, frame, camera, view, look.after, False)
+                    trace = trace.followed_by(look)
                 extrinsic = trace.after
                 traces.append(trace)
         return CascadeTrace(initial, tuple(traces), clock.parts)

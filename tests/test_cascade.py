@@ -14,6 +14,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, depth_image, invert, miscalibration, project
 from calibnet.network.features import FeatureExtractor
+from calibnet.network.network import CalibrationNetwork
 from calibnet.trace import CascadeTrace
 from calibnet.weights import save_network, weights_path
 from tests.network.tiny import TINY, tiny_network
@@ -196,6 +197,7 @@ def test_rows_above_the_scan_are_spared_and_still_in_the_detail(frame: Frame, mo
 
 
 def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(CalibrationNetwork, "is_settled", lambda network, correction: False)
     first = cascade((3,)).calibrate(frame, INITIAL, detail=True)
     second = cascade((3,)).calibrate(frame, first.corrected)
     calls = count_image_features(monkeypatch)
@@ -208,6 +210,20 @@ def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch:
     assert stage.detail is not None and first.stages[0].detail is not None
     np.testing.assert_array_equal(stage.detail.depth, first.stages[0].detail.depth)
     assert stage.milliseconds.keys() == first.stages[0].milliseconds.keys()
+
+
+def test_a_stage_looks_again_until_the_next_one_can_take_over(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    once = cascade((3,)).calibrate(frame, INITIAL).stages[0]
+    found: list[np.ndarray] = []
+
+    def is_settled(network: CalibrationNetwork, correction: np.ndarray) -> bool:
+        found.append(correction)
+        return len(found) == 2
+
+    monkeypatch.setattr(CalibrationNetwork, "is_settled", is_settled)
+    stage = cascade((3,), rounds=(1, 1, 5, 1, 1)).calibrate(frame, INITIAL).stages[0]
+    np.testing.assert_allclose(found[0], once.correction, atol=1e-9)
+    np.testing.assert_allclose(found[1] @ found[0], stage.correction, atol=1e-9)
 
 
 def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,7 +44,7 @@ class NetworkConfig:
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
-    rounds: tuple[int, ...] = (1,) * len(RANGES)  # times that each stage runs, on the scan projected anew
+    rounds: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -112,7 +112,7 @@ class NetworkConfig:
         return dict(zip(RANGES, self.zooms, strict=True)).get(bounds, 1.0)
 
     def rounds_of(self, bounds: MiscalibrationRange) -> int:
-        """How often the stage with this range runs; a second look costs its time again, but from much nearer."""
+        """How often the stage with this range looks at most; another look costs its time again, from much nearer."""
         return dict(zip(RANGES, self.rounds, strict=True)).get(bounds, 1)
 
     @property

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from calibnet.geometry import MiscalibrationRange, PinholeCamera
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, bounds_of
 from calibnet.network.aggregation import Aggregation
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
@@ -92,8 +94,14 @@ class CalibrationNetwork(nn.Module):
 
     @property
     def rounds(self) -> int:
-        """How often this stage runs, one after the other."""
+        """How often this stage runs at most, one look after the other."""
         return self.config.rounds_of(self.bounds)
+
+    def is_settled(self, correction: NDArray[np.float64]) -> bool:
+        """Whether the next stage can take over: what this look corrected (4x4) is within that one's range."""
+        position = RANGES.index(self.bounds) if self.bounds in RANGES else len(RANGES)
+        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], bounds_of(correction)
+        return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from calibnet.datasets.frame import Frame
 from calibnet.geometry import RANGES, MiscalibrationRange, sample_miscalibration
 from calibnet.geometry.miscalibration import bounds_of
 from calibnet.network.network import CalibrationNetwork
@@ -38,20 +39,29 @@ def residual_errors(
         count: frames to run; what is lost altogether is left out of the result.
     """
     generator = np.random.default_rng([data.seed, 4])
-    looks = [network for network in networks for _ in range(network.rounds)]
     residuals = []
     for number in range(count):
         frame = data.draw_frame(number, generator, 1.0, whole=True)
         delta = sample_miscalibration(networks[0].bounds, generator)
-        for network in looks:
+        for network in networks:
             seen = plain(frame, network.input_camera(frame.camera))
-            inputs, _ = collate([make_sample(seen, delta, network.config.volume_scales)])
-            device = next(network.parameters()).device
-            with torch.inference_mode(), autocast(device):
-                delta = network(inputs.to(device)).pose.correction[0].double().cpu().numpy() @ delta
+            for _ in range(network.rounds):
+                correction = look(network, seen, delta)
+                delta = correction @ delta
+                if network.is_settled(correction):
+                    break
         if within(delta, bounds):
             residuals.append(delta)
     return residuals
+
+
+def look(network: CalibrationNetwork, frame: Frame, delta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The correction (4x4) of one frame, already at input size, under ``delta @ camera_from_lidar``."""
+    inputs, _ = collate([make_sample(frame, delta, network.config.volume_scales)])
+    device = next(network.parameters()).device
+    with torch.inference_mode(), autocast(device):
+        correction: NDArray[np.float64] = network(inputs.to(device)).pose.correction[0].double().cpu().numpy()
+    return correction
 
 
 def within(delta: NDArray[np.float64], bounds: MiscalibrationRange) -> bool:
