@@ -130,10 +130,14 @@ class GeometricHead(nn.Module):
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
         """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""
         with torch.autocast(cells.device.type, enabled=False):
-            points = cells.flatten(2).transpose(1, 2)
-            scale = field.log_scale.float().flatten(2).transpose(1, 2).exp()
-            target = project_points(points, intrinsics) + field.displacement.float().flatten(2).transpose(1, 2)
-            return self.solve(points, target, scale, intrinsics)
+            occupied = (cells[:, 2] > 0).any(0)  # in any frame of the batch; the others weigh nothing
+
+            def picked(grid: Tensor) -> Tensor:
+                return grid.float()[:, :, occupied].transpose(1, 2)
+
+            points = picked(cells)
+            target = project_points(points, intrinsics) + picked(field.displacement)
+            return self.solve(points, target, picked(field.log_scale).exp(), intrinsics)
 
     def solve(self, points: Tensor, target: Tensor, scale: Tensor, intrinsics: Tensor) -> Pose:
         """Move ``points [B, N, 3]`` so that they project to ``target [B, N, 2]``.

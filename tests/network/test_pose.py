@@ -158,6 +158,22 @@ def test_geometric_head_reads_the_field_in_pixels() -> None:
     assert centimetres < 3.0
 
 
+def test_a_batch_is_solved_frame_by_frame_wherever_its_cells_are() -> None:
+    generator = torch.Generator().manual_seed(2)
+    head, intrinsics = GeometricHead(TINY, RANGES[2]), INTRINSICS.expand(2, 3, 3)
+    cells = scene(40).transpose(1, 2).unflatten(2, (5, 8)).repeat(2, 1, 1, 1)
+    cells[0, :, :, :3], cells[1, :, 3:] = 0.0, 0.0
+    displacement, log_scale = torch.randn(2, 2, 2, 5, 8, generator=generator)
+    both = head(DisplacementField(3 * displacement, log_scale, displacement), cells, intrinsics)
+    for number in range(2):
+        one = slice(number, number + 1)
+        field = DisplacementField(3 * displacement[one], log_scale[one], displacement[one])
+        alone = head(field, cells[one], INTRINSICS)
+        torch.testing.assert_close(both.correction[one], alone.correction, atol=1e-5, rtol=1e-4)
+    nothing = head(DisplacementField(displacement, log_scale, displacement), torch.zeros_like(cells), intrinsics)
+    torch.testing.assert_close(nothing.correction, torch.eye(4).expand(2, 4, 4))
+
+
 def test_rotations() -> None:
     torch.manual_seed(0)
     vector = 0.3 * torch.randn(5, 3, dtype=torch.float64)
