@@ -29,8 +29,8 @@ from calibnet.weights import load_network, weights_path
 
 FRAMES_UNTIL_LAST_PASS = 24
 """Frames, spread over the drive, that all passes but the last look at."""
-REPROJECTIONS = 2
-"""Times that the last stage corrects a sequence again on scans projected anew."""
+PASSES = 2
+"""Times that each stage corrects a sequence, on scans projected anew; the last one does so once more in the end."""
 LONGEST_HISTORY = 200
 """Points of the curve that shows how an estimate converges over a drive."""
 MINIMUM_CELLS = 20
@@ -94,9 +94,11 @@ class Clock:
 class Cascade:
     """The stages that have weights, coarse to fine; a stage without them is skipped, never guessed."""
 
-    def __init__(self, stages: list[Stage], skipped: list[SkippedStage] | None = None) -> None:
-        """Use ``Cascade.load`` unless the networks are already there."""
-        self.stages, self.skipped = stages, skipped or []
+    def __init__(
+        self, stages: list[Stage], skipped: list[SkippedStage] | None = None, looks: int | None = None
+    ) -> None:
+        """Use ``Cascade.load`` unless the networks are already there; ``looks`` a stage are its preset's by default."""
+        self.stages, self.skipped, self.looks = stages, skipped or [], looks
         if not stages:
             reasons = " ".join(stage.reason for stage in self.skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
@@ -161,7 +163,7 @@ class Cascade:
                 camera = stage.network.input_camera(frame.camera)
                 view = views[branch, camera.width, camera.height]
                 look = trace = self._run(stage, frame, camera, view, extrinsic, detail)
-                for _ in range(stage.network.rounds - 1):
+                for _ in range((self.looks or stage.network.rounds) - 1):
                     if stage.network.is_settled(look.correction):
                         break
                     look = self._run(stage, frame, camera, view, look.after, False)
@@ -191,8 +193,8 @@ class Cascade:
     ) -> SequenceEstimate:
         """Correct the one extrinsic that all frames of a drive share.
 
-        Each stage corrects what all frames together make of it, and the last one does so again on the scans
-        projected anew. Until then some frames from all over the drive are enough; the last pass sees them all.
+        Each stage corrects what all frames together make of it, and again on the scans projected anew. Until the
+        end some frames from all over the drive are enough; the last pass sees them all.
         No more than one frame is in memory at a time.
 
         Args:
@@ -208,7 +210,7 @@ class Cascade:
             raise ValueError("There are no frames to calibrate.")
         some, everything = spread(len(frames), FRAMES_UNTIL_LAST_PASS), list(range(len(frames)))
         last = self.stages[-1]
-        rehearsals = [*self.stages, *[last] * (REPROJECTIONS - 1)]
+        rehearsals = [stage for stage in self.stages for _ in range(PASSES)]
         total = len(rehearsals) * len(some) + len(everything)
         number = itertools.count()
 
@@ -246,7 +248,7 @@ class Cascade:
         note: Callable[[Frame, Consensus, int], None] | None = None,
     ) -> Consensus:
         """What one stage makes of some frames of a drive; ``note`` is told after each that it could calibrate."""
-        single, failure = Cascade([stage]), None
+        single, failure = Cascade([stage], looks=1), None
         consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
         for count, position in enumerate(positions):
             frame = read(position)

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from calibnet.cascade import Cascade, SkippedStage, Stage, orthonormal
+from calibnet.cascade import PASSES, Cascade, SkippedStage, Stage, orthonormal
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, depth_image, invert, miscalibration, project
@@ -355,8 +355,9 @@ def test_a_drive_is_solved_by_all_its_frames(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("calibnet.cascade.FRAMES_UNTIL_LAST_PASS", 2)
     drive, told = Drive(4, blind=frozenset({1})), []
     estimate = cascade().calibrate_sequence(drive, INITIAL, lambda *numbers: told.append(numbers))
-    assert drive.read == [1, 5, 1, 5], "two frames in the passes of three stages and one more, all in the last"
-    assert told == [(number, 12) for number in range(12)]
+    often = 3 * PASSES + 1
+    assert drive.read == [1, often, 1, often], "two frames in all passes of the three stages, all in the last one"
+    assert told == [(number, 2 + 2 * often) for number in range(2 + 2 * often)]
     assert (estimate.frames, estimate.skipped) == (3, 1)
     assert [frame for frame, _ in estimate.history] == [10, 12, 13]
     np.testing.assert_array_equal(estimate.history[-1][1].covariance, estimate.covariance)
