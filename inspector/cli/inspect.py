@@ -50,7 +50,7 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option(
         "--detail",
         type=click.Choice(["overview", "full", "custom"]),
-        help="full: some 5 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
+        help="full: some 6 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
         "custom: what --log names.  [default: full]",
     ),
     click.option(
