@@ -67,9 +67,8 @@ def band_index(width: int, radius: int) -> Tensor:
 def concatenate(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
     """Concatenation volume ``[B, D, h, w, 2C]`` of features ``[B, C, h, w]``."""
     window = 2 * radius + 1
-    moved = (
-        surroundings(image, lidar.shape[2], radius).unfold(2, window, 1).unfold(3, window, 1)
-    )  # [B, C, h, w, Dy, Dx]
+    rows = surroundings(image, lidar.shape[2], radius)
+    moved = rows.unfold(2, window, 1).unfold(3, window, 1)  # [B, C, h, w, Dy, Dx]
     moved = moved.permute(0, 4, 5, 2, 3, 1).flatten(1, 2)
     fixed = lidar.permute(0, 2, 3, 1)[:, None].expand_as(moved)
     return torch.cat([fixed, moved], dim=-1)

@@ -32,7 +32,7 @@ SCHEDULE = (
     # the middle range first: most of the truth lies within the finest window there, so every scale learns to match
     Step(MIDDLE, 0.55, None, 1.0),
     Step(WIDEST, 0.12, MIDDLE, 0.6),
-    Step(WIDE, 0.08, WIDEST, 0.6),
+    Step(WIDE, 0.08, MIDDLE, 0.6),
     # and again, now that there are stages before it whose errors it can be shown
     Step(MIDDLE, 0.06, MIDDLE, 0.5),
     Step(NARROW, 0.11, MIDDLE, 0.6),
