@@ -7,6 +7,7 @@ from calibnet.geometry.miscalibration import (
     bounds_of,
     miscalibration,
     sample_miscalibration,
+    scaled,
     stages_within,
 )
 from calibnet.geometry.projection import Projection, depth_image, project
@@ -41,6 +42,7 @@ __all__ = [
     "rotation_from_vector",
     "rotation_vector",
     "sample_miscalibration",
+    "scaled",
     "stages_within",
     "transform",
     "transform_points",

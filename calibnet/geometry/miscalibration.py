@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calibnet.errors import ConfigError
-from calibnet.geometry.se3 import Matrix, euler_xyz, rotation_from_euler_xyz, transform
+from calibnet.geometry.se3 import (
+    Matrix,
+    euler_xyz,
+    rotation_from_euler_xyz,
+    rotation_from_vector,
+    rotation_vector,
+    transform,
+)
 
 
 @dataclass(frozen=True, order=True)
@@ -49,6 +56,11 @@ def sample_miscalibration(bounds: MiscalibrationRange, generator: np.random.Gene
     """Draw one ``delta`` uniformly within ``bounds``."""
     angles = generator.uniform(-bounds.rotation_deg, bounds.rotation_deg, 3)
     return miscalibration(angles, generator.uniform(-bounds.translation_m, bounds.translation_m, 3))
+
+
+def scaled(delta: Matrix, factor: float) -> Matrix:
+    """The ``delta`` that turns and moves ``factor`` times as far about the same axes."""
+    return transform(rotation_from_vector(factor * rotation_vector(delta[:3, :3])), factor * delta[:3, 3])
 
 
 def bounds_of(delta: Matrix) -> MiscalibrationRange:

@@ -46,10 +46,16 @@ class WindowConv(nn.Module):
         return y.reshape(batch, -1, height, width, channels).permute(0, 4, 1, 2, 3)
 
 
-def pointwise(conv: nn.Module, volume: Tensor) -> Tensor:
+def pointwise(conv: nn.Module, volume: Tensor, bias: bool = True) -> Tensor:
     """A 1x1x1 convolution as a product over the channels, which lie last in memory: ``[B, C, D, h, w]``."""
     assert isinstance(conv, nn.Conv3d)
-    return F.linear(volume.permute(0, 2, 3, 4, 1), conv.weight.flatten(1), conv.bias).permute(0, 4, 1, 2, 3)
+    rows, weight = volume.permute(0, 2, 3, 4, 1), conv.weight.flatten(1)
+    return F.linear(rows, weight, conv.bias if bias else None).permute(0, 4, 1, 2, 3)
+
+
+def read(heads: nn.ModuleList, volumes: list[Tensor]) -> list[Tensor]:
+    """One 1x1x1 convolution a scale."""
+    return [pointwise(head, volume) for head, volume in zip(heads, volumes, strict=True)]
 
 
 def spatial(conv: nn.Module, volume: Tensor) -> Tensor:
@@ -85,11 +91,17 @@ class VolumeBlock(nn.Module):
         return (volume + self.y(self.x(volume).relu())).relu()
 
 
-def coarsen_window(volume: Tensor, window: int) -> Tensor:
-    """Place a fine volume's displacements in the coarse window: ``[B, C, D, h, w] -> [B, C, D, h, w]``."""
+def every_second(volume: Tensor, window: int) -> Tensor:
+    """The displacements of a fine volume that the coarse window has too: ``[B, C, D, h, w] -> [B, C, D', h, w]``."""
     picked = volume.permute(0, 2, 3, 4, 1).unflatten(1, (window, window))[:, ::2, ::2]  # channels stay last in memory
-    margin = (window - picked.shape[1]) // 2
-    padded = F.pad(picked, (0, 0) * 3 + (margin, margin) * 2)
+    return picked.flatten(1, 2).permute(0, 4, 1, 2, 3)
+
+
+def centre_in_window(volume: Tensor, window: int) -> Tensor:
+    """Place them in the centre of the coarse window, zeros around: ``[B, C, D', h, w] -> [B, C, D, h, w]``."""
+    side = (window + 1) // 2
+    margin = (window - side) // 2
+    padded = F.pad(volume.permute(0, 2, 3, 4, 1).unflatten(1, (side, side)), (0, 0) * 3 + (margin, margin) * 2)
     return padded.flatten(1, 2).permute(0, 4, 1, 2, 3)
 
 
@@ -117,6 +129,7 @@ class Hourglass(nn.Module):
         super().__init__()
         channels, window = config.channels_at_scales, config.window
         self.window, self.fuse = window, config.hierarchical_fusion
+        self.convolve_finest = config.convolve_finest
 
         def stacks(counts: list[int]) -> nn.ModuleList:
             return nn.ModuleList(
@@ -138,17 +151,37 @@ class Hourglass(nn.Module):
 
     def forward(self, volumes: list[Tensor]) -> list[Tensor]:
         """Volumes ``[B, C_s, D, h_s, w_s]``, fine to coarse, to the same shapes."""
+        return self._up(self._down(volumes))
+
+    def read(self, volumes: list[Tensor], heads: nn.ModuleList) -> list[Tensor]:
+        """What one 1x1x1 convolution a scale makes of the volumes that `forward` gives.
+
+        The finest volume, by far the largest, is the sum of two others where it is not convolved itself: each is
+        read by itself, before it is interpolated to all cells and displacements.
+        """
+        entered = self._down(volumes)
+        if not self.fuse or len(entered) == 1 or self.convolve_finest:
+            return read(heads, self._up(entered))
+        left = self._up(entered, finest=1)
+        risen = pointwise(heads[0], pointwise(self.up[0], left[0]), bias=False)
+        finest = pointwise(heads[0], entered[0]) + double(refine_window(risen, self.window))
+        return [finest, *read(heads[1:], left)]
+
+    def _down(self, volumes: list[Tensor]) -> list[Tensor]:
         entered: list[Tensor] = []
         for scale, volume in enumerate(volumes):
             if scale and self.fuse:
-                volume = volume + coarsen_window(spatial(self.down[scale - 1], entered[-1]), self.window)
+                shared = spatial(self.down[scale - 1], every_second(entered[-1], self.window))
+                volume = volume + centre_in_window(shared, self.window)
             entered.append(self.down_blocks[scale](volume))
+        return entered
+
+    def _up(self, entered: list[Tensor], finest: int = 0) -> list[Tensor]:
         left: list[Tensor] = []
-        for scale in reversed(range(len(volumes))):
+        for scale in reversed(range(finest, len(entered))):
             volume = entered[scale]
             if left and self.fuse:
-                finer = refine_window(pointwise(self.up[scale], left[0]), self.window)
-                volume = volume + double(finer)
+                volume = volume + double(refine_window(pointwise(self.up[scale], left[0]), self.window))
             left.insert(0, self.up_blocks[scale](volume))
         return left
 
@@ -166,23 +199,28 @@ class Aggregation(nn.Module):
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for channels in config.channels_at_scales)
 
-    def forward(self, volumes: list[Tensor], scores: list[Tensor]) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
+    def forward(
+        self, volumes: list[Tensor], scores: list[Tensor], keep_activations: bool = False
+    ) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
         """Aggregate volumes ``[B, G + 2Cc, D, h_s, w_s]`` and raw scores ``[B, D, h_s, w_s]``, fine to coarse.
 
         Returns:
-            Activations before and after the hourglasses, ``[B, C_s, D, h_s, w_s]``, and logits
-            ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by itself, and
-            what the hourglass adds to it.
+            Activations before and after the hourglasses, ``[B, C_s, D, h_s, w_s]``, those after only if they are to
+            be kept, and logits ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by
+            itself, and what the hourglasses add to it.
         """
         before = [
             pointwise(enter.get_submodule("0"), volume).relu()
             for enter, volume in zip(self.enter, volumes, strict=True)
         ]
         after = before
-        for hourglass in self.hourglasses:
+        for hourglass in self.hourglasses[:-1]:
             after = hourglass(after)
-        logits = [
-            TEMPERATURE * raw + pointwise(score, volume).squeeze(1)
-            for raw, score, volume in zip(scores, self.score, after, strict=True)
-        ]
+        last = self.hourglasses[-1] if len(self.hourglasses) else None
+        if isinstance(last, Hourglass) and not keep_activations:
+            added, after = last.read(after, self.score), []
+        else:
+            after = last(after) if last else after
+            added = read(self.score, after)
+        logits = [TEMPERATURE * raw + more.squeeze(1) for raw, more in zip(scores, added, strict=True)]
         return before, after, logits

@@ -132,7 +132,7 @@ class CalibrationNetwork(nn.Module):
         pairs = zip(self.cost_volumes, lidar_features, image_features, strict=True)
         volumes, scores = map(list, zip(*(build(lidar, image) for build, lidar, image in pairs), strict=True))
         clock("cost_volumes")
-        before, after, logits = self.aggregation(volumes, scores)
+        before, after, logits = self.aggregation(volumes, scores, keep_activations)
         clock("hourglass")
         field = self.displacement(logits, lidar_features[0], inputs.cells[0])
         clock("displacement")

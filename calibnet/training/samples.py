@@ -18,6 +18,7 @@ from calibnet.geometry import (
     invert,
     project,
     sample_miscalibration,
+    scaled,
     transform_points,
 )
 from calibnet.geometry.projection import nearest_per_cell
@@ -140,6 +141,7 @@ class TrainingSamples(Dataset[Sample]):
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
     RESIDUAL_SHARE = 0.7  # of the miscalibrations, when the errors of the stages before are known
+    RESIDUAL_STRETCH = (0.7, 1.8)  # times as large as measured: frames never trained on leave more behind
     LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
     def __init__(
@@ -219,12 +221,13 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
-        """A miscalibration: one that the stages before leave behind or anywhere in the range, seven of ten the former.
+        """A miscalibration anywhere in the range, or, seven of ten, as the stages before leave behind.
 
         Sometimes a small one, as a stage must also know when to stop.
         """
         if self.residuals and generator.random() < self.RESIDUAL_SHARE:
-            return self.residuals[generator.integers(len(self.residuals))]
+            residual = self.residuals[generator.integers(len(self.residuals))]
+            return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
         share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
         bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
         return sample_miscalibration(bounds, generator)

@@ -7,7 +7,15 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from calibnet.network.aggregation import Aggregation, Hourglass, WindowConv, coarsen_window, refine_window
+from calibnet.network.aggregation import (
+    Aggregation,
+    Hourglass,
+    WindowConv,
+    centre_in_window,
+    every_second,
+    read,
+    refine_window,
+)
 from calibnet.network.cost_volume import TEMPERATURE
 from tests.network.tiny import TINY
 
@@ -21,7 +29,8 @@ def linear_window(radius: int, slope_y: float, slope_x: float) -> Tensor:
 @pytest.mark.parametrize("radius", [2, 4, 6])
 def test_coarsening_keeps_displacements_in_pixels(radius: int) -> None:
     window = 2 * radius + 1
-    coarse = coarsen_window(linear_window(radius, 3.0, -5.0), window).reshape(window, window)
+    picked = every_second(linear_window(radius, 3.0, -5.0), window)
+    coarse = centre_in_window(picked, window).reshape(window, window)
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):
             covered = 2 * abs(dy) <= radius and 2 * abs(dx) <= radius
@@ -38,7 +47,7 @@ def test_refining_keeps_displacements_in_pixels(radius: int) -> None:
 def test_windows_change_neither_cells_nor_channels() -> None:
     volume = torch.zeros(2, 3, 25, 4, 5)
     volume[1, 2, 12, 3, 1] = 1.0  # no displacement, one cell
-    for moved in (coarsen_window(volume, 5), refine_window(volume, 5)):
+    for moved in (centre_in_window(every_second(volume, 5), 5), refine_window(volume, 5)):
         assert moved[1, 2, 12, 3, 1] == 1.0
         assert moved.amax(2).sum() == 1.0
 
@@ -78,17 +87,34 @@ def test_hourglass_fuses_scales_only_when_asked(scales: tuple[int, ...], fuse: b
         assert reached == [fuse or scale == other for other in range(len(scales))]
 
 
+@pytest.mark.parametrize("scales", [(8,), (8, 16), (8, 16, 32)])
+@pytest.mark.parametrize("fuse", [True, False])
+@pytest.mark.parametrize("convolve_finest", [True, False])
+def test_volumes_are_read_as_if_they_were_made(scales: tuple[int, ...], fuse: bool, convolve_finest: bool) -> None:
+    channels = (4, 6, 8)[: len(scales)]
+    config = replace(
+        TINY, scales=scales, volume_channels=channels, hierarchical_fusion=fuse, convolve_finest=convolve_finest
+    )
+    hourglass, volumes = Hourglass(config, blocks=1), volumes_of(channels, config.window)
+    heads = torch.nn.ModuleList(torch.nn.Conv3d(width, 2, 1) for width in channels)
+    for found, expected in zip(hourglass.read(volumes, heads), read(heads, hourglass(volumes)), strict=True):
+        torch.testing.assert_close(found, expected)
+
+
 def test_aggregation_scores_every_displacement_of_every_scale() -> None:
     inputs = TINY.groups + 2 * TINY.concat_channels
     raw = [torch.randn(1, 25, 8 >> scale, 12 >> scale) for scale in range(3)]
     aggregation = Aggregation(TINY)
-    before, after, logits = aggregation(volumes_of((inputs,) * 3, TINY.window), raw)
+    before, after, logits = aggregation(volumes_of((inputs,) * 3, TINY.window), raw, keep_activations=True)
     assert [tuple(volume.shape[:3]) for volume in before] == [(1, 4, 25), (1, 6, 25), (1, 8, 25)]
     assert [volume.shape for volume in after] == [volume.shape for volume in before]
     assert [tuple(scores.shape) for scores in logits] == [(1, 25, 8, 12), (1, 25, 4, 6), (1, 25, 2, 3)]
     for scale, (scores, scale_logits) in enumerate(zip(raw, logits, strict=True)):
         added = aggregation.score[scale](after[scale])[:, 0]
         torch.testing.assert_close(scale_logits, TEMPERATURE * scores + added)
+    nothing, same = aggregation(volumes_of((inputs,) * 3, TINY.window), raw)[1:]
+    assert nothing == []
+    torch.testing.assert_close(same, logits)
 
 
 def test_one_number_stands_for_all_scales_and_hourglasses() -> None:

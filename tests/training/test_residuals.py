@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
+from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration, rotation_vector
+from calibnet.geometry.se3 import Matrix
 from calibnet.network.network import NetworkInputs, NetworkOutput
 from calibnet.training.residuals import residual_errors, stages_before, within
 from calibnet.training.samples import Source, TrainingSamples
@@ -28,8 +29,21 @@ def test_residuals_are_what_the_stages_leave_and_most_of_what_is_drawn(data: Tra
         np.testing.assert_array_equal(one, again)
     generator = np.random.default_rng(0)
     drawn = [data.draw(generator) for _ in range(400)]
-    repeated = np.mean([any(delta is residual for residual in data.residuals) for delta in drawn])
-    assert 0.6 < repeated < 0.8
+    stretches = [stretch for delta in drawn for residual in data.residuals if (stretch := stretched(delta, residual))]
+    assert 0.6 < len(stretches) / len(drawn) < 0.8
+    assert 0.7 <= min(stretches) < 0.8, "frames never trained on leave more behind than those measured"
+    assert 1.7 < max(stretches) <= 1.8
+
+
+def stretched(delta: Matrix, residual: Matrix) -> float | None:
+    """How many times as far ``delta`` turns and moves as ``residual``, None if not about the same axes."""
+    factors = np.concatenate(
+        [
+            rotation_vector(delta[:3, :3]) / rotation_vector(residual[:3, :3]),
+            delta[:3, 3] / residual[:3, 3],
+        ]
+    )
+    return float(factors[0]) if np.ptp(factors) < 1e-6 else None
 
 
 def test_lost_frames_are_left_out() -> None:
