@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.network.config import load_preset
+from calibnet.network.displacement import expected_error
 from calibnet.network.inputs import LidarInput, lidar_input, resize_image
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
 from calibnet.network.pose import prior_information
@@ -170,7 +172,7 @@ class Cascade:
                     trace = trace.followed_by(look)
                 extrinsic = trace.after
                 traces.append(trace)
-        return CascadeTrace(initial, tuple(traces), clock.parts)
+        return CascadeTrace(initial, tuple(traces), clock.parts, match_error_limit(self.stages[-1]))
 
     def _views(self, frame: Frame, clock: Clock) -> dict[tuple[int, int, int], View]:
         """The image at every size that a stage wants, and its features: once for all stages that share them.
@@ -253,7 +255,7 @@ class Cascade:
         for count, position in enumerate(positions):
             frame = read(position)
             try:
-                trace = single.calibrate(frame, extrinsic).stages[0]
+                trace = confirmed(single.calibrate(frame, extrinsic), frame).stages[0]
             except CalibrationError as error:
                 failure = error
                 continue
@@ -302,6 +304,7 @@ class Cascade:
             clock.parts,
             None if output.pose.information is None else output.pose.information[0].double().cpu().numpy(),
             stage_detail(stage.network.config, lidar, output) if detail else None,
+            float(expected_error(output.field, inputs.cells[0])[0]),
         )
 
     def _inputs(self, image: Tensor, lidar: LidarInput, camera: PinholeCamera) -> NetworkInputs:
@@ -310,6 +313,30 @@ class Cascade:
 
         intrinsics = camera.matrix.astype(np.float32)
         return NetworkInputs(image, batch(lidar.image), batch(intrinsics), [batch(cells) for cells in lidar.cells])
+
+
+def confirmed(trace: CascadeTrace, frame: Frame) -> CascadeTrace:
+    """The trace, if picture and scan fit together.
+
+    Raises:
+        CalibrationError: they do not.
+    """
+    if not trace.confirmed:
+        last, limit = trace.stages[-1], trace.match_error_limit_px
+        raise CalibrationError(
+            f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {last.number}, "
+            f"which expects its matches to be {last.match_error_px:.1f} px off (at most {limit:g}): "
+            "check that they belong together and that the start is within the range of the first stage."
+        )
+    return trace
+
+
+def match_error_limit(stage: Stage) -> float:
+    """Expected error of matches, in pixels, beyond which a stage's answer is not believed.
+
+    Only the finest stage judges: the others' matches are coarse anyway, and the next stage looks again.
+    """
+    return stage.network.config.largest_match_error if stage.range == RANGES[-1] else math.inf
 
 
 def spread(count: int, most: int) -> list[int]:

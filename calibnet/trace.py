@@ -6,6 +6,7 @@ Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -71,6 +72,7 @@ class StageTrace:
         information: ``[6, 6]`` inverse covariance of the correction's ``(translation m, rotation rad)`` as the
             network states it, or None from a head that does not.
         detail: intermediate results of its first round, or None when they were not asked for.
+        match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
     """
 
     number: int
@@ -82,6 +84,7 @@ class StageTrace:
     milliseconds: dict[str, float] = field(default_factory=dict)
     information: NDArray[np.float64] | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
+    match_error_px: float = math.nan
 
     def followed_by(self, again: StageTrace) -> StageTrace:
         """This and a second round of the same stage as one; the detail stays that of the first look."""
@@ -92,6 +95,7 @@ class StageTrace:
             correction=again.correction @ self.correction,
             milliseconds={part: self.milliseconds.get(part, 0.0) + again.milliseconds.get(part, 0.0) for part in parts},
             information=again.information,
+            match_error_px=again.match_error_px,
         )
 
 
@@ -103,13 +107,20 @@ class CascadeTrace:
         initial: ``camera_from_lidar`` the run started from, 4x4.
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (resizing, image features).
+        match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
     """
 
     initial: NDArray[np.float64] = field(repr=False)
     stages: tuple[StageTrace, ...]
     milliseconds: dict[str, float] = field(default_factory=dict)
+    match_error_limit_px: float = math.inf
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether picture and scan fit together under what the stages found; true where the last one cannot tell."""
+        return not self.stages or not self.stages[-1].match_error_px > self.match_error_limit_px
 
     @property
     def corrected(self) -> NDArray[np.float64]:
-        """``camera_from_lidar`` after the last stage."""
-        return self.stages[-1].after if self.stages else self.initial
+        """``camera_from_lidar`` after the last stage; the initial one where the picture does not confirm that."""
+        return self.stages[-1].after if self.stages and self.confirmed else self.initial

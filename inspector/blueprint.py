@@ -19,6 +19,7 @@ from inspector.views import (
     TITLE_HEIGHT,
     View,
     curve_view,
+    fit_view,
     frustum_legend,
     image_view,
     names_legend,
@@ -70,8 +71,9 @@ def overview_tab(layout: Layout) -> View:
     if layout.has_reference:
         overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE, layout.image))
     below: View = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
-    if layout.has_reference and Part.CURVES in layout.contents.parts:
-        curves = [curve_view(kind, unit) for kind, unit in entities.ERROR_KINDS.items()]
+    if layout.stages and Part.CURVES in layout.contents.parts:
+        kinds = entities.ERROR_KINDS.items() if layout.has_reference else ()
+        curves = [*(curve_view(kind, unit) for kind, unit in kinds), fit_view()]
         below = rrb.Horizontal(rrb.Vertical(*curves), below, column_shares=[1.0, 1.0])
     width, height = layout.image
     overlay = min(SCREEN_WIDTH / len(overlays) * height / width + TITLE_HEIGHT, LARGEST_OVERLAY)

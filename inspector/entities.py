@@ -40,6 +40,7 @@ CAMERA_INITIAL = "world/camera/initial"
 CAMERA_REFERENCE = "world/camera/reference"
 
 EXTRINSIC_INITIAL = "extrinsic/initial"
+EXTRINSIC_CORRECTED = "extrinsic/corrected"
 EXTRINSIC_REFERENCE = "extrinsic/reference"
 EXTRINSIC_DRIVE = "extrinsic/drive"
 CAMERA = "extrinsic/camera"
@@ -60,6 +61,11 @@ VALIDATION = "validation"
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 """The error curves and their units."""
+
+
+FIT = "fit"
+FIT_LIMIT = "fit/limit"
+"""Up to which the last stage's answer is believed."""
 
 
 def overlay_stage(number: int) -> str:
@@ -110,6 +116,11 @@ def error_corrected(kind: str) -> str:
 def error_limit(kind: str) -> str:
     """The bound of the success rate, as a curve to hold the others against."""
     return f"error/{kind}/success_limit"
+
+
+def fit_stage(number: int) -> str:
+    """Curve of the error that a stage expects of its matches, in pixels of the frame's image."""
+    return f"{FIT}/stage_{number}"
 
 
 def displacement(stage: int) -> str:

@@ -43,6 +43,11 @@ def exported_frame(run: RecordedRun, index: int) -> Exported:
     """
     for frame in run.frames:
         if frame.index == index:
+            if not frame.confirmed:
+                raise RecordingError(
+                    f"Picture and scan of frame {index} of {run.path} do not fit together, so it has no result; "
+                    "choose another frame."
+                )
             return Exported(frame.corrected, frame.camera, np.zeros(5), f"{run.title}, frame {index}")
     first, last = run.frames[0].index, run.frames[-1].index
     raise RecordingError(f"{run.path} has no complete frame {index}, only frames from {first} to {last}; choose one.")
@@ -57,9 +62,14 @@ def exported_median(run: RecordedRun) -> Exported:
     first = run.frames[0]
     if not all(_same_mount(first, frame) for frame in run.frames[1:]):
         raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
-    count = len(run.frames)
+    count = sum(frame.confirmed for frame in run.frames)
+    if not count:
+        raise RecordingError(
+            f"In no frame of {run.path} do picture and scan fit together, so there is no result to export; check that "
+            "they belong together, and record again from a wider --range."
+        )
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
-    return Exported(median_pose([frame.corrected for frame in run.frames]), first.camera, np.zeros(5), origin)
+    return Exported(median_pose(run.results), first.camera, np.zeros(5), origin)
 
 
 def exported_drive(run: RecordedRun) -> Exported:

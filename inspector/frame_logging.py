@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ def log_frame(rec: rr.RecordingStream, observation: Observation, contents: Conte
     rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
     if Part.CURVES in contents.parts:
         _log_errors(rec, observation)
+        _log_fit(rec, observation)
     _log_extrinsics(rec, observation)
     _log_overlays(rec, observation, contents)
 
@@ -52,12 +54,13 @@ def _log_overlays(rec: rr.RecordingStream, observation: Observation, contents: C
         _log_caption(rec, observation, path, name, camera_from_lidar)
 
     start = "as given" if observation.reference is None else "miscalibrated"
+    result = "corrected" if trace.confirmed else "left as it was: picture and scan do not fit"
     initial = overlay(trace.initial)
     log(entities.OVERLAY_MISCALIBRATED, initial, start, trace.initial)
     if observation.reference is not None:
         log(entities.OVERLAY_REFERENCE, overlay(observation.reference), "reference", observation.reference)
     if Part.OVERLAYS not in contents.parts:
-        log(entities.OVERLAY_CORRECTED, overlay(trace.corrected), "corrected", trace.corrected)
+        log(entities.OVERLAY_CORRECTED, overlay(trace.corrected), result, trace.corrected)
         return
     log(entities.OVERLAY_CURRENT, initial, start, trace.initial)
     points, first_step = initial, frame.index * entities.STEPS_PER_FRAME
@@ -67,7 +70,7 @@ def _log_overlays(rec: rr.RecordingStream, observation: Observation, contents: C
         rec.set_time(entities.STEP, sequence=first_step + stage.number)
         log(entities.OVERLAY_CURRENT, points, name, stage.after)
         rec.set_time(entities.STEP, sequence=first_step)
-    log(entities.OVERLAY_CORRECTED, points, "corrected", trace.corrected)
+    log(entities.OVERLAY_CORRECTED, points if trace.confirmed else initial, result, trace.corrected)
 
 
 def _log_caption(
@@ -101,10 +104,21 @@ def _log_errors(rec: rr.RecordingStream, observation: Observation) -> None:
                 rec.log(path, rr.Scalars(error.rotation_deg if kind == "rotation" else error.translation_cm))
 
 
+def _log_fit(rec: rr.RecordingStream, observation: Observation) -> None:
+    """How far off every stage expects its matches to be, which needs no reference."""
+    trace = observation.trace
+    for stage in trace.stages:
+        error = observation.image_px(stage, stage.match_error_px)
+        rec.log(entities.fit_stage(stage.number), rr.Scalars(error))
+    if trace.stages and math.isfinite(trace.match_error_limit_px):
+        limit = observation.image_px(trace.stages[-1], trace.match_error_limit_px)
+        rec.log(entities.FIT_LIMIT, rr.Scalars(limit))
+
+
 def _log_extrinsics(rec: rr.RecordingStream, observation: Observation) -> None:
     """Every extrinsic as numbers in full precision, and the camera: what a report or an export needs."""
     frame, trace = observation.frame, observation.trace
-    extrinsics = {entities.EXTRINSIC_INITIAL: trace.initial}
+    extrinsics = {entities.EXTRINSIC_INITIAL: trace.initial, entities.EXTRINSIC_CORRECTED: trace.corrected}
     extrinsics |= {entities.extrinsic_stage(stage.number): stage.after for stage in trace.stages}
     if observation.reference is not None:
         extrinsics[entities.EXTRINSIC_REFERENCE] = observation.reference
@@ -121,18 +135,21 @@ def _log_extrinsics(rec: rr.RecordingStream, observation: Observation) -> None:
 
 def log_curve_styles(rec: rr.RecordingStream, layout: Layout) -> None:
     """Name and colour the error curves, once for the recording."""
-    if not layout.has_reference or Part.CURVES not in layout.contents.parts:
+    if Part.CURVES not in layout.contents.parts:
         return
-    for kind, unit in entities.ERROR_KINDS.items():
-        curves = {entities.error_initial(kind): ("miscalibrated", colors.INITIAL)}
-        for stage in layout.stages:
-            curves[entities.error_stage(kind, stage.number)] = (stage.short.lower(), colors.STAGES[stage.number])
-        limit = f"success: below {SUCCESS[kind]:g} {unit}"
-        rec.log(entities.error_limit(kind), rr.SeriesLines(names=limit, colors=colors.LIMIT, widths=1.5), static=True)
-        for path, (name, color) in curves.items():
-            rec.log(
-                path,
-                rr.SeriesLines(names=name, colors=color, widths=2.0),
-                rr.SeriesPoints(names=name, colors=color, marker_sizes=3.0),
-                static=True,
-            )
+    looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
+    curves = {entities.fit_stage(number): look for number, look in looks.items()}
+    limits = {entities.FIT_LIMIT: "believed: below"}
+    for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():
+        curves[entities.error_initial(kind)] = ("miscalibrated", colors.INITIAL)
+        curves |= {entities.error_stage(kind, number): look for number, look in looks.items()}
+        limits[entities.error_limit(kind)] = f"success: below {SUCCESS[kind]:g} {unit}"
+    for path, name in limits.items():
+        rec.log(path, rr.SeriesLines(names=name, colors=colors.LIMIT, widths=1.5), static=True)
+    for path, (name, color) in curves.items():
+        rec.log(
+            path,
+            rr.SeriesLines(names=name, colors=color, widths=2.0),
+            rr.SeriesPoints(names=name, colors=color, marker_sizes=3.0),
+            static=True,
+        )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import PoseError, invert, pose_error, project
 from calibnet.geometry.projection import Projection
-from calibnet.trace import CascadeTrace
+from calibnet.trace import CascadeTrace, StageTrace
 from inspector.contents import Contents
 
 Vector = tuple[float, float, float]
@@ -71,6 +71,10 @@ class Observation:
         ahead = np.stack([extrinsic[2] for extrinsic in extrinsics]).astype(np.float32)
         depths = ahead[:, :3] @ self.frame.points[:, :3].T + ahead[:, 3:]
         return np.flatnonzero(depths.max(axis=0) > 0.0)
+
+    def image_px(self, stage: StageTrace, pixels: float) -> float:
+        """A length in a stage's input image as one in the frame's own."""
+        return pixels * self.frame.camera.width / stage.camera.width
 
     def error(self, camera_from_lidar: NDArray[np.float64]) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""

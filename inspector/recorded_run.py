@@ -47,6 +47,8 @@ class RecordedFrame:
         source: name of its image file.
         camera: its own camera, at full size.
         initial: ``camera_from_lidar`` that the run started from, 4x4.
+        corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where the
+            picture did not confirm that.
         stages: ``camera_from_lidar`` after every stage by its number, coarse to fine.
         reference: the true one, or None where nobody knows it.
     """
@@ -56,13 +58,14 @@ class RecordedFrame:
     source: str
     camera: PinholeCamera
     initial: Extrinsic = field(repr=False)
+    corrected: Extrinsic = field(repr=False)
     stages: dict[int, Extrinsic] = field(repr=False)
     reference: Extrinsic | None = field(repr=False)
 
     @property
-    def corrected(self) -> Extrinsic:
-        """``camera_from_lidar`` after the last stage."""
-        return self.stages[max(self.stages)] if self.stages else self.initial
+    def confirmed(self) -> bool:
+        """Whether the picture confirmed what the last stage found, so that it is the result."""
+        return not self.stages or np.array_equal(self.corrected, self.stages[max(self.stages)])
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""
@@ -104,6 +107,11 @@ class RecordedRun:
     drive: Extrinsic | None = field(repr=False)
     warning: str
     _file: RecordingFile = field(repr=False)
+
+    @property
+    def results(self) -> list[Extrinsic]:
+        """The extrinsics that the picture confirmed; of all frames, if it confirmed none."""
+        return [frame.corrected for frame in self.frames if frame.confirmed] or [one.corrected for one in self.frames]
 
     def image(self, index: int) -> bytes:
         """The frame's image as JPEG."""
@@ -200,6 +208,8 @@ def _frames(
     """The frames of which everything is there."""
     initial = _matrices(tables[entities.EXTRINSIC_INITIAL])
     after = {number: _matrices(tables[entities.extrinsic_stage(number)]) for number in stages}
+    # earlier recordings have the stages only: what the last one found was the result
+    corrected = after[max(stages)] | _matrices(tables[entities.EXTRINSIC_CORRECTED])
     reference = _matrices(tables[entities.EXTRINSIC_REFERENCE])
     pictures = [{row[entities.FRAME] for row in _rows(tables[entity])} for entity in PICTURES] if cut else []
     cameras = {row[entities.FRAME]: row for row in _rows(tables[entities.CAMERA])}
@@ -211,6 +221,7 @@ def _frames(
             source=row["source"][0],
             camera=PinholeCamera(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3))),
             initial=initial[index],
+            corrected=corrected[index],
             stages={number: matrices[index] for number, matrices in after.items()},
             reference=reference.get(index),
         )

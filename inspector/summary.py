@@ -16,6 +16,7 @@ class Summary:
     """Collects a few numbers a frame; constant memory is not needed for these."""
 
     frames: int = 0
+    unconfirmed: int = 0
     interrupted: bool = False
     drive: str = ""
     started: float = field(default_factory=time.monotonic)
@@ -28,6 +29,7 @@ class Summary:
         """Take in one frame."""
         trace = observation.trace
         self.frames += 1
+        self.unconfirmed += not trace.confirmed
         self._change.append(pose_error(trace.corrected, trace.initial))
         for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
             error = observation.error(extrinsic)
@@ -49,6 +51,10 @@ class Summary:
             )
         else:
             lines.append(f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with.")
+        if self.unconfirmed:
+            lines.append(
+                f"{_frames(self.unconfirmed)} left as given: picture and scan do not fit together after the last stage."
+            )
         if self.drive:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())

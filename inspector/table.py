@@ -6,6 +6,8 @@ equal. The command line prints them.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +29,15 @@ def stage_table(observation: Observation, linked: bool = True) -> str:
         observation: the frame and what was done to it.
         linked: whether the overlays are there that the stages' names link to.
     """
-    lines = [f"### {_headline(observation)}", "", *_stages(observation, linked), "", *_axes(observation), ""]
+    lines = [
+        f"### {_headline(observation)}",
+        "",
+        *_confirmation(observation),
+        *_stages(observation, linked),
+        "",
+        *_axes(observation),
+        "",
+    ]
     lines += [f"{stage.reason}\n" for stage in observation.skipped]
     if observation.reference is None:
         lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
@@ -37,6 +47,8 @@ def stage_table(observation: Observation, linked: bool = True) -> str:
 def _headline(observation: Observation) -> str:
     """The result in a line."""
     frame, trace = observation.frame, observation.trace
+    if not trace.confirmed:
+        return f"Frame {frame.index}: not corrected, picture and scan do not fit together"
     before, after = observation.error(trace.initial), observation.error(trace.corrected)
     if before is None or after is None:
         change = pose_error(trace.corrected, trace.initial)
@@ -45,6 +57,23 @@ def _headline(observation: Observation) -> str:
         f"Frame {frame.index}: {before.rotation_deg:.2f}° → {after.rotation_deg:.2f}°, "
         f"{before.translation_cm:.1f} → {after.translation_cm:.1f} cm"
     )
+
+
+def _confirmation(observation: Observation) -> list[str]:
+    """Whether the picture confirms the result: all that can be said where no reference is known."""
+    trace = observation.trace
+    if not trace.stages or math.isinf(trace.match_error_limit_px):
+        return []
+    last = trace.stages[-1]
+    found = f"its matches are expected to be {observation.image_px(last, last.match_error_px):.1f} px off"
+    limit = f"{observation.image_px(last, trace.match_error_limit_px):.1f} px"
+    if trace.confirmed:
+        return [f"The picture confirms it: after stage {last.number} {found} (of at most {limit}).", ""]
+    return [
+        f"**Left as it was**: after stage {last.number} {found}, more than {limit}. "
+        "Do picture and scan belong together, and is the start within the range of the first stage?",
+        "",
+    ]
 
 
 def _stages(observation: Observation, linked: bool) -> list[str]:

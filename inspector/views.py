@@ -81,6 +81,15 @@ def curve_view(kind: str, unit: str) -> rrb.TimeSeriesView:
     )
 
 
+def fit_view() -> rrb.TimeSeriesView:
+    """How far off every stage expects its matches to be, over the frames."""
+    return rrb.TimeSeriesView(
+        origin=entities.FIT,
+        name="Fit of picture and scan: matches expected to be off by [px]",
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+    )
+
+
 def tensor_view(name: str, path: str) -> rrb.TensorView:
     """A cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
     return rrb.TensorView(

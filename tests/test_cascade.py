@@ -58,6 +58,26 @@ def test_stages_follow_one_another(trace: CascadeTrace) -> None:
     assert np.array_equal(trace.corrected, trace.stages[-1].after)
 
 
+def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: CascadeTrace) -> None:
+    last = trace.stages[-1]
+    assert trace.confirmed and last.match_error_px > 0.5 and not np.array_equal(trace.corrected, INITIAL)
+    doubting = cascade(largest_match_error=last.match_error_px - 0.01).calibrate(frame, INITIAL)
+    assert not doubting.confirmed and np.array_equal(doubting.corrected, INITIAL)
+    assert np.array_equal(doubting.stages[-1].after, trace.stages[-1].after), "what the stages found can be seen"
+    believing = cascade(largest_match_error=last.match_error_px + 0.01).calibrate(frame, INITIAL)
+    assert believing.confirmed and np.array_equal(believing.corrected, trace.corrected)
+
+
+def test_only_the_finest_stage_judges(frame: Frame) -> None:
+    coarse = cascade((3, 4), largest_match_error=0.01).calibrate(frame, INITIAL)
+    assert coarse.confirmed and np.array_equal(coarse.corrected, coarse.stages[-1].after)
+
+
+def test_a_drive_of_pictures_that_fit_no_scan_has_no_estimate(frame: Frame) -> None:
+    with pytest.raises(CalibrationError, match=r"scan of frame 3 .* do not fit together after stage 5, .* px off"):
+        cascade(largest_match_error=0.01).calibrate_sequence([frame, frame], INITIAL)
+
+
 def test_detail_has_the_shapes_and_units_of_the_contract(trace: CascadeTrace, frame: Frame) -> None:
     camera = trace.stages[0].camera
     assert camera.width % 32 == camera.height % 32 == 0

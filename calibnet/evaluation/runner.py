@@ -36,6 +36,8 @@ class Run:
         initial: error before the first stage.
         stages: error after each stage that ran, by stage number; empty when the frame could not
             be calibrated.
+        unconfirmed: whether picture and scan did not fit after the last stage, so that the extrinsic was left as it
+            was: the last stage's error is the initial one then.
     """
 
     sequence: str
@@ -43,6 +45,7 @@ class Run:
     repeat: int
     initial: PoseError
     stages: dict[int, PoseError]
+    unconfirmed: bool = False
 
 
 Observer = Callable[[Run], None]
@@ -76,6 +79,7 @@ class Evaluation:
         sequence: errors of whole drives, each solved as one; None where that was not measured.
         references: errors without a network, by name: no correction, a classical refinement.
         audit: errors after the last stage with altered frames, by name, see `calibnet.evaluation.audit`.
+        audit_unconfirmed: how many of those runs the picture did not confirm, by the same names.
         audit_images: where the swapped images come from.
     """
 
@@ -92,7 +96,13 @@ class Evaluation:
     sequence: Metrics | None = None
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
+    audit_unconfirmed: dict[str, int] = field(default_factory=dict)
     audit_images: str = ""
+
+    @property
+    def unconfirmed(self) -> int:
+        """Runs that the picture did not confirm; they count with their initial error after the last stage."""
+        return sum(run.unconfirmed for run in self.runs)
 
     @property
     def final(self) -> Metrics:
@@ -109,6 +119,7 @@ class Evaluation:
             "seed": self.seed,
             "frames": self.frames,
             "failed": self.failed,
+            "unconfirmed": self.unconfirmed,
             "initial": self.initial.as_dict(),
             "stages": [
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
@@ -118,6 +129,7 @@ class Evaluation:
         }
         if self.audit:
             content["audit"] = {name: metrics.as_dict() for name, metrics in self.audit.items()}
+            content["audit_unconfirmed"] = self.audit_unconfirmed
             content["audit_images"] = self.audit_images
         return content
 
@@ -158,13 +170,19 @@ def evaluate(
             for repeat in range(repeats):
                 initial = draw_miscalibration(bounds, seed, frame.index, repeat) @ reference
                 errors: dict[int, PoseError] = {}
+                unconfirmed = False
                 try:
-                    for stage in cascade.calibrate(frame, initial).stages:
+                    trace = cascade.calibrate(frame, initial)
+                    for stage in trace.stages:
                         ranges[stage.number] = stage.range
                         errors[stage.number] = pose_error(stage.after, reference)
+                    errors[trace.stages[-1].number] = pose_error(trace.corrected, reference)
+                    unconfirmed = not trace.confirmed
                 except CalibrationError as error:
                     failure = error
-                runs.append(Run(sequence.name, frame.index, repeat, pose_error(initial, reference), errors))
+                runs.append(
+                    Run(sequence.name, frame.index, repeat, pose_error(initial, reference), errors, unconfirmed)
+                )
                 if observer is not None:
                     observer(runs[-1])
     if not runs:

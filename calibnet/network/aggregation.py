@@ -151,23 +151,23 @@ class Hourglass(nn.Module):
 
     def forward(self, volumes: list[Tensor]) -> list[Tensor]:
         """Volumes ``[B, C_s, D, h_s, w_s]``, fine to coarse, to the same shapes."""
-        return self._up(self._down(volumes))
+        return self.ascend(self.descend(volumes))
 
-    def read(self, volumes: list[Tensor], heads: nn.ModuleList) -> list[Tensor]:
-        """What one 1x1x1 convolution a scale makes of the volumes that `forward` gives.
+    def read(self, entered: list[Tensor], heads: nn.ModuleList) -> list[Tensor]:
+        """What one 1x1x1 convolution a scale makes of the volumes that `ascend` makes of those that `descend` gave.
 
         The finest volume, by far the largest, is the sum of two others where it is not convolved itself: each is
         read by itself, before it is interpolated to all cells and displacements.
         """
-        entered = self._down(volumes)
         if not self.fuse or len(entered) == 1 or self.convolve_finest:
-            return read(heads, self._up(entered))
-        left = self._up(entered, finest=1)
+            return read(heads, self.ascend(entered))
+        left = self.ascend(entered, finest=1)
         risen = pointwise(heads[0], pointwise(self.up[0], left[0]), bias=False)
         finest = pointwise(heads[0], entered[0]) + double(refine_window(risen, self.window))
         return [finest, *read(heads[1:], left)]
 
-    def _down(self, volumes: list[Tensor]) -> list[Tensor]:
+    def descend(self, volumes: list[Tensor]) -> list[Tensor]:
+        """The way down: each scale with what the finer ones say of the displacements that they share."""
         entered: list[Tensor] = []
         for scale, volume in enumerate(volumes):
             if scale and self.fuse:
@@ -176,7 +176,8 @@ class Hourglass(nn.Module):
             entered.append(self.down_blocks[scale](volume))
         return entered
 
-    def _up(self, entered: list[Tensor], finest: int = 0) -> list[Tensor]:
+    def ascend(self, entered: list[Tensor], finest: int = 0) -> list[Tensor]:
+        """The way up to the scale ``finest``, each with what the coarser ones say."""
         left: list[Tensor] = []
         for scale in reversed(range(finest, len(entered))):
             volume = entered[scale]
@@ -216,11 +217,11 @@ class Aggregation(nn.Module):
         after = before
         for hourglass in self.hourglasses[:-1]:
             after = hourglass(after)
-        last = self.hourglasses[-1] if len(self.hourglasses) else None
-        if isinstance(last, Hourglass) and not keep_activations:
-            added, after = last.read(after, self.score), []
+        if len(self.hourglasses):
+            last = self.hourglasses[-1]
+            entered = last.descend(after)
+            added, after = last.read(entered, self.score), last.ascend(entered) if keep_activations else []
         else:
-            after = last(after) if last else after
             added = read(self.score, after)
         logits = [TEMPERATURE * raw + more.squeeze(1) for raw, more in zip(scores, added, strict=True)]
         return before, after, logits

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import tomllib
 from dataclasses import dataclass, fields
 from importlib import resources
@@ -44,6 +45,7 @@ class NetworkConfig:
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
+    largest_match_error: float = math.inf  # pixels that the last stage may expect its matches to be off, to be believed
     rounds: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True

@@ -27,6 +27,23 @@ class DisplacementField(NamedTuple):
     features: Tensor
 
 
+def expected_error(field: DisplacementField, cells: Tensor) -> Tensor:
+    """What error, in input pixels, the network expects of a frame's matches: geometric mean over cells and axes.
+
+    It tells pictures that belong to the scan from others: nothing there is found with confidence.
+
+    Args:
+        field: of a batch.
+        cells: ``[B, 3, h, w]`` nearest LiDAR point of each cell, zeros where there is none.
+
+    Returns:
+        ``[B]``; not a number where no cell holds a point.
+    """
+    occupied = (cells[:, 2] > 0).float()
+    logarithms = field.log_scale.float().mean(1) * occupied
+    return (logarithms.sum((1, 2)) / occupied.sum((1, 2))).exp()
+
+
 def window_offsets(radius: int, stride: int) -> Tensor:
     """Displacements ``[D, 2]`` as ``(dx, dy)`` in pixels of the flattened window."""
     axis = torch.arange(-radius, radius + 1, dtype=torch.float32) * stride

@@ -95,9 +95,11 @@ def evaluate(
             evaluation = replace(evaluation, sequence=measurement.drives(cascade))
         if audit:
             donors = {id(one): find_donors(one, opened, dataset, root) for one in opened}
+            altered = measurement.audit(cascade, donors)
             evaluation = replace(
                 evaluation,
-                audit=measurement.audit(cascade, donors),
+                audit={name: row.final for name, row in altered.items()},
+                audit_unconfirmed={name: row.unconfirmed for name, row in altered.items()},
                 audit_images=", ".join(dict.fromkeys(donor.name for donor in donors.values())),
             )
     report(evaluation, console)
@@ -139,7 +141,7 @@ class Measurement:
             cascade, self.sequences, self.bounds, self.repeats, self.seed, lambda name, *_: show(name)
         )
 
-    def audit(self, cascade: Cascade, donors: dict[int, Sequence]) -> dict[str, Metrics]:
+    def audit(self, cascade: Cascade, donors: dict[int, Sequence]) -> dict[str, Evaluation]:
         """Every frame by itself, altered."""
         from calibnet.evaluation.audit import Altered, alterations
 
@@ -148,7 +150,7 @@ class Measurement:
             altered: list[Sequence] = [
                 Altered(sequence, alterations(donors[id(sequence)])[name]) for sequence in self.sequences
             ]
-            rows[name] = self.single_frames(cascade, f"audit, {name}", altered).final
+            rows[name] = self.single_frames(cascade, f"audit, {name}", altered)
         return rows
 
 
@@ -230,6 +232,8 @@ def report(evaluation: Evaluation, console: Console) -> None:
     console.print(success_table(rows))
     if evaluation.audit:
         console.print(audit_sentence(evaluation))
+    if evaluation.audit or evaluation.unconfirmed:
+        console.print(unconfirmed_sentence(evaluation))
     if evaluation.failed:
         console.print(
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
@@ -244,6 +248,15 @@ def audit_sentence(evaluation: Evaluation) -> str:
     left |= {"a grey image": evaluation.audit["grey"], "half the rings": evaluation.audit["thinned"]}
     shares = ", ".join(f"{metrics.rotation_deg.median / initial:.0%} with {name}" for name, metrics in left.items())
     return f"Of the initial rotation error (median) is left: {shares}."
+
+
+def unconfirmed_sentence(evaluation: Evaluation) -> str:
+    """In how many runs the picture did not confirm the result."""
+    with_audit = "".join(f", {count} with the audit's {name}" for name, count in evaluation.audit_unconfirmed.items())
+    return (
+        f"Picture and scan did not fit after the last stage, so the extrinsic was left as it was, in "
+        f"{evaluation.unconfirmed} of {len(evaluation.runs)} runs{with_audit}."
+    )
 
 
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:

@@ -65,7 +65,8 @@ class Figures:
 
     Attributes:
         run: the recording.
-        states: initial first, then every stage that ran; the last is the corrected one.
+        states: initial first, then every stage that ran; the last is the corrected one, which frames that the
+            picture did not confirm leave where they started.
         changes: from the initial to the corrected extrinsic, a frame each.
         median: extrinsic in the middle of all corrected ones; None where the frames are of several mounts.
         median_error: of that extrinsic; None without reference or median.
@@ -85,8 +86,7 @@ class Figures:
             run: with at least one frame.
         """
         frames = run.frames
-        corrected = [frame.corrected for frame in frames]
-        median = median_pose(corrected)
+        median = median_pose(run.results)
         yardsticks = [median if frame.reference is None else frame.reference for frame in frames]
         one_mount = float(np.ptp(yardsticks, axis=0).max()) < SAME_MOUNT
 
@@ -96,7 +96,8 @@ class Figures:
         start = "miscalibrated" if run.has_reference else "start"
         states = [State(start, None, None, errors([frame.initial for frame in frames]))]
         for number, bounds in run.stages:
-            after = errors([frame.stages[number] for frame in frames])
+            last = number == run.stages[-1].number
+            after = errors([frame.corrected if last else frame.stages[number] for frame in frames])
             states.append(State(f"stage {number}", number, bounds, after))
         return cls(
             run,
@@ -133,6 +134,11 @@ class Figures:
         """Statistics of how far the calibration was moved."""
         return Metrics.of(self.changes)
 
+    @property
+    def unconfirmed(self) -> int:
+        """Frames whose picture and scan did not fit together after the last stage."""
+        return sum(not frame.confirmed for frame in self.run.frames)
+
     def ranking(self) -> list[int]:
         """Positions of the frames, best corrected first."""
         return sorted(
@@ -154,6 +160,7 @@ class Figures:
             "versions": run.provenance,
             "weights": {str(number): record for number, record in run.weights.items()},
             "frames": len(run.frames),
+            "unconfirmed": self.unconfirmed,
             "measured_against": "reference" if self.has_reference else "median of the corrected extrinsics",
             "initial": self._summary(self.initial),
             "stages": [

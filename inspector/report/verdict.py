@@ -56,6 +56,7 @@ class Quantity:
 
 ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
 TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 2.5, 5.0, 1)
+NO_FIT = "Picture and scan do not fit together after the last stage"
 CLEAR_CHANGE = 2.0
 """A change that is not so many times larger than the frames' disagreement is no evidence of anything."""
 
@@ -79,10 +80,12 @@ def verdict(figures: Figures) -> list[Finding]:
     """What is good and what is not."""
     if not figures.run.stages:
         return [Finding("bad", "No stage ran, so nothing was corrected.")]
+    if figures.unconfirmed == len(figures.run.frames):
+        return [Finding("bad", f"{NO_FIT}: nothing was corrected.")]
     if figures.has_reference:
         findings = [_judge_error(quantity, figures) for quantity in (ROTATION, TRANSLATION)]
-        return findings + _together(figures)
-    return _judge_agreement(figures)
+        return _confirmation(figures) + findings + _together(figures)
+    return _confirmation(figures) + _judge_agreement(figures)
 
 
 def pair(metrics: Metrics) -> str:
@@ -134,6 +137,14 @@ def _worse(quantity: Quantity, figures: Figures) -> str:
     )
     worse, total = int(np.sum(after > before)), len(before)
     return f" In {worse} of {count(total)} it is worse than before." if worse and total > 1 else ""
+
+
+def _confirmation(figures: Figures) -> list[Finding]:
+    """How many frames were left as they were; nothing if none."""
+    if not figures.unconfirmed:
+        return []
+    share = f"{figures.unconfirmed} of {count(len(figures.run.frames))}"
+    return [Finding("bad", f"{NO_FIT} in {share}, which were left as they were.")]
 
 
 def _together(figures: Figures) -> list[Finding]:

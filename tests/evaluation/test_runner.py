@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -27,6 +27,7 @@ class ShrinkingCascade:
     """Stages 3 and 4 leave known errors; frames in ``blind`` cannot be calibrated."""
 
     blind: frozenset[int] = frozenset()
+    doubted: frozenset[int] = frozenset()
     initials: list[tuple[int, Matrix]] = field(default_factory=list)
 
     def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
@@ -39,9 +40,10 @@ class ShrinkingCascade:
         ]
         stages, before = [], initial
         for number, after in steps:
-            stages.append(StageTrace(number, RANGES[number - 1], CAMERA, before, after, after @ invert(before)))
+            stage = StageTrace(number, RANGES[number - 1], CAMERA, before, after, after @ invert(before))
+            stages.append(replace(stage, match_error_px=5.0 if frame.index in self.doubted else 3.0))
             before = after
-        return CascadeTrace(initial, tuple(stages))
+        return CascadeTrace(initial, tuple(stages), match_error_limit_px=4.0)
 
 
 def test_every_stage_is_measured_against_the_reference() -> None:
@@ -55,6 +57,15 @@ def test_every_stage_is_measured_against_the_reference() -> None:
     assert fourth.metrics.success_1deg_2_5cm == 1.0
     assert evaluation.frames == 3
     assert len(evaluation.runs) == 6
+
+
+def test_runs_that_the_picture_does_not_confirm_keep_their_initial_error_in_the_end() -> None:
+    evaluation = evaluate(ShrinkingCascade(doubted=frozenset({1})), [Drive([0, 1, 2])], BOUNDS, repeats=2, seed=7)
+    assert evaluation.unconfirmed == evaluation.as_dict()["unconfirmed"] == 2
+    for run in evaluation.runs:
+        assert run.unconfirmed == (run.frame == 1)
+        assert (run.stages[4] == run.initial) == run.unconfirmed
+        assert run.stages[3].pitch_deg == pytest.approx(1.5), "what the stages before found is measured as it is"
 
 
 def test_initial_errors_are_those_of_what_the_cascade_was_given() -> None:

@@ -28,6 +28,7 @@ from calibnet.geometry.projection import nearest_per_cell
 from calibnet.trace import CascadeTrace, ScaleTrace, StageDetail, StageTrace
 
 LEFTOVER = 0.3
+MATCH_ERROR_LIMIT = 4.0
 DELTA = miscalibration([2.0, -3.0, 4.0], [0.2, -0.3, 0.1])
 AXES_CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 REFERENCE = transform(AXES_CAMERA_FROM_LIDAR, [0.06, -0.08, -0.27])
@@ -89,7 +90,10 @@ class FakeCascade:
         strides: tuple[int, ...] = (8, 16, 32),
         radius: int = 4,
         size: tuple[int, int] = (512, 160),
+        doubted: tuple[int, ...] = (),
     ) -> None:
+        """Frames whose index is in ``doubted`` are not confirmed by their picture."""
+        self.doubted = doubted
         self.stages = [FakeStage(number) for number in stages]
         self.strides, self.radius, self.size = strides, radius, size
 
@@ -104,10 +108,9 @@ class FakeCascade:
             details = self._detail(frame, camera, before, number) if detail else None
             correction = current @ invert(before)
             timing = {"projection": float(np.random.default_rng().uniform(1, 3))}
-            stages.append(
-                StageTrace(number, RANGES[number - 1], camera, before, current, correction, timing, None, details)
-            )
-        return CascadeTrace(initial, tuple(stages), {"features": 3.0})
+            bounds, off = RANGES[number - 1], 6.0 if frame.index in self.doubted else 2.0
+            stages.append(StageTrace(number, bounds, camera, before, current, correction, timing, None, details, off))
+        return CascadeTrace(initial, tuple(stages), {"features": 3.0}, match_error_limit_px=MATCH_ERROR_LIMIT)
 
     def _detail(self, frame: Frame, camera: PinholeCamera, before: NDArray[np.float64], seed: int) -> StageDetail:
         projection = project(frame.points, before, camera)

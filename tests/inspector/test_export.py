@@ -134,6 +134,22 @@ def test_opencv_yaml_is_read_by_file_storage(
     assert "# camera_from_lidar maps LiDAR points" in file.read_text()
 
 
+def test_only_results_that_the_picture_confirmed_are_exported(
+    export: Callable[..., str], record: Callable[..., Any], tmp_path: Path
+) -> None:
+    some, none = tmp_path / "some.rrd", tmp_path / "none.rrd"
+    record(some, detail="overview", strides=(32,), doubted=(1,), per_frame=True)
+    record(none, detail="overview", strides=(32,), doubted=(0, 1, 2))
+    frames = read_run(some).frames
+    content = json.loads(export(some, "--format", "json"))
+    np.testing.assert_allclose(
+        content["camera_from_lidar"], median_pose([frames[0].corrected, frames[2].corrected]), atol=1e-12
+    )
+    assert "median of 2 frames" in json.dumps(content)
+    assert "frame 1" in export(some, "--format", "json", "--frame", 1, code=3)
+    assert "In no frame" in export(none, "--format", "json", code=3)
+
+
 def test_json_is_the_median_unless_a_frame_is_named(
     export: Callable[..., str], recording: Path, recorded: RecordedRun
 ) -> None:

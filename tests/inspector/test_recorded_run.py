@@ -55,6 +55,16 @@ def test_extrinsics_come_back_exactly(full_recording: Path, fakes: ModuleType) -
     assert error.translation_cm < 0.1 * recorded.error(recorded.initial).translation_cm
 
 
+def test_a_frame_without_confirmation_keeps_its_start(record: Callable[..., Any], tmp_path: Path) -> None:
+    record(tmp_path / "doubted.rrd", detail="overview", strides=(32,), doubted=(1,))
+    frames = read_run(tmp_path / "doubted.rrd").frames
+    assert [frame.confirmed for frame in frames] == [True, False, True]
+    for frame in frames:
+        result = frame.stages[5] if frame.confirmed else frame.initial
+        np.testing.assert_array_equal(frame.corrected, result)
+        assert not np.array_equal(frame.stages[5], frame.initial)
+
+
 def test_pictures_come_back(full_recording: Path, fakes: ModuleType) -> None:
     run = read_run(full_recording)
     image = cv2.imdecode(np.frombuffer(run.image(1), np.uint8), cv2.IMREAD_COLOR)

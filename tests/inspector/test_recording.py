@@ -163,6 +163,30 @@ def test_without_reference_nothing_claims_to_know_it(record: Callable[..., Any],
     assert "No reference" in row.as_py()[0]
 
 
+def test_a_frame_without_confirmation_is_shown_as_it_was(
+    record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
+) -> None:
+    file = tmp_path / "doubted.rrd"
+    summary = record(file, detail="overview", doubted=(1,))
+    captions = [row.as_py()[0] for _, row in read(file, "overlay/corrected/caption", "Points2D:labels")]
+    assert [caption.startswith("left as it was: picture and scan do not fit") for caption in captions] == [0, 1, 0]
+    shown, given = (
+        [row.as_py() for _, row in read(file, f"overlay/{name}", "Points2D:positions")]
+        for name in ("corrected", "miscalibrated")
+    )
+    assert [one == other for one, other in zip(shown, given, strict=True)] == [False, True, False]
+    fit = [row.as_py()[0] for _, row in read(file, "fit/stage_5", "Scalars:scalars")]
+    scale = fakes.make_frame().camera.width / 512
+    assert fit == pytest.approx([2.0 * scale, 6.0 * scale, 2.0 * scale])
+    assert read(file, "fit/limit", "Scalars:scalars")[0][1].as_py() == pytest.approx([4.0 * scale])
+    texts = [row.as_py()[0] for _, row in read(file, "table", "TextDocument:text")]
+    assert (
+        "The picture confirms it: after stage 5 its matches are expected to be 1.6 px off (of at most 3.1" in texts[0]
+    )
+    assert "Frame 1: not corrected, picture and scan do not fit together" in texts[1]
+    assert any(line.startswith("1 frame left as given") for line in summary.lines())
+
+
 def test_overview_keeps_every_view_but_the_raw_volumes_and_coarse_scales(
     record: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -97,8 +97,9 @@ def test_volumes_are_read_as_if_they_were_made(scales: tuple[int, ...], fuse: bo
     )
     hourglass, volumes = Hourglass(config, blocks=1), volumes_of(channels, config.window)
     heads = torch.nn.ModuleList(torch.nn.Conv3d(width, 2, 1) for width in channels)
-    for found, expected in zip(hourglass.read(volumes, heads), read(heads, hourglass(volumes)), strict=True):
-        torch.testing.assert_close(found, expected)
+    found, expected = hourglass.read(hourglass.descend(volumes), heads), read(heads, hourglass(volumes))
+    for volume, other in zip(found, expected, strict=True):
+        torch.testing.assert_close(volume, other)
 
 
 def test_aggregation_scores_every_displacement_of_every_scale() -> None:

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 import torch
 
-from calibnet.network.displacement import DisplacementDecoder, window_offsets
+from calibnet.network.displacement import DisplacementDecoder, DisplacementField, expected_error, window_offsets
 from tests.network.tiny import TINY
 
 CONFIG = replace(TINY, radius=4)  # 32 px are a displacement of the window at 1/8, 1/16 and 1/32 alike
@@ -59,6 +60,18 @@ def test_residual_moves_the_field_by_cells_of_the_finest_scale(decoder: Displace
         decoder.residual.bias.copy_(torch.tensor([0.5, -0.25]))
         displacement = decoder(peaked(0, 0), FEATURES, CELLS).displacement
     torch.testing.assert_close(displacement[0, :, 3, 4], torch.tensor([4.0, -2.0]), atol=1e-3, rtol=0)
+
+
+def test_expected_error_is_the_geometric_mean_over_occupied_cells_and_axes(decoder: DisplacementDecoder) -> None:
+    log_scale = torch.full((2, 2, 2, 3), 9.0)
+    cells = torch.zeros(2, 3, 2, 3)
+    log_scale[0, :, 0, 1], log_scale[0, :, 1, 2] = torch.tensor([0.0, 1.0]), torch.tensor([2.0, 1.0])
+    cells[0, 2, 0, 1] = cells[0, 2, 1, 2] = 10.0
+    log_scale[1, :, 1, 0] = math.log(3.0)
+    cells[1, 2, 1, 0] = 5.0
+    field = DisplacementField(torch.zeros(2, 2, 2, 3), log_scale, torch.zeros(2, 1, 2, 3))
+    torch.testing.assert_close(expected_error(field, cells), torch.tensor([math.e, 3.0]))
+    assert expected_error(field, torch.zeros_like(cells)).isnan().all()
 
 
 def test_field_starts_unsure_and_stays_within_bounds(decoder: DisplacementDecoder) -> None:

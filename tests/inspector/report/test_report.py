@@ -46,12 +46,23 @@ def moved(run: RecordedRun, offsets_m: list[float]) -> RecordedRun:
     for frame, offset in zip(run.frames, offsets_m, strict=True):
         after = frame.initial.copy()
         after[0, 3] += offset
-        frames.append(replace(frame, stages=dict.fromkeys(frame.stages, after)))
+        frames.append(replace(frame, corrected=after, stages=dict.fromkeys(frame.stages, after)))
     return replace(run, frames=tuple(frames))
 
 
 def page_of(run: RecordedRun, folder: Path) -> str:
     return write_report(run, folder).read_text(encoding="utf-8")
+
+
+def test_frames_that_the_picture_does_not_confirm_are_told(record: Callable[..., Any], tmp_path: Path) -> None:
+    for doubted in ((1,), (0, 1, 2)):
+        record(tmp_path / "run.rrd", detail="overview", strides=(32,), doubted=doubted)
+        figures = Figures.of(read_run(tmp_path / "run.rrd"))
+        assert figures.unconfirmed == figures.as_dict()["unconfirmed"] == len(doubted)
+        assert figures.corrected.errors[1] == figures.initial.errors[1]
+        first = verdict(figures)[0]
+        assert first.grade == "bad" and "do not fit together" in first.sentence
+        assert ("nothing was corrected" in first.sentence) == (len(doubted) == 3)
 
 
 def test_page_states_the_figures_of_the_run(known: RecordedRun, tmp_path: Path, fakes: ModuleType) -> None:
@@ -110,7 +121,10 @@ def test_frames_that_disagree_are_not_called_good(unknown: RecordedRun) -> None:
 
 
 def test_what_got_worse_is_called_so(known: RecordedRun) -> None:
-    frames = tuple(replace(frame, initial=frame.corrected, stages={5: frame.initial}) for frame in known.frames)
+    frames = tuple(
+        replace(frame, initial=frame.corrected, corrected=frame.initial, stages={5: frame.initial})
+        for frame in known.frames
+    )
     worse = replace(known, frames=frames, stages=known.stages[-1:])
     sentences = [finding.sentence for finding in verdict(Figures.of(worse)) if finding.grade == "bad"]
     assert [sentence.partition(" ")[0] for sentence in sentences] == ["Rotation", "Translation"]
