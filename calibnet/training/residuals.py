@@ -16,8 +16,11 @@ from calibnet.precision import autocast
 from calibnet.training.samples import TrainingSamples, collate, make_sample, plain
 from calibnet.weights import load_network, weights_path
 
-LARGEST_ROTATION, LARGEST_TRANSLATION = 1.5, 3.0
-"""Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them."""
+LARGEST_ROTATION, LARGEST_TRANSLATION = 3.0, 6.0
+"""Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them.
+
+A stage corrects less than it should of what is larger than all it has seen, so this is generous.
+"""
 
 
 def stages_before(preset: str, bounds: MiscalibrationRange, folder: Path) -> list[CalibrationNetwork]:

@@ -47,9 +47,9 @@ def stretched(delta: Matrix, residual: Matrix) -> float | None:
 
 
 def test_lost_frames_are_left_out() -> None:
-    assert within(miscalibration([0, 0, 2.9], [0.5, 0, 0]), RANGES[3])
-    assert not within(miscalibration([0, 0, 3.1], [0, 0, 0]), RANGES[3])
-    assert not within(miscalibration([0, 0, 0], [0, 0.7, 0]), RANGES[3])
+    assert within(miscalibration([0, 0, 5.9], [1.1, 0, 0]), RANGES[3])
+    assert not within(miscalibration([0, 0, 6.1], [0, 0, 0]), RANGES[3])
+    assert not within(miscalibration([0, 0, 0], [0, 1.3, 0]), RANGES[3])
     assert not within(np.full((4, 4), np.nan), RANGES[3])
 
 
