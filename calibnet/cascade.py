@@ -287,13 +287,12 @@ class Cascade:
         clock("projection")
         inputs = self._inputs(view.image, lidar.without_top(lidar.empty_rows), camera)
         output = stage.network(inputs, view.features, keep_activations=detail, clock=clock)
-        estimate = output.pose.correction[0].double().cpu().numpy()
-        if not np.isfinite(estimate).all():
+        correction = stage.network.correction(output)
+        if not np.isfinite(correction).all():
             raise CalibrationError(
                 f"Stage {stage.number} found no finite correction for frame {frame.index} ({frame.source}); "
                 "train its weights again if this happens on every frame."
             )
-        correction = orthonormal(estimate)
         return StageTrace(
             stage.number,
             stage.range,
@@ -343,14 +342,6 @@ def spread(count: int, most: int) -> list[int]:
     """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
     chosen = min(count, most)
     return [(number + 1) * count // chosen - 1 for number in range(chosen)]
-
-
-def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Remove the rounding of single precision from the rotation of a 4x4 transform."""
-    u, _, vt = np.linalg.svd(matrix[:3, :3])
-    exact = matrix.copy()
-    exact[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    return exact
 
 
 def _image_branches(networks: list[CalibrationNetwork]) -> list[int]:

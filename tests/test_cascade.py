@@ -9,10 +9,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from calibnet.cascade import PASSES, Cascade, SkippedStage, Stage, orthonormal
+from calibnet.cascade import PASSES, Cascade, SkippedStage, Stage
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
-from calibnet.geometry import RANGES, depth_image, invert, miscalibration, project
+from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, project, scaled
 from calibnet.network.features import FeatureExtractor
 from calibnet.network.network import CalibrationNetwork
 from calibnet.trace import CascadeTrace
@@ -66,6 +66,13 @@ def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: C
     assert np.array_equal(doubting.stages[-1].after, trace.stages[-1].after), "what the stages found can be seen"
     believing = cascade(largest_match_error=last.match_error_px + 0.01).calibrate(frame, INITIAL)
     assert believing.confirmed and np.array_equal(believing.corrected, trace.corrected)
+
+
+def test_corrections_are_extended_by_the_gain_of_their_stage(frame: Frame, trace: CascadeTrace) -> None:
+    plain, extended = trace.stages[0], cascade((3,), gains=(1, 1, 1.5, 1, 1)).calibrate(frame, INITIAL).stages[0]
+    np.testing.assert_allclose(extended.correction, scaled(plain.correction, 1.5), atol=1e-9)
+    np.testing.assert_allclose(extended.after, extended.correction @ INITIAL, atol=1e-12)
+    assert np.linalg.norm(extended.correction[:3, 3]) == pytest.approx(1.5 * np.linalg.norm(plain.correction[:3, 3]))
 
 
 def test_only_the_finest_stage_judges(frame: Frame) -> None:

@@ -24,6 +24,14 @@ def invert(matrix: Matrix) -> Matrix:
     return transform(rotation.T, -rotation.T @ matrix[:3, 3])
 
 
+def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Remove the rounding of single precision from the rotation of a 4x4 transform."""
+    u, _, vt = np.linalg.svd(matrix[:3, :3])
+    exact = matrix.copy()
+    exact[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return exact
+
+
 def transform_points(target_from_source: Matrix, points: NDArray[np.floating]) -> NDArray[np.floating]:
     """Map points ``[N, 3]`` from source to target; the points' own precision is kept.
 

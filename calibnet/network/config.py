@@ -47,6 +47,7 @@ class NetworkConfig:
     zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
     largest_match_error: float = math.inf  # pixels that the last stage may expect its matches to be off, to be believed
     rounds: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
+    gains: tuple[float, ...] = (1.0,) * len(RANGES)  # by which each stage's corrections are extended
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -90,6 +91,10 @@ class NetworkConfig:
                 f"rounds has one number of at least 1 a stage, {len(RANGES)} in all",
             ),
             (
+                len(self.gains) != len(RANGES) or min(self.gains) <= 0,
+                f"gains has one positive number a stage, {len(RANGES)} in all",
+            ),
+            (
                 self.image_encoder not in get_args(ImageEncoder),
                 f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
             ),
@@ -112,6 +117,14 @@ class NetworkConfig:
         of a cell.
         """
         return dict(zip(RANGES, self.zooms, strict=True)).get(bounds, 1.0)
+
+    def gain_of(self, bounds: MiscalibrationRange) -> float:
+        """What the corrections of the stage with this range are multiplied by.
+
+        Trained to be least wrong on average, a network falls short where it is unsure; most of what is left then
+        lies in the direction in which it has gone.
+        """
+        return dict(zip(RANGES, self.gains, strict=True)).get(bounds, 1.0)
 
     def rounds_of(self, bounds: MiscalibrationRange) -> int:
         """How often the stage with this range looks at most; another look costs its time again, from much nearer."""

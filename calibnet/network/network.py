@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, bounds_of
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, bounds_of, orthonormal, scaled
 from calibnet.network.aggregation import Aggregation
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
@@ -102,6 +102,13 @@ class CalibrationNetwork(nn.Module):
         position = RANGES.index(self.bounds) if self.bounds in RANGES else len(RANGES)
         reach, found = RANGES[min(position + 1, len(RANGES) - 1)], bounds_of(correction)
         return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
+
+    def correction(self, output: NetworkOutput) -> NDArray[np.float64]:
+        """The 4x4 correction of the first frame of a batch, extended by the stage's gain."""
+        estimate = output.pose.correction[0].double().cpu().numpy()
+        if not np.isfinite(estimate).all():
+            return estimate.astype(np.float64)
+        return scaled(orthonormal(estimate), self.config.gain_of(self.bounds))
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""

@@ -63,8 +63,7 @@ def look(network: CalibrationNetwork, frame: Frame, delta: NDArray[np.float64]) 
     inputs, _ = collate([make_sample(frame, delta, network.config.volume_scales)])
     device = next(network.parameters()).device
     with torch.inference_mode(), autocast(device):
-        correction: NDArray[np.float64] = network(inputs.to(device)).pose.correction[0].double().cpu().numpy()
-    return correction
+        return network.correction(network(inputs.to(device)))
 
 
 def within(delta: NDArray[np.float64], bounds: MiscalibrationRange) -> bool:
