@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from functools import lru_cache
+from typing import cast
 
 import torch
 import torch.nn.functional as F
@@ -218,7 +219,7 @@ class Aggregation(nn.Module):
         for hourglass in self.hourglasses[:-1]:
             after = hourglass(after)
         if len(self.hourglasses):
-            last = self.hourglasses[-1]
+            last = cast(Hourglass, self.hourglasses[-1])
             entered = last.descend(after)
             added, after = last.read(entered, self.score), last.ascend(entered) if keep_activations else []
         else:
