@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from calibnet.clock import Clock
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
+from calibnet.image_views import View, image_branches, image_views
 from calibnet.network.config import load_preset
 from calibnet.network.displacement import expected_error
-from calibnet.network.inputs import LidarInput, lidar_input, resize_image
+from calibnet.network.inputs import LidarInput, lidar_input
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
 from calibnet.network.pose import prior_information
 from calibnet.precision import autocast
@@ -69,30 +70,6 @@ class Frames(Protocol):
         ...
 
 
-class View(NamedTuple):
-    """A frame's image at the size some stages want: ``[1, 3, H, W]``, and what their image branch makes of it."""
-
-    image: Tensor
-    features: list[Tensor]
-
-
-class Clock:
-    """Wall time by part, in milliseconds."""
-
-    def __init__(self, device: torch.device) -> None:
-        self.device = device
-        self.parts: dict[str, float] = {}
-        self.last = time.perf_counter()
-
-    def __call__(self, part: str) -> None:
-        """Everything since the last call was ``part``."""
-        if self.device.type == "cuda":
-            torch.cuda.synchronize(self.device)  # work is only queued there
-        now = time.perf_counter()
-        self.parts[part] = self.parts.get(part, 0.0) + 1000 * (now - self.last)
-        self.last = now
-
-
 class Cascade:
     """The stages that have weights, coarse to fine; a stage without them is skipped, never guessed."""
 
@@ -105,7 +82,7 @@ class Cascade:
             reasons = " ".join(stage.reason for stage in self.skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
         self.device = next(stages[0].network.parameters()).device
-        self.image_branches = _image_branches([stage.network for stage in stages])
+        self.image_branches = image_branches([stage.network for stage in stages])
 
     @classmethod
     def load(
@@ -158,9 +135,9 @@ class Cascade:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
         clock = Clock(self.device)
-        extrinsic, traces = initial, []
+        networks, extrinsic, traces = [stage.network for stage in self.stages], initial, []
         with torch.inference_mode(), autocast(self.device):
-            views = self._views(frame, clock)
+            views = image_views(networks, self.image_branches, frame, clock)
             for stage, branch in zip(self.stages, self.image_branches, strict=True):
                 camera = stage.network.input_camera(frame.camera)
                 view = views[branch, camera.width, camera.height]
@@ -173,22 +150,6 @@ class Cascade:
                 extrinsic = trace.after
                 traces.append(trace)
         return CascadeTrace(initial, tuple(traces), clock.parts, match_error_limit(self.stages[-1]))
-
-    def _views(self, frame: Frame, clock: Clock) -> dict[tuple[int, int, int], View]:
-        """The image at every size that a stage wants, and its features: once for all stages that share them.
-
-        By image branch, width and height.
-        """
-        views: dict[tuple[int, int, int], View] = {}
-        for stage, branch in zip(self.stages, self.image_branches, strict=True):
-            camera = stage.network.input_camera(frame.camera)
-            if (branch, camera.width, camera.height) in views:
-                continue
-            image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(self.device)
-            clock("resize")
-            views[branch, camera.width, camera.height] = View(image, stage.network.features.image(image))
-            clock("image_features")
-        return views
 
     def calibrate_sequence(
         self, frames: Frames, initial: NDArray[np.float64], observer: Callable[[int, int], None] | None = None
@@ -342,25 +303,3 @@ def spread(count: int, most: int) -> list[int]:
     """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
     chosen = min(count, most)
     return [(number + 1) * count // chosen - 1 for number in range(chosen)]
-
-
-def _image_branches(networks: list[CalibrationNetwork]) -> list[int]:
-    """For each network the position of the first one whose image branch would compute the same features."""
-    branches: list[int] = []
-    for position, network in enumerate(networks):
-        known = (earlier for earlier in sorted(set(branches)) if _same_image_branch(networks[earlier], network))
-        branches.append(next(known, position))
-    return branches
-
-
-def _same_image_branch(one: CalibrationNetwork, other: CalibrationNetwork) -> bool:
-    """Whether two stages would compute the same image features: then they are computed once."""
-    mine, theirs = (
-        {name: tensor for name, tensor in network.features.state_dict().items() if name.startswith("image_")}
-        for network in (one, other)
-    )
-    return (
-        one.config.volume_scales == other.config.volume_scales
-        and mine.keys() == theirs.keys()
-        and all(torch.equal(tensor, theirs[name]) for name, tensor in mine.items())
-    )

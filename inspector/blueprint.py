@@ -191,12 +191,16 @@ def scene_tab(layout: Layout) -> View:
     """The cloud coloured through one extrinsic after the other, and where each believes the camera to be."""
     seen = {layout.start: ("initial", entities.CAMERA_INITIAL)}
     seen |= {stage.title: (f"stage_{stage.number}", entities.camera_stage(stage.number)) for stage in layout.stages}
-    last = list(seen.values())[-1][0]
+    last, (through, _) = list(seen.items())[-1]
     if layout.has_reference:
         seen["Reference (truth)"] = ("reference", entities.CAMERA_REFERENCE)
     truth = [entities.CAMERA_REFERENCE] if layout.has_reference else []
     cameras = [camera for _, camera in seen.values()]
-    compared = {_lower(layout.start): "initial", "corrected": last} | ({"reference": "reference"} if truth else {})
+    compared = {_lower(layout.start): "initial"}
+    if layout.stages:
+        compared[f"after {_lower(last)}"] = through
+    if layout.has_reference:
+        compared["reference"] = "reference"
     views = [scene_view(f"Coloured through: {name}", part, cameras, layout) for name, part in compared.items()]
     pages = [
         scene_view(name, through, list(dict.fromkeys([camera, *truth])), layout)

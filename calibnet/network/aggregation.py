@@ -54,7 +54,7 @@ def pointwise(conv: nn.Module, volume: Tensor, bias: bool = True) -> Tensor:
     return F.linear(rows, weight, conv.bias if bias else None).permute(0, 4, 1, 2, 3)
 
 
-def read(heads: nn.ModuleList, volumes: list[Tensor]) -> list[Tensor]:
+def pointwise_each(heads: nn.ModuleList, volumes: list[Tensor]) -> list[Tensor]:
     """One 1x1x1 convolution a scale."""
     return [pointwise(head, volume) for head, volume in zip(heads, volumes, strict=True)]
 
@@ -161,11 +161,11 @@ class Hourglass(nn.Module):
         read by itself, before it is interpolated to all cells and displacements.
         """
         if not self.fuse or len(entered) == 1 or self.convolve_finest:
-            return read(heads, self.ascend(entered))
+            return pointwise_each(heads, self.ascend(entered))
         left = self.ascend(entered, finest=1)
         risen = pointwise(heads[0], pointwise(self.up[0], left[0]), bias=False)
         finest = pointwise(heads[0], entered[0]) + double(refine_window(risen, self.window))
-        return [finest, *read(heads[1:], left)]
+        return [finest, *pointwise_each(heads[1:], left)]
 
     def descend(self, volumes: list[Tensor]) -> list[Tensor]:
         """The way down: each scale with what the finer ones say of the displacements that they share."""
@@ -221,8 +221,9 @@ class Aggregation(nn.Module):
         if len(self.hourglasses):
             last = cast(Hourglass, self.hourglasses[-1])
             entered = last.descend(after)
-            added, after = last.read(entered, self.score), last.ascend(entered) if keep_activations else []
+            added = last.read(entered, self.score)
+            after = last.ascend(entered) if keep_activations else []
         else:
-            added = read(self.score, after)
+            added = pointwise_each(self.score, after)
         logits = [TEMPERATURE * raw + more.squeeze(1) for raw, more in zip(scores, added, strict=True)]
         return before, after, logits

@@ -13,7 +13,7 @@ from calibnet.network.aggregation import (
     WindowConv,
     centre_in_window,
     every_second,
-    read,
+    pointwise_each,
     refine_window,
 )
 from calibnet.network.cost_volume import TEMPERATURE
@@ -97,7 +97,7 @@ def test_volumes_are_read_as_if_they_were_made(scales: tuple[int, ...], fuse: bo
     )
     hourglass, volumes = Hourglass(config, blocks=1), volumes_of(channels, config.window)
     heads = torch.nn.ModuleList(torch.nn.Conv3d(width, 2, 1) for width in channels)
-    found, expected = hourglass.read(hourglass.descend(volumes), heads), read(heads, hourglass(volumes))
+    found, expected = hourglass.read(hourglass.descend(volumes), heads), pointwise_each(heads, hourglass(volumes))
     for volume, other in zip(found, expected, strict=True):
         torch.testing.assert_close(volume, other)
 
