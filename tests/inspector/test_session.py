@@ -18,6 +18,7 @@ from rerun.chunk import RrdReader
 from calibnet.errors import ConfigError, DatasetError
 from inspector import outputs as outputs_module
 from inspector.outputs import Outputs, has_display
+from inspector.recording_file import RecordingFile
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -79,7 +80,8 @@ def test_a_killed_run_leaves_what_it_had_recorded(tmp_path: Path) -> None:
     process = start_long_run(file)
     process.kill()
     process.communicate(timeout=60)
-    chunks = RrdReader(file).stream().filter(content="/image")
+    # the kill may cut the last chunk short, which Rerun's own reader refuses
+    chunks = RecordingFile(file).chunks("image")
     assert sum(chunk.to_record_batch().num_rows for chunk in chunks) >= 2
 
 
