@@ -1,4 +1,4 @@
-"""What the stages before leave behind: the errors, tails included, that the next stage is trained to correct."""
+"""What earlier looks leave behind: the errors, tails included, that the next look is trained to correct."""
 
 from __future__ import annotations
 
@@ -31,7 +31,11 @@ def stages_before(preset: str, bounds: MiscalibrationRange, folder: Path) -> lis
 
 
 def residual_errors(
-    networks: list[CalibrationNetwork], data: TrainingSamples, bounds: MiscalibrationRange, count: int
+    networks: list[CalibrationNetwork],
+    data: TrainingSamples,
+    bounds: MiscalibrationRange,
+    count: int,
+    start: CalibrationNetwork | None = None,
 ) -> list[NDArray[np.float64]]:
     """Errors ``correction @ delta`` (4x4) that the networks leave on ``count`` augmented training frames.
 
@@ -40,12 +44,13 @@ def residual_errors(
         data: where frames come from.
         bounds: of the stage to be trained.
         count: frames to run; what is lost altogether is left out of the result.
+        start: the stage itself as it was, if it looks more than once: what its first look leaves is added.
     """
     generator = np.random.default_rng([data.seed, 4])
     residuals = []
     for number in range(count):
         frame = data.draw_frame(number, generator, 1.0, whole=True)
-        delta = sample_miscalibration(networks[0].bounds, generator)
+        delta = sample_miscalibration(networks[0].bounds if networks else bounds, generator)
         for network in networks:
             seen = plain(frame, network.input_camera(frame.camera))
             for _ in range(network.rounds):
@@ -53,8 +58,12 @@ def residual_errors(
                 delta = correction @ delta
                 if network.is_settled(correction):
                     break
-        if within(delta, bounds):
+        if networks and within(delta, bounds):
             residuals.append(delta)
+        if start is not None:
+            delta = look(start, plain(frame, start.input_camera(frame.camera)), delta) @ delta
+            if within(delta, bounds):
+                residuals.append(delta)
     return residuals
 
 

@@ -141,6 +141,7 @@ class TrainingSamples(Dataset[Sample]):
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
     RESIDUAL_SHARE = 0.7  # of the miscalibrations, when the errors of the stages before are known
+    OWN_SHARE = 0.4  # where there are none before: only what a stage's own first look leaves
     RESIDUAL_STRETCH = (0.7, 1.8)  # times as large as measured: frames never trained on leave more behind
     LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
 
@@ -170,6 +171,7 @@ class TrainingSamples(Dataset[Sample]):
         factor = (area / (160 * 512)) ** 0.5
         self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
         self.residuals: list[NDArray[np.float64]] = []
+        self.residual_share = self.RESIDUAL_SHARE
         self.cache: dict[tuple[int, int], Frame] = {}
 
     def read(self, source: int, position: int) -> Frame:
@@ -221,11 +223,11 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
-        """A miscalibration anywhere in the range, or, seven of ten, as the stages before leave behind.
+        """A miscalibration anywhere in the range, or, mostly, as the looks before leave behind.
 
         Sometimes a small one, as a stage must also know when to stop.
         """
-        if self.residuals and generator.random() < self.RESIDUAL_SHARE:
+        if self.residuals and generator.random() < self.residual_share:
             residual = self.residuals[generator.integers(len(self.residuals))]
             return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
         share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))

@@ -40,6 +40,7 @@ class Trainer:
     REPORT_SECONDS, CHECKPOINT_SECONDS, VALIDATION_SECONDS = 5.0, 120.0, 600.0
     WARM_UP = 6000  # samples with which a run from scratch first trains the features alone, at a third of the cost
     RATE_RAMP, FINAL_RATE = 0.03, 0.02  # share of the budget in which the learning rate rises; what it falls to
+    FROZEN_LEVELS = 2  # pretrained levels left as they are: they see edges on any camera, and cost most to train
     PRETRAINED_RATE = 0.3  # relative learning rate of what was learned on a million pictures
     RESIDUALS = 200  # errors of the stages before, measured when the run starts
     POSE_RAMP = 2000  # samples over which the pose's losses fade in after the warm-up
@@ -59,6 +60,8 @@ class Trainer:
         self.network = CalibrationNetwork(load_preset(options.preset), self.bounds)
         config = self.network.config
         self.network.features.load_pretrained()
+        for parameter in self.network.features.pretrained_levels()[: self.FROZEN_LEVELS].parameters():
+            parameter.requires_grad_(False)
         if options.initialize:
             self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
             if config.share_image_branch and not options.train_image_branch:
@@ -82,8 +85,13 @@ class Trainer:
         )
         if options.after:
             before = stages_before(options.preset, self.bounds, Path(options.after))
-            if before:
-                self.data.residuals = residual_errors(before, self.data, self.bounds, self.RESIDUALS)
+            start = load_network(Path(options.initialize)) if options.initialize else None
+            if start is not None and (start.bounds != self.bounds or start.rounds == 1):
+                start = None  # a neighbour's looks are another's, and who looks once sees nothing of its own
+            if before or start:
+                self.data.residuals = residual_errors(before, self.data, self.bounds, self.RESIDUALS, start)
+            if not before:
+                self.data.residual_share = self.data.OWN_SHARE
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.995))
         optimizer = torch.optim.AdamW(self._parameters(), lr=options.learning_rate, weight_decay=1e-4)
         self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None

@@ -35,6 +35,19 @@ def test_residuals_are_what_the_stages_leave_and_most_of_what_is_drawn(data: Tra
     assert 1.7 < max(stretches) <= 1.8
 
 
+def test_what_the_first_look_of_a_stage_leaves_is_for_its_second(data: TrainingSamples) -> None:
+    start, wide = tiny_network(seed=1, stage=2, rounds=(2, 2, 1, 1, 1)), MiscalibrationRange(30, 5)
+    before = [tiny_network(seed=2, stage=1)]
+    alone = residual_errors(before, data, wide, 4)
+    both = residual_errors(before, data, wide, 4, start)
+    assert len(both) == 8
+    for one, first in zip(alone, both[::2], strict=True):
+        np.testing.assert_array_equal(one, first)
+    assert all(not np.allclose(first, second) for first, second in zip(both[::2], both[1::2], strict=True))
+    of_the_first_stage = residual_errors([], data, wide, 4, start)
+    assert len(of_the_first_stage) == 4, "without stages before, only what the look leaves: all else is drawn anyway"
+
+
 def stretched(delta: Matrix, residual: Matrix) -> float | None:
     """How many times as far ``delta`` turns and moves as ``residual``, None if not about the same axes."""
     factors = np.concatenate(
