@@ -49,12 +49,18 @@ class FloatInputs(MixedPrecision):
 
 
 def next_batch(batches: Iterator[Batch]) -> Batch:
-    """The next batch; an error from a worker comes with its traceback as text: keep the sentence."""
+    """The next batch; an error from a worker comes with its traceback as text: keep the sentence.
+
+    The error's own traceback, which goes round in a circle, would keep the workers, and these the process, alive.
+    """
     try:
         return next(batches)
-    except CalibnetError as error:
-        kind, text = type(error), str(error)
-    raise kind(text.rpartition(f"{kind.__name__}: ")[2].strip())  # out here: nothing holds on to the worker any more
+    except Exception as error:
+        failure = error.with_traceback(None)
+    if isinstance(failure, CalibnetError):
+        kind = type(failure)
+        raise kind(str(failure).rpartition(f"{kind.__name__}: ")[2].strip())
+    raise failure
 
 
 def leave_signals_to_main(worker: int) -> None:

@@ -118,6 +118,17 @@ def test_strided_convolutions_pad_as_tensorflow_does() -> None:
     assert rows.tolist() == [[9.0, 15.0], [6.0, 10.0]]
 
 
+def test_gradients_of_depthwise_convolutions_are_single_precision_under_autocast() -> None:
+    torch.manual_seed(2)
+    layer = efficientnet.SameConv(8, 8, 3, stride=2, groups=8)
+    x = torch.randn(2, 8, 16, 24)
+    exact = layer.eval()(x)
+    with torch.autocast("cpu", torch.bfloat16):
+        fast, careful = layer(x), layer.train()(x)
+    assert fast.dtype == torch.bfloat16, "inference takes what is fastest"
+    assert careful.equal(exact)
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import math
 import multiprocessing
 import os
@@ -17,6 +18,7 @@ from safetensors.torch import load_file
 
 from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsError
 from calibnet.geometry import RANGES, miscalibration
+from calibnet.network.efficientnet import load_weights
 from calibnet.network.inputs import input_camera
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training import trainer as trainer_module
@@ -187,6 +189,19 @@ def test_later_stages_keep_the_image_branch_of_the_first(tiny_world: Scenes, tmp
     assert any(not torch.equal(before[name], after[name]) for name in before.keys() - shared)
 
 
+def test_the_first_pretrained_levels_stay_as_they_are(
+    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pretrained = replace(TINY, image_encoder="efficientnet-lite0", widths=(8, 8, 16, 16, 24))
+    monkeypatch.setattr(trainer_module, "load_preset", lambda name: pretrained)
+    trained, original = load_file(Trainer(options(tmp_path, batches=2), Watcher()).run()), load_weights()
+    for level, changes in enumerate([False, False, True, True]):
+        names = [name for name in original if name.startswith(f"{level}.")]
+        assert names
+        same = [torch.equal(trained[f"features.image_trunk.encoder.{n}"], original[n].half().float()) for n in names]
+        assert all(same) is not changes, level
+
+
 def test_a_run_needs_a_budget(tiny_world: Scenes, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="--minutes or --samples"):
         Trainer(options(tmp_path, samples=None), Watcher())
@@ -204,6 +219,26 @@ def test_a_broken_frame_is_one_sentence_also_from_another_process(
     with pytest.raises(CalibnetError) as raised:
         trainer.run()
     assert str(raised.value) == "Scan 000003.bin is cut short; copy it again."
+
+
+@pytest.mark.parametrize("failure", [DatasetError("Scan 000003.bin is cut short."), MemoryError("none left")])
+def test_a_failed_run_leaves_no_worker_that_its_process_would_wait_for(
+    tiny_world: Scenes, tmp_path: Path, failure: Exception
+) -> None:
+    def broken(reads: int) -> None:
+        raise failure
+
+    trainer = Trainer(options(tmp_path, workers=1), Watcher())
+    tiny_world.on_read = broken
+    gc.disable()  # nothing may depend on when it runs
+    try:
+        with pytest.raises(type(failure)) as raised:
+            trainer.run()
+        raised.value.__traceback__ = None
+        del raised
+        assert not multiprocessing.active_children()
+    finally:
+        gc.enable()
 
 
 def test_a_loss_that_is_not_a_number_stops_the_run(tiny_world: Scenes, tmp_path: Path) -> None:
