@@ -62,8 +62,9 @@ class Trainer:
         self.network.features.load_pretrained()
         for parameter in self.network.features.pretrained_levels()[: self.FROZEN_LEVELS].parameters():
             parameter.requires_grad_(False)
-        if options.initialize:
-            self.network.load_state_dict(load_network(Path(options.initialize)).state_dict())
+        start = load_network(Path(options.initialize)) if options.initialize else None
+        if start is not None:
+            self.network.load_state_dict(start.state_dict())
             if config.share_image_branch and not options.train_image_branch:
                 for name, parameter in self.network.features.named_parameters():
                     parameter.requires_grad_(not name.startswith("image_"))
@@ -84,14 +85,7 @@ class Trainer:
             sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
         )
         if options.after:
-            before = stages_before(options.preset, self.bounds, Path(options.after))
-            start = load_network(Path(options.initialize)) if options.initialize else None
-            if start is not None and (start.bounds != self.bounds or start.rounds == 1):
-                start = None  # a neighbour's looks are another's, and who looks once sees nothing of its own
-            if before or start:
-                self.data.residuals = residual_errors(before, self.data, self.bounds, self.RESIDUALS, start)
-            if not before:
-                self.data.residual_share = self.data.OWN_SHARE
+            self._draw_residuals(Path(options.after), start)
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.995))
         optimizer = torch.optim.AdamW(self._parameters(), lr=options.learning_rate, weight_decay=1e-4)
         self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None
@@ -105,6 +99,20 @@ class Trainer:
             raise ConfigError(
                 f"{self.checkpoint} is there from an earlier run: add --resume, or remove it to start again."
             )
+
+    def _draw_residuals(self, folder: Path, start: CalibrationNetwork | None) -> None:
+        """Let most miscalibrations be what the stages in ``folder`` leave, and what the start's own first look does.
+
+        Not so the look of a neighbour of which this stage starts, nor of a stage that looks only once.
+        """
+        before = stages_before(self.options.preset, self.bounds, folder)
+        looks_again = start is not None and start.bounds == self.bounds and start.rounds > 1
+        if before or looks_again:
+            self.data.residuals = residual_errors(
+                before, self.data, self.bounds, self.RESIDUALS, start if looks_again else None
+            )
+        if not before:
+            self.data.residual_share = self.data.OWN_SHARE
 
     @property
     def checkpoint(self) -> Path:

@@ -80,10 +80,14 @@ if TYPE_CHECKING:
 @click.option(
     "--train-image-branch",
     is_flag=True,
-    help="Also train the image branch of an initialised stage.  [default: frozen, as all stages share it]",
+    help="Also train the image branch of an initialised stage, but for its finest pretrained levels.  "
+    "[default: frozen, as all stages share it]",
 )
 @click.option(
-    "--after", type=FOLDER, help="Folder of the stages before: most miscalibrations are then what they leave behind."
+    "--after",
+    type=FOLDER,
+    help="Folder of the stages before: most miscalibrations are then what they leave behind, and what the first look "
+    "of --initialize does where that is this stage's.",
 )
 @click.option(
     "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."

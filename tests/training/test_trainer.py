@@ -17,7 +17,7 @@ import torch
 from safetensors.torch import load_file
 
 from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsError
-from calibnet.geometry import RANGES, miscalibration
+from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
 from calibnet.network.efficientnet import load_weights
 from calibnet.network.inputs import input_camera
 from calibnet.network.network import CalibrationNetwork
@@ -25,10 +25,10 @@ from calibnet.training import trainer as trainer_module
 from calibnet.training.losses import feature_loss
 from calibnet.training.options import TrainingOptions
 from calibnet.training.progress import Progress
-from calibnet.training.samples import Source, collate, make_sample, plain
+from calibnet.training.samples import Source, TrainingSamples, collate, make_sample, plain
 from calibnet.training.trainer import Trainer
 from calibnet.training.validation import ValidationFigures
-from calibnet.weights import load_network, read_record
+from calibnet.weights import load_network, read_record, save_network
 from tests.network.tiny import TINY
 from tests.training.scene import Scenes, make_frame
 
@@ -187,6 +187,25 @@ def test_later_stages_keep_the_image_branch_of_the_first(tiny_world: Scenes, tmp
     shared = {name for name in before if name.startswith("features.image_")}
     assert shared and all(torch.equal(before[name], after[name]) for name in shared)
     assert any(not torch.equal(before[name], after[name]) for name in before.keys() - shared)
+
+
+def test_only_a_stage_that_starts_from_itself_and_looks_again_is_shown_what_its_first_look_leaves(
+    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def residuals(rounds: int, initialize: str) -> tuple[int, float]:
+        monkeypatch.setattr(trainer_module, "load_preset", lambda name: replace(TINY, rounds=(rounds,) * 5))
+        start = tmp_path / f"{rounds}.safetensors"
+        network = CalibrationNetwork(replace(TINY, rounds=(rounds,) * 5), MiscalibrationRange.parse(initialize))
+        save_network(start, network, network.state_dict(), {})
+        nothing_before = str(tmp_path / "empty")
+        trainer = Trainer(options(tmp_path / "out", initialize=str(start), after=nothing_before), Watcher())
+        return len(trainer.data.residuals), trainer.data.residual_share
+
+    monkeypatch.setattr(Trainer, "RESIDUALS", 5)
+    found, share = residuals(2, "5/0.5")
+    assert found > 0 and share == TrainingSamples.OWN_SHARE, "the range itself stays the larger part"
+    assert residuals(1, "5/0.5")[0] == 0
+    assert residuals(2, "10/1")[0] == 0
 
 
 def test_the_first_pretrained_levels_stay_as_they_are(
