@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -16,6 +14,7 @@ from torch import Tensor
 
 from calibnet.clock import Clock
 from calibnet.datasets.frame import Frame
+from calibnet.drive import Frames, solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
 from calibnet.image_views import View, image_branches, image_views
@@ -23,19 +22,12 @@ from calibnet.network.config import load_preset
 from calibnet.network.displacement import expected_error
 from calibnet.network.inputs import LidarInput, lidar_input
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
-from calibnet.network.pose import prior_information
 from calibnet.precision import autocast
-from calibnet.sequence_estimate import Consensus, Estimate, SequenceEstimate
+from calibnet.sequence_estimate import SequenceEstimate
 from calibnet.stage_detail import stage_detail
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.weights import load_network, weights_path
 
-FRAMES_UNTIL_LAST_PASS = 24
-"""Frames, spread over the drive, that all passes but the last look at."""
-PASSES = 2
-"""Times that each stage corrects a sequence, on scans projected anew; the last one does so once more in the end."""
-LONGEST_HISTORY = 200
-"""Points of the curve that shows how an estimate converges over a drive."""
 MINIMUM_CELLS = 20
 """Cells with a LiDAR point below which a pose of six parameters would be a guess."""
 
@@ -56,18 +48,6 @@ class SkippedStage:
     number: int
     range: MiscalibrationRange
     reason: str
-
-
-class Frames(Protocol):
-    """A drive: a `calibnet.datasets.Sequence`, or a list of frames."""
-
-    def __len__(self) -> int:
-        """Number of frames."""
-        ...
-
-    def __getitem__(self, position: int, /) -> Frame:
-        """Read one frame."""
-        ...
 
 
 class Cascade:
@@ -157,8 +137,9 @@ class Cascade:
         """Correct the one extrinsic that all frames of a drive share.
 
         Each stage corrects what all frames together make of it, and again on the scans projected anew. Until the
-        end some frames from all over the drive are enough; the last pass sees them all.
-        No more than one frame is in memory at a time.
+        end some frames from all over the drive are enough; the last pass sees them all. What the finest stage leaves
+        is aligned without training (`calibnet.alignment`) on some frames from all over the drive.
+        Memory does not grow with the drive.
 
         Args:
             frames: of one camera and LiDAR on one mount; read once in the last pass, some of them before.
@@ -169,63 +150,8 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        if not len(frames):
-            raise ValueError("There are no frames to calibrate.")
-        some, everything = spread(len(frames), FRAMES_UNTIL_LAST_PASS), list(range(len(frames)))
-        last = self.stages[-1]
-        rehearsals = [stage for stage in self.stages for _ in range(PASSES)]
-        total = len(rehearsals) * len(some) + len(everything)
-        number = itertools.count()
-
-        def read(position: int) -> Frame:
-            if observer is not None:
-                observer(next(number), total)
-            return frames[position]
-
-        kept = set(spread(len(everything), LONGEST_HISTORY))
-        history: list[tuple[int, Estimate]] = []
-
-        def note(frame: Frame, consensus: Consensus, count: int) -> None:
-            if count in kept:
-                history.append((frame.index, consensus.estimate()))
-
-        extrinsic = initial
-        for stage in rehearsals:
-            extrinsic = self._agree(stage, read, some, extrinsic).estimate().camera_from_lidar
-        consensus = self._agree(last, read, everything, extrinsic, note)
-        estimate = consensus.estimate()
-        return SequenceEstimate(
-            estimate.camera_from_lidar,
-            estimate.covariance,
-            estimate.frames,
-            tuple(history),
-            len(everything) - len(consensus),
-        )
-
-    def _agree(
-        self,
-        stage: Stage,
-        read: Callable[[int], Frame],
-        positions: list[int],
-        extrinsic: NDArray[np.float64],
-        note: Callable[[Frame, Consensus, int], None] | None = None,
-    ) -> Consensus:
-        """What one stage makes of some frames of a drive; ``note`` is told after each that it could calibrate."""
-        single, failure = Cascade([stage], looks=1), None
-        consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
-        for count, position in enumerate(positions):
-            frame = read(position)
-            try:
-                trace = confirmed(single.calibrate(frame, extrinsic), frame).stages[0]
-            except CalibrationError as error:
-                failure = error
-                continue
-            consensus.add(trace.correction, trace.information)
-            if note is not None:
-                note(frame, consensus, count)
-        if failure is not None and not len(consensus):
-            raise failure
-        return consensus
+        alone = [(stage.range, Cascade([stage], looks=1)) for stage in self.stages]
+        return solve_drive(alone, frames, initial, observer)
 
     def _run(
         self,
@@ -275,31 +201,9 @@ class Cascade:
         return NetworkInputs(image, batch(lidar.image), batch(intrinsics), [batch(cells) for cells in lidar.cells])
 
 
-def confirmed(trace: CascadeTrace, frame: Frame) -> CascadeTrace:
-    """The trace, if picture and scan fit together.
-
-    Raises:
-        CalibrationError: they do not.
-    """
-    if not trace.confirmed:
-        last, limit = trace.stages[-1], trace.match_error_limit_px
-        raise CalibrationError(
-            f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {last.number}, "
-            f"which expects its matches to be {last.match_error_px:.1f} px off (at most {limit:g}): "
-            "check that they belong together and that the start is within the range of the first stage."
-        )
-    return trace
-
-
 def match_error_limit(stage: Stage) -> float:
     """Expected error of matches, in pixels, beyond which a stage's answer is not believed.
 
     Only the finest stage judges: the others' matches are coarse anyway, and the next stage looks again.
     """
     return stage.network.config.largest_match_error if stage.range == RANGES[-1] else math.inf
-
-
-def spread(count: int, most: int) -> list[int]:
-    """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
-    chosen = min(count, most)
-    return [(number + 1) * count // chosen - 1 for number in range(chosen)]

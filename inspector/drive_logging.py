@@ -12,7 +12,7 @@ from calibnet.sequence_estimate import Estimate, SequenceEstimate
 from inspector import colors, entities
 
 BAND = 2.0
-"""Standard deviations on either side of the estimate: 95 % of the errors, if the network is right about itself."""
+"""Standard deviations on either side of the estimate: 95 % of the errors, if it is right about itself."""
 PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
 """Of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
@@ -85,8 +85,15 @@ def drive_sentence(
     error = pose_error(estimate.camera_from_lidar, initial if reference is None else reference)
     what = "changed the calibration by" if reference is None else "off by"
     skipped = f", {estimate.skipped} more could not be used" if estimate.skipped else ""
-    return (
+    result = (
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
-        f"{error.translation_cm:.1f} cm; by the frames' scatter it is sure to {estimate.rotation_deg:.2f}° / "
-        f"{estimate.translation_cm:.1f} cm, not counting what all of them get wrong."
+        f"{error.translation_cm:.1f} cm; "
+    )
+    sure = f"sure to {estimate.rotation_deg:.2f}° / {estimate.translation_cm:.1f} cm"
+    if estimate.networks is None:
+        return f"{result}by the frames' scatter it is {sure}, not counting what all of them get wrong."
+    alone = pose_error(estimate.networks.camera_from_lidar, initial if reference is None else reference)
+    return (
+        f"{result}{sure} (one standard deviation). Before its edges were aligned: {alone.rotation_deg:.2f}° / "
+        f"{alone.translation_cm:.1f} cm."
     )

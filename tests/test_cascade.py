@@ -9,10 +9,12 @@ import pytest
 import torch
 from torch import Tensor
 
-from calibnet.cascade import PASSES, Cascade, SkippedStage, Stage
+from calibnet.alignment import Evidence
+from calibnet.cascade import Cascade, SkippedStage, Stage
 from calibnet.datasets.frame import Frame
+from calibnet.drive import PASSES
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
-from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, project, scaled
+from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, pose_error, project, scaled
 from calibnet.network.features import FeatureExtractor
 from calibnet.network.network import CalibrationNetwork
 from calibnet.trace import CascadeTrace
@@ -379,7 +381,7 @@ class Drive:
 
 
 def test_a_drive_is_solved_by_all_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("calibnet.cascade.FRAMES_UNTIL_LAST_PASS", 2)
+    monkeypatch.setattr("calibnet.drive.FRAMES_UNTIL_LAST_PASS", 2)
     drive, told = Drive(4, blind=frozenset({1})), []
     estimate = cascade().calibrate_sequence(drive, INITIAL, lambda *numbers: told.append(numbers))
     often = 3 * PASSES + 1
@@ -391,6 +393,32 @@ def test_a_drive_is_solved_by_all_its_frames(monkeypatch: pytest.MonkeyPatch) ->
     rotation = estimate.camera_from_lidar[:3, :3]
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
     assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
+
+
+def test_edges_are_aligned_after_the_finest_stage_only(frame: Frame) -> None:
+    coarse, fine = (cascade(numbers).calibrate_sequence([frame, frame], INITIAL) for numbers in ((3, 4), (4, 5)))
+    assert coarse.networks is None and fine.networks is not None
+    assert not np.array_equal(fine.camera_from_lidar, fine.networks.camera_from_lidar)
+    moved = pose_error(fine.camera_from_lidar, fine.networks.camera_from_lidar)
+    assert moved.translation_cm < 5 * 14 and moved.rotation_deg < 5 * 0.21, "not farther than networks are wrong"
+    assert fine.translation_cm > fine.networks.translation_cm, "what two equal frames get wrong alike is counted"
+
+
+def test_a_long_drive_notes_the_estimate_down_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("calibnet.drive.FRAMES_ALIGNED", 2)
+    gathered: list[int] = []
+    monkeypatch.setattr("calibnet.drive.gather", lambda frame, _: gathered.append(frame.index) or Evidence(()))
+    estimate = cascade((5,)).calibrate_sequence(Drive(5), INITIAL)
+    assert gathered == [frame for frame, _ in estimate.history] == [11, 14]
+    assert estimate.frames == 5 and estimate.networks is not None
+    np.testing.assert_allclose(estimate.camera_from_lidar, estimate.networks.camera_from_lidar, atol=1e-9)
+
+
+def test_the_curve_of_a_drive_ends_at_its_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("calibnet.drive.FRAMES_ALIGNED", 2)
+    estimate = cascade((5,)).calibrate_sequence(Drive(4, blind=frozenset({3})), INITIAL)
+    assert [(frame, then.frames) for frame, then in estimate.history] == [(11, 2), (12, 3)]
+    np.testing.assert_array_equal(estimate.history[-1][1].camera_from_lidar, estimate.camera_from_lidar)
 
 
 def test_a_drive_without_a_usable_frame_is_an_error() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,14 @@ from calibnet.geometry.se3 import Matrix
 from calibnet.sequence_estimate import SequenceEstimate
 
 FEWEST_FRAMES = 2
+
+
+@dataclass(frozen=True)
+class DriveMetrics:
+    """Errors of drives solved as one, and of what the networks alone made of them."""
+
+    estimate: Metrics
+    networks: Metrics
 
 
 class DriveCalibrator(Protocol):
@@ -35,7 +44,7 @@ def evaluate_drives(
     repeats: int,
     seed: int,
     observer: Callable[[str, int, int], None] | None = None,
-) -> Metrics | None:
+) -> DriveMetrics | None:
     """Errors of ``repeats`` estimates of every drive; those that fail keep their initial error.
 
     Args:
@@ -49,23 +58,25 @@ def evaluate_drives(
     Returns:
         None where no sequence is a drive.
     """
-    errors = []
+    errors, of_networks = [], []
     for number, sequence in enumerate(sequences):
         if not shares_mount(sequence):
             continue
         reference = sequence[0].camera_from_lidar
         for repeat in range(repeats):
             delta = sample_miscalibration(bounds, np.random.default_rng([seed, number, repeat, 1]))
-            estimate = delta @ reference
+            estimate = networks = delta @ reference
 
             def told(read: int, total: int, name: str = sequence.name) -> None:
                 if observer is not None:
                     observer(name, read, total)
 
             with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
-                estimate = cascade.calibrate_sequence(sequence, estimate, told).camera_from_lidar
+                solved = cascade.calibrate_sequence(sequence, estimate, told)
+                estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
             errors.append(pose_error(estimate, reference))
-    return Metrics.of(errors) if errors else None
+            of_networks.append(pose_error(networks, reference))
+    return DriveMetrics(Metrics.of(errors), Metrics.of(of_networks)) if errors else None
 
 
 def shares_mount(sequence: Sequence) -> bool:

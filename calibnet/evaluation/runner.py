@@ -77,6 +77,7 @@ class Evaluation:
         stages: errors after each stage that ran, coarse to fine.
         runs: every single result.
         sequence: errors of whole drives, each solved as one; None where that was not measured.
+        sequence_networks: likewise of what the networks alone made of them, before edges were aligned.
         references: errors without a network, by name: no correction, a classical refinement.
         audit: errors after the last stage with altered frames, by name, see `calibnet.evaluation.audit`.
         audit_unconfirmed: how many of those runs the picture did not confirm, by the same names.
@@ -94,6 +95,7 @@ class Evaluation:
     stages: tuple[StageMetrics, ...]
     runs: tuple[Run, ...] = field(repr=False)
     sequence: Metrics | None = None
+    sequence_networks: Metrics | None = None
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
     audit_unconfirmed: dict[str, int] = field(default_factory=dict)
@@ -125,6 +127,7 @@ class Evaluation:
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
             ],
             "sequence": None if self.sequence is None else self.sequence.as_dict(),
+            "sequence_networks": None if self.sequence_networks is None else self.sequence_networks.as_dict(),
             "references": {name: metrics.as_dict() for name, metrics in self.references.items()},
         }
         if self.audit:

@@ -78,6 +78,16 @@ def rotation_vector(rotation: NDArray[np.floating]) -> Matrix:
     return axis * (rotation_angle(rotation) / sine) if sine > 1e-12 else axis
 
 
+def pose_vector(correction: Matrix) -> NDArray[np.float64]:
+    """A 4x4 correction as ``(translation m, rotation vector rad)``."""
+    return np.concatenate([correction[:3, 3], rotation_vector(correction[:3, :3])])
+
+
+def pose_from_vector(vector: NDArray[np.float64]) -> Matrix:
+    """The inverse of `pose_vector`."""
+    return transform(rotation_from_vector(vector[3:]), vector[:3])
+
+
 def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
     """The three angles, in radians, of ``rotation_from_euler_xyz`` (for |b| < 90 degrees)."""
     return np.array(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from calibnet.cascade import Cascade
+    from calibnet.evaluation.drives import DriveMetrics
     from calibnet.evaluation.metrics import Metrics
     from calibnet.evaluation.runner import Calibrator, Evaluation
     from calibnet.geometry import MiscalibrationRange
@@ -68,7 +69,8 @@ def evaluate(
 
     Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success
     rates: for the initial error, a classical refinement (edges of depth onto edges of the image), after
-    each stage on single frames, and for every sequence solved as one.
+    each stage on single frames, and for every sequence solved as one: by the networks alone, and with its
+    edges aligned after them.
     """
     names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [
@@ -92,7 +94,9 @@ def evaluate(
             references["edge alignment"] = measurement.classical()
         evaluation = replace(evaluation, references=references)
         if drives:
-            evaluation = replace(evaluation, sequence=measurement.drives(cascade))
+            solved = measurement.drives(cascade)
+            if solved is not None:
+                evaluation = replace(evaluation, sequence=solved.estimate, sequence_networks=solved.networks)
         if audit:
             donors = {id(one): find_donors(one, opened, dataset, root) for one in opened}
             altered = measurement.audit(cascade, donors)
@@ -132,7 +136,7 @@ class Measurement:
 
         return self.single_frames(EdgeAlignment(self.bounds), "edge alignment").final
 
-    def drives(self, cascade: Cascade) -> Metrics | None:
+    def drives(self, cascade: Cascade) -> DriveMetrics | None:
         """Every sequence solved as one."""
         from calibnet.evaluation.drives import evaluate_drives
 
@@ -221,6 +225,8 @@ def report(evaluation: Evaluation, console: Console) -> None:
     rows = [("initial", evaluation.initial)]
     rows += [(name, metrics) for name, metrics in evaluation.references.items() if metrics is not evaluation.initial]
     rows += [(f"stage {stage.number} ({stage.range})", stage.metrics) for stage in evaluation.stages]
+    if evaluation.sequence_networks is not None:
+        rows.append(("as one, networks", evaluation.sequence_networks))
     if evaluation.sequence is not None:
         rows.append(("sequence as one", evaluation.sequence))
     rows += [(f"audit: {name}", metrics) for name, metrics in evaluation.audit.items()]

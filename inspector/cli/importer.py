@@ -63,8 +63,9 @@ def import_folder(found: Recognised) -> None:
     """
     from rich.console import Console
 
-    from calibnet.cascade import Cascade, spread
+    from calibnet.cascade import Cascade
     from calibnet.datasets import open_sequence
+    from calibnet.drive import spread
     from calibnet.geometry import MiscalibrationRange
     from inspector.contents import Contents, Detail
     from inspector.outputs import Outputs

@@ -18,7 +18,7 @@ import yaml
 from calibnet.datasets import Frame, Sequence
 from calibnet.geometry import RANGES, invert, miscalibration
 from calibnet.geometry.se3 import Matrix
-from calibnet.sequence_estimate import SequenceEstimate
+from calibnet.sequence_estimate import Estimate, SequenceEstimate
 from calibnet.trace import CascadeTrace, StageTrace
 from inspector.cli.errors import run
 from inspector.cli.main import cli
@@ -49,7 +49,9 @@ class KnownCascade:
     def calibrate_sequence(
         self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
     ) -> SequenceEstimate:
-        return SequenceEstimate(miscalibration([0, 0.25, 0], [0, 0, 0]) @ CAMERA_FROM_LIDAR, np.eye(6), len(frames))
+        networks = Estimate(miscalibration([0, 0.5, 0], [0, 0, 0]) @ CAMERA_FROM_LIDAR, np.eye(6), len(frames))
+        found = miscalibration([0, 0.25, 0], [0, 0, 0]) @ CAMERA_FROM_LIDAR
+        return SequenceEstimate(found, np.eye(6), len(frames), networks=networks)
 
 
 @pytest.fixture(autouse=True)
@@ -92,6 +94,7 @@ def test_folder_to_table_and_json(rig: Path, tmp_path: Path, capsys: pytest.Capt
     assert [stage["range"] for stage in content["stages"]] == ["5/0.5", "2/0.2", "1/0.1"]
     assert content["stages"][0]["rotation_deg"]["yaw"] == pytest.approx(1.0)
     assert content["sequence"]["rotation_deg"]["pitch"] == pytest.approx(0.25)
+    assert content["sequence_networks"]["rotation_deg"]["pitch"] == pytest.approx(0.5)
     assert content["references"]["no correction"] == content["initial"]
     assert set(content["references"]) == {"no correction", "edge alignment"}
     assert "audit" not in content
@@ -101,6 +104,7 @@ def test_folder_to_table_and_json(rig: Path, tmp_path: Path, capsys: pytest.Capt
     rows = [line.split()[:2] for line in printed.splitlines() if line.strip().startswith(("initial", "stage"))]
     assert [row[0] for row in rows[:4]] == ["initial", "stage", "stage", "stage"]
     assert "edge alignment" in printed and "sequence as one" in printed
+    assert "as one, networks" in printed
     assert "100.0%" in printed  # within 2 degrees and 5 cm
     assert max(len(line) for line in printed.splitlines()[1:]) <= 80
     assert list(tmp_path.glob("new/*")) == [out]

@@ -10,17 +10,17 @@ from calibnet.errors import CalibrationError
 from calibnet.evaluation.drives import evaluate_drives, shares_mount
 from calibnet.geometry import MiscalibrationRange, miscalibration, pose_error
 from calibnet.geometry.se3 import Matrix
-from calibnet.sequence_estimate import SequenceEstimate
+from calibnet.sequence_estimate import Estimate, SequenceEstimate
 from tests.evaluation.drive import REFERENCE, Drive
 
 BOUNDS = MiscalibrationRange(5, 0.5)
 
 
 class Solver:
-    """Ends half a degree of yaw beside the truth, or fails."""
+    """Ends half a degree of yaw beside the truth, its networks thrice as far if it aligns; or fails."""
 
-    def __init__(self, fails: bool = False) -> None:
-        self.fails, self.initials = fails, list[Matrix]()
+    def __init__(self, fails: bool = False, aligns: bool = True) -> None:
+        self.fails, self.aligns, self.initials = fails, aligns, list[Matrix]()
 
     def calibrate_sequence(
         self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
@@ -30,14 +30,17 @@ class Solver:
             raise CalibrationError("no frame")
         if observer is not None:
             observer(0, len(frames))
-        return SequenceEstimate(miscalibration([0, 0, 0.5], [0, 0, 0]) @ REFERENCE, np.eye(6), len(frames))
+        networks = Estimate(miscalibration([0, 0, 1.5], [0, 0, 0]) @ REFERENCE, np.eye(6), len(frames))
+        found = miscalibration([0, 0, 0.5], [0, 0, 0]) @ REFERENCE
+        return SequenceEstimate(found, np.eye(6), len(frames), networks=networks if self.aligns else None)
 
 
 def test_every_drive_is_solved_from_every_miscalibration() -> None:
     solver, told = Solver(), []
     drives: list[Sequence] = [Drive([0, 1, 2]), Drive([0, 1], "other")]
     metrics = evaluate_drives(solver, drives, BOUNDS, 3, 7, lambda *seen: told.append(seen))
-    assert metrics is not None and metrics.rotation_deg.yaw == pytest.approx(0.5)
+    assert metrics is not None and metrics.estimate.rotation_deg.yaw == pytest.approx(0.5)
+    assert metrics.networks.rotation_deg.yaw == pytest.approx(1.5)
     assert len({initial.tobytes() for initial in solver.initials}) == 6
     assert told == [("test/drive", 0, 3)] * 3 + [("other", 0, 2)] * 3
     again = Solver()
@@ -49,7 +52,13 @@ def test_a_drive_that_cannot_be_solved_keeps_its_initial_error() -> None:
     solver = Solver(fails=True)
     metrics = evaluate_drives(solver, [Drive([0, 1])], BOUNDS, 1, 0)
     assert metrics is not None
-    assert metrics.rotation_deg.mean == pytest.approx(pose_error(solver.initials[0], REFERENCE).rotation_deg)
+    for either in (metrics.estimate, metrics.networks):
+        assert either.rotation_deg.mean == pytest.approx(pose_error(solver.initials[0], REFERENCE).rotation_deg)
+
+
+def test_networks_that_nothing_is_aligned_after_are_the_estimate() -> None:
+    metrics = evaluate_drives(Solver(aligns=False), [Drive([0, 1])], BOUNDS, 1, 0)
+    assert metrics is not None and metrics.networks == metrics.estimate
 
 
 def test_frames_of_several_mounts_are_no_drive() -> None:

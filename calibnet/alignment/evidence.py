@@ -1,0 +1,202 @@
+"""What one frame has to say of its extrinsic, without training.
+
+Depth edges: after Levinson & Thrun, "Automatic online calibration of cameras and lasers" (2013), points behind
+which the scene falls away belong onto edges of the picture. Edges of reflectance (road markings, signs, plates)
+likewise. Reflectance as a whole: after Pandey et al., "Automatic targetless extrinsic calibration" (2012), and
+Koide et al., "General, single-shot, target-less" (2023), it tells most of the picture's brightness where it fits,
+measured by the normalised information distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.alignment.pull import Map
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import PinholeCamera, project
+from calibnet.geometry.projection import nearest_per_cell
+from calibnet.geometry.se3 import Matrix
+from calibnet.network.inputs import input_camera, resize_image
+
+HEIGHT, WIDTH = 320, 1024
+"""Size of the picture that is looked at, in area; all pixels below are its own."""
+BLUR = 2.0
+"""Pixels by which edges are blurred: as far as they pull, and finer than the cells of the networks."""
+BRIGHTNESS_BLUR = 2.5
+"""Pixels by which the brightness is that reflectance is compared with: what is finer makes the way there rough."""
+SURROUNDINGS = 61
+"""Pixels, a side, of the square that an edge's contrast is relative to."""
+FAINTEST, SHARPEST = 8.0, 4.0
+"""Contrast of surroundings without any, in grey levels; and how many times theirs an edge counts at most."""
+DEPTH_REACH, REFLECTANCE_REACH = 3, 6
+"""Pixels to either side in which the neighbours of a point are looked for."""
+JUMP_METRES, JUMP_SHARE = 0.5, 0.1
+"""A point is at a depth edge where a neighbour lies farther by both, the second a share of its depth."""
+REFLECTANCE_JUMP = 0.3
+"""A point is at an edge of reflectance where a neighbour is darker than it by this share of the scan."""
+FEWEST_POINTS = 30
+MOST_POINTS = 2000
+"""Of a term; more are thinned out evenly."""
+BINS = 16
+INFORMATION_WEIGHT = 10.0
+"""Of the information distance, beside the two kinds of edges, which are means over points."""
+
+
+class Edges:
+    """Points at edges of the scan on the edges of a picture."""
+
+    def __init__(self, edges: Map, points: NDArray[np.float32]) -> None:
+        self.edges, self.points = edges, points
+
+    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+        """Minus the mean strength of the edges that the points fall onto, and its gradient ``[6]``."""
+        sampled, count = self.edges.under(self.points, correction), len(self.points)
+        return -float(sampled.values.mean()), sampled.gradient(-1.0 / count, correction[:3, 3])
+
+
+class Reflectance:
+    """Points' reflectance and the picture's brightness: how little each tells of the other."""
+
+    def __init__(self, brightness: Map, points: NDArray[np.float32], reflectance: NDArray[np.float64]) -> None:
+        """Brightness and ``reflectance [N]`` of ``points [N, 3]``, both 0..1 and about evenly spread over that."""
+        self.brightness, self.points = brightness, points
+        self.row, self.into_row = bins(reflectance)
+
+    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+        """Normalised information distance of the joint histogram, weighted, and its gradient ``[6]``."""
+        sampled, count = self.brightness.under(self.points, correction), len(self.points)
+        column, into_column = bins(sampled.values)
+        joint = np.zeros(BINS * BINS)
+        for right, share in ((0, 1 - into_column), (1, into_column)):
+            for down, part in ((0, 1 - self.into_row), (1, self.into_row)):
+                joint += np.bincount((column + right) * BINS + self.row + down, share * part, BINS * BINS)
+        distance, slope = information_distance(joint.reshape(BINS, BINS) / count)
+        steps = slope[1:] - slope[:-1]  # when a point's brightness goes from one bin to the next
+        change = steps[column, self.row] * (1 - self.into_row) + steps[column, self.row + 1] * self.into_row
+        weights = INFORMATION_WEIGHT * change * (BINS - 1) / count
+        return INFORMATION_WEIGHT * distance, sampled.gradient(weights, correction[:3, 3])
+
+
+def bins(levels: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """The lower one of the two bins that each level 0..1 is shared between, and the upper one's share."""
+    position = levels.clip(0.0, 1.0) * (BINS - 1)
+    lower = np.minimum(position.astype(np.int64), BINS - 2)
+    return lower, position - lower
+
+
+def information_distance(joint: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """``(H(x, y) - I(x; y)) / H(x, y)`` of a joint distribution, 0 (each tells the other) to 1, and its derivative."""
+    log_joint = np.log(np.maximum(joint, 1e-12))
+    x, y = joint.sum(1, keepdims=True), joint.sum(0, keepdims=True)
+    log_x, log_y = np.log(np.maximum(x, 1e-12)), np.log(np.maximum(y, 1e-12))
+    together = -float((joint * log_joint).sum())
+    if together < 1e-6:
+        return 1.0, np.zeros_like(joint)  # everything in one bin tells nothing
+    apart = -float((x * log_x).sum() + (y * log_y).sum())
+    slope_of_together, slope_of_apart = -(log_joint + 1), -(log_x + log_y + 2)
+    return 2 - apart / together, (apart * slope_of_together - together * slope_of_apart) / together**2
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The terms of one frame; their sum is smallest where they find that picture and scan fit best."""
+
+    terms: tuple[Edges | Reflectance, ...]
+
+    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+        """Sum and gradient ``[6]`` by ``(translation m, rotation rad)`` for a correction, 4x4."""
+        value, gradient = 0.0, np.zeros(6)
+        for term in self.terms:
+            more, slope = term(correction)
+            value, gradient = value + more, gradient + slope
+        return value, gradient
+
+
+def gather(frame: Frame, camera_from_lidar: Matrix) -> Evidence:
+    """Find a frame's edges; what it does not have, nor a scan without reflectance, is left out.
+
+    Args:
+        frame: image, scan and camera; its own extrinsic is not looked at.
+        camera_from_lidar: 4x4, that corrections will be relative to.
+    """
+    import cv2
+
+    camera = input_camera(frame.camera, HEIGHT, WIDTH, 1)
+    grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
+    across, any_way = picture_edges(grey, camera)
+    projection = project(frame.points, camera_from_lidar, camera)
+    winner = nearest_per_cell(projection, camera)
+    rank = ranks(frame.points[projection.index, 3])
+    at_depth, at_reflectance = scan_edges(winner, projection.depth, rank)
+    terms: list[Edges | Reflectance] = []
+    for edges, mask in ((across, at_depth), (any_way, at_reflectance)):
+        if mask.sum() >= FEWEST_POINTS:
+            terms.append(Edges(edges, projection.points[thinned(winner[mask])]))
+    some = thinned(winner[winner >= 0])
+    if len(some) >= FEWEST_POINTS and np.ptp(rank[some]) > 0:
+        brightness = Map(blurred(cv2.equalizeHist(grey) / np.float32(255), BRIGHTNESS_BLUR), camera)
+        terms.append(Reflectance(brightness, projection.points[some], rank[some]))
+    return Evidence(tuple(terms))
+
+
+def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
+    """Strength of edges relative to their surroundings, ``[H, W]``: of those across the rows, and of all.
+
+    A scan's rows run along the picture's, so depth that jumps along them should meet an edge across.
+    """
+    import cv2
+
+    smooth = blurred(grey, BLUR / 2)
+    along_x, along_y = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy) for dx, dy in ((1, 0), (0, 1)))
+    contrast = np.hypot(along_x, along_y)
+    usual = cv2.blur(contrast, (SURROUNDINGS, SURROUNDINGS)) + FAINTEST
+
+    def strength(contrast: NDArray[np.float32]) -> Map:
+        return Map(blurred(np.minimum(contrast / usual, SHARPEST), BLUR), camera)
+
+    return strength(np.abs(along_x)), strength(contrast)
+
+
+def blurred(image: NDArray[np.floating] | NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
+    """By a Gaussian of so many pixels."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma), np.float32)
+
+
+def scan_edges(
+    winner: NDArray[np.int64], depth: NDArray[np.float32], rank: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Pixels ``[H, W]`` with a point beside which depth falls away, and with one beside which only reflectance does.
+
+    Args:
+        winner: ``[H, W]``, the point seen at each pixel, or -1.
+        depth: ``[M]`` of the points, metres.
+        rank: ``[M]`` of their reflectance, 0..1.
+    """
+    import cv2
+
+    hit = winner >= 0
+    near = np.append(depth, np.float32(0))[winner]
+    bright = np.append(rank, 2.0)[winner].astype(np.float32)
+
+    def row(reach: int) -> NDArray[np.uint8]:
+        return np.ones((1, 2 * reach + 1), np.uint8)
+
+    at_depth = hit & (cv2.dilate(near, row(DEPTH_REACH)) - near > np.maximum(JUMP_METRES, JUMP_SHARE * near))
+    darkest, farthest = cv2.erode(bright, row(REFLECTANCE_REACH)), cv2.dilate(near, row(REFLECTANCE_REACH))
+    flat = farthest - near < np.maximum(JUMP_METRES, JUMP_SHARE * near)
+    return at_depth, hit & flat & (bright - darkest > REFLECTANCE_JUMP)
+
+
+def thinned(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """At most `MOST_POINTS` of them, evenly from all over the picture."""
+    return rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64)]
+
+
+def ranks(values: NDArray[np.float32]) -> NDArray[np.float64]:
+    """The share of values that are smaller than each: every sensor has another scale of reflectance."""
+    return np.searchsorted(np.sort(values), values) / max(len(values), 1)
