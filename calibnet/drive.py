@@ -51,7 +51,14 @@ def solve_drive(
     initial: Matrix,
     observer: Callable[[int, int], None] | None = None,
 ) -> SequenceEstimate:
-    """See `calibnet.cascade.Cascade.calibrate_sequence`; ``stages`` coarse to fine, each with its range."""
+    """Correct the extrinsic that all frames share.
+
+    Args:
+        stages: coarse to fine, each with its range.
+        frames: see `calibnet.cascade.Cascade.calibrate_sequence`, as for the other arguments and errors.
+        initial: ``camera_from_lidar``, 4x4.
+        observer: called before each frame with the number of frames read and to be read.
+    """
     if not len(frames):
         raise ValueError("There are no frames to calibrate.")
     some, everything = spread(len(frames), FRAMES_UNTIL_LAST_PASS), list(range(len(frames)))
@@ -68,36 +75,50 @@ def solve_drive(
             extrinsic = agree(bounds, stage, read, some, extrinsic).estimate().camera_from_lidar
 
     bounds, last = stages[-1]
-    aligned, aligns = set(spread(len(everything), FRAMES_ALIGNED)), bounds == RANGES[-1]
-    evidence: list[Evidence] = []
-    history: list[tuple[int, Estimate]] = []
-    latest = 0
-
-    def estimate(consensus: Consensus) -> Estimate:
-        if not aligns:
-            return consensus.estimate()
-        return consensus.aligned(evidence, history[-1][1] if history else None)
-
-    def note(position: int, frame: Frame, consensus: Consensus) -> None:
-        nonlocal latest
-        latest = frame.index
-        if position in aligned:
-            if aligns:  # edges pull no farther than what the finest stage leaves
-                evidence.append(gather(frame, consensus.before))
-            history.append((frame.index, estimate(consensus)))
-
-    consensus = agree(bounds, last, read, everything, extrinsic, note)
-    if not history or history[-1][1].frames < len(consensus):  # frames at the end could not be calibrated
-        history.append((latest, estimate(consensus)))
-    final = history[-1][1]
+    curve = Curve(len(everything), aligns=bounds == RANGES[-1])
+    consensus = agree(bounds, last, read, everything, extrinsic, curve.note)
+    estimate = curve.end(consensus)
     return SequenceEstimate(
-        final.camera_from_lidar,
-        final.covariance,
-        final.frames,
-        tuple(history),
+        estimate.camera_from_lidar,
+        estimate.covariance,
+        estimate.frames,
+        tuple(curve.points),
         skipped=len(everything) - len(consensus),
-        networks=consensus.estimate() if aligns else None,
+        networks=consensus.estimate() if curve.aligns else None,
     )
+
+
+class Curve:
+    """The estimate after more and more frames of the last pass.
+
+    Attributes:
+        aligns: whether edges are aligned; they pull no farther than what the finest stage leaves.
+        points: index of a frame, and the estimate up to it.
+    """
+
+    def __init__(self, frames: int, aligns: bool) -> None:
+        self.aligns, self.points = aligns, list[tuple[int, Estimate]]()
+        self._positions, self._evidence = set(spread(frames, FRAMES_ALIGNED)), list[Evidence]()
+        self._latest = 0
+
+    def note(self, position: int, frame: Frame, consensus: Consensus) -> None:
+        """Take in one more frame, the last one of ``consensus``."""
+        self._latest = frame.index
+        if position in self._positions:
+            if self.aligns:
+                self._evidence.append(gather(frame, consensus.before))
+            self._add(consensus)
+
+    def end(self, consensus: Consensus) -> Estimate:
+        """The estimate of all frames; it is the last point of the curve."""
+        if not self.points or self.points[-1][1].frames < len(consensus):  # the frames at the end failed
+            self._add(consensus)
+        return self.points[-1][1]
+
+    def _add(self, consensus: Consensus) -> None:
+        earlier = self.points[-1][1] if self.points else None
+        estimate = consensus.aligned(self._evidence, earlier) if self.aligns else consensus.estimate()
+        self.points.append((self._latest, estimate))
 
 
 def agree(

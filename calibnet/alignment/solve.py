@@ -11,7 +11,8 @@ from calibnet.alignment.evidence import Evidence
 from calibnet.geometry.se3 import pose_from_vector
 
 FIRMNESS = 15.0
-"""Of a frame's evidence, beside the squared standard deviations (halved) of what is known already."""
+"""Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are as
+large as the covariance says (docs/training.md)."""
 MOST_ITERATIONS = 40
 SPREAD = 0.5
 """Standard deviations to either side over which the curvature is measured: edges are rough at closer range."""
