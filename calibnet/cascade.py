@@ -16,7 +16,7 @@ from calibnet.clock import Clock
 from calibnet.datasets.frame import Frame
 from calibnet.drive import Frames, solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest
 from calibnet.image_views import View, image_branches, image_views
 from calibnet.network.config import load_preset
 from calibnet.network.displacement import expected_error
@@ -139,7 +139,7 @@ class Cascade:
         Each stage corrects what all frames together make of it, and again on the scans projected anew. Until the
         end some frames from all over the drive are enough; the last pass sees them all. What the finest stage leaves
         is aligned without training (`calibnet.alignment`) on some frames from all over the drive.
-        Memory does not grow with the drive.
+        One frame is in memory at a time, and 4 MB of each that is aligned.
 
         Args:
             frames: of one camera and LiDAR on one mount; read once in the last pass, some of them before.
@@ -206,4 +206,4 @@ def match_error_limit(stage: Stage) -> float:
 
     Only the finest stage judges: the others' matches are coarse anyway, and the next stage looks again.
     """
-    return stage.network.config.largest_match_error if stage.range == RANGES[-1] else math.inf
+    return stage.network.config.largest_match_error if is_finest(stage.range) else math.inf

@@ -9,12 +9,13 @@ from typing import Protocol
 import numpy as np
 
 from calibnet.alignment import Evidence, gather
+from calibnet.consensus import Consensus
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
-from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.se3 import Matrix
 from calibnet.network.pose import prior_information
-from calibnet.sequence_estimate import Consensus, Estimate, SequenceEstimate
+from calibnet.sequence_estimate import Estimate, SequenceEstimate
 from calibnet.trace import CascadeTrace
 
 FRAMES_UNTIL_LAST_PASS = 24
@@ -22,7 +23,9 @@ FRAMES_UNTIL_LAST_PASS = 24
 PASSES = 2
 """Times that each stage corrects a sequence, on scans projected anew; the last one does so once more in the end."""
 FRAMES_ALIGNED = 24
-"""Frames, spread over the drive, whose edges are aligned; the estimate's curve has a point after each."""
+"""Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
+CURVE_POINTS = 12
+"""Of the curve that shows how an estimate converges over a drive."""
 
 
 class Frames(Protocol):
@@ -75,7 +78,7 @@ def solve_drive(
             extrinsic = agree(bounds, stage, read, some, extrinsic).estimate().camera_from_lidar
 
     bounds, last = stages[-1]
-    curve = Curve(len(everything), aligns=bounds == RANGES[-1])
+    curve = Curve(len(everything), is_finest(bounds))
     consensus = agree(bounds, last, read, everything, extrinsic, curve.note)
     estimate = curve.end(consensus)
     return SequenceEstimate(
@@ -98,27 +101,43 @@ class Curve:
 
     def __init__(self, frames: int, aligns: bool) -> None:
         self.aligns, self.points = aligns, list[tuple[int, Estimate]]()
-        self._positions, self._evidence = set(spread(frames, FRAMES_ALIGNED)), list[Evidence]()
+        self._evidence = list[Evidence]()
+        self._to_align, self._to_note = spread(frames, FRAMES_ALIGNED), spread(frames, CURVE_POINTS)
         self._latest = 0
 
     def note(self, position: int, frame: Frame, consensus: Consensus) -> None:
         """Take in one more frame, the last one of ``consensus``."""
         self._latest = frame.index
-        if position in self._positions:
-            if self.aligns:
-                self._evidence.append(gather(frame, consensus.before))
-            self._add(consensus)
+        if self.aligns and due(self._to_align, position):
+            self._evidence.append(gather(frame, consensus.before))
+        if due(self._to_note, position):
+            self.points.append((frame.index, self._estimate(consensus, self._earlier)))
 
     def end(self, consensus: Consensus) -> Estimate:
         """The estimate of all frames; it is the last point of the curve."""
-        if not self.points or self.points[-1][1].frames < len(consensus):  # the frames at the end failed
-            self._add(consensus)
-        return self.points[-1][1]
+        final = self._estimate(consensus, [consensus.estimate(), *self._earlier])
+        if self.points and self.points[-1][0] == self._latest:
+            self.points.pop()
+        self.points.append((self._latest, final))
+        return final
 
-    def _add(self, consensus: Consensus) -> None:
-        earlier = self.points[-1][1] if self.points else None
-        estimate = consensus.aligned(self._evidence, earlier) if self.aligns else consensus.estimate()
-        self.points.append((self._latest, estimate))
+    @property
+    def _earlier(self) -> list[Estimate]:
+        return [estimate for _, estimate in self.points[-1:]]
+
+    def _estimate(self, consensus: Consensus, starts: list[Estimate]) -> Estimate:
+        return consensus.aligned(self._evidence, starts) if self.aligns else consensus.estimate()
+
+
+def due(positions: list[int], position: int) -> bool:
+    """Whether one of the sorted ``positions`` is reached; if so, those up to it are done.
+
+    A frame that fails is made up for by the next one that does not.
+    """
+    reached = bool(positions) and positions[0] <= position
+    while positions and positions[0] <= position:
+        positions.pop(0)
+    return reached
 
 
 def agree(

@@ -12,7 +12,7 @@ from torch import Tensor
 from calibnet.alignment import Evidence
 from calibnet.cascade import Cascade, SkippedStage, Stage
 from calibnet.datasets.frame import Frame
-from calibnet.drive import PASSES
+from calibnet.drive import PASSES, due
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, pose_error, project, scaled
 from calibnet.network.features import FeatureExtractor
@@ -406,6 +406,7 @@ def test_edges_are_aligned_after_the_finest_stage_only(frame: Frame) -> None:
 
 def test_a_long_drive_notes_the_estimate_down_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("calibnet.drive.FRAMES_ALIGNED", 2)
+    monkeypatch.setattr("calibnet.drive.CURVE_POINTS", 2)
     gathered: list[int] = []
     monkeypatch.setattr("calibnet.drive.gather", lambda frame, _: gathered.append(frame.index) or Evidence(()))
     estimate = cascade((5,)).calibrate_sequence(Drive(5), INITIAL)
@@ -415,10 +416,16 @@ def test_a_long_drive_notes_the_estimate_down_now_and_then(monkeypatch: pytest.M
 
 
 def test_the_curve_of_a_drive_ends_at_its_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("calibnet.drive.FRAMES_ALIGNED", 2)
+    monkeypatch.setattr("calibnet.drive.CURVE_POINTS", 2)
     estimate = cascade((5,)).calibrate_sequence(Drive(4, blind=frozenset({3})), INITIAL)
     assert [(frame, then.frames) for frame, then in estimate.history] == [(11, 2), (12, 3)]
     np.testing.assert_array_equal(estimate.history[-1][1].camera_from_lidar, estimate.camera_from_lidar)
+
+
+def test_frames_that_fail_are_made_up_for_by_the_next() -> None:
+    positions = [1, 3, 4]
+    assert [due(positions, position) for position in (0, 2, 3, 5)] == [False, True, True, True]
+    assert positions == []
 
 
 def test_a_drive_without_a_usable_frame_is_an_error() -> None:

@@ -5,7 +5,7 @@ pictures themselves knows nothing of any training, so that together they come cl
 farther than some pixels: a drive has to be corrected by the cascade first.
 """
 
-from calibnet.alignment.evidence import Evidence, gather
+from calibnet.alignment.evidence import Evidence, gather, picture_camera
 from calibnet.alignment.solve import align
 
-__all__ = ["Evidence", "align", "gather"]
+__all__ = ["Evidence", "align", "gather", "picture_camera"]

@@ -9,8 +9,10 @@ measured by the normalised information distance.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,15 +31,16 @@ BRIGHTNESS_BLUR = 2.5
 """Pixels by which the brightness is that reflectance is compared with: what is finer makes the way there rough."""
 SURROUNDINGS = 61
 """Pixels, a side, of the square that an edge's contrast is relative to."""
-FAINTEST, SHARPEST = 8.0, 4.0
-"""Contrast of surroundings without any, in grey levels; and how many times theirs an edge counts at most."""
+FAINTEST, SHARPEST = 1.0, 4.0
+"""Contrast of surroundings without any, in grey levels a pixel; and how many times theirs an edge counts at most."""
 DEPTH_REACH, REFLECTANCE_REACH = 3, 6
 """Pixels to either side in which the neighbours of a point are looked for."""
 JUMP_METRES, JUMP_SHARE = 0.5, 0.1
-"""A point is at a depth edge where a neighbour lies farther by both, the second a share of its depth."""
+"""Neighbours are on another surface where their depth differs by both, the second a share of the depth."""
 REFLECTANCE_JUMP = 0.3
 """A point is at an edge of reflectance where a neighbour is darker than it by this share of the scan."""
-FEWEST_POINTS = 30
+FEWEST_POINTS, ENOUGH_POINTS = 30, 100
+"""Of a term: with fewer it is left out; and up to so many it counts by their share."""
 MOST_POINTS = 2000
 """Of a term; more are thinned out evenly."""
 BINS = 16
@@ -50,11 +53,13 @@ class Edges:
 
     def __init__(self, edges: Map, points: NDArray[np.float32]) -> None:
         self.edges, self.points = edges, points
+        self.weight = min(1.0, len(points) / ENOUGH_POINTS)
 
     def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
-        """Minus the mean strength of the edges that the points fall onto, and its gradient ``[6]``."""
-        sampled, count = self.edges.under(self.points, correction), len(self.points)
-        return -float(sampled.values.mean()), sampled.gradient(-1.0 / count, correction[:3, 3])
+        """Minus the mean strength of the edges that the points fall onto, weighted, and its gradient ``[6]``."""
+        sampled = self.edges.under(self.points, correction)
+        gradient = sampled.gradient(-self.weight / len(self.points), correction[:3, 3])
+        return -self.weight * float(sampled.values.mean()), gradient
 
 
 class Reflectance:
@@ -100,14 +105,20 @@ def information_distance(joint: NDArray[np.float64]) -> tuple[float, NDArray[np.
     return 2 - apart / together, (apart * slope_of_together - together * slope_of_apart) / together**2
 
 
+Term = Callable[[Matrix], tuple[float, NDArray[np.float64]]]
+
+
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """The terms of one frame; their sum is smallest where they find that picture and scan fit best."""
 
-    terms: tuple[Edges | Reflectance, ...]
+    terms: tuple[Term, ...]
 
     def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
-        """Sum and gradient ``[6]`` by ``(translation m, rotation rad)`` for a correction, 4x4."""
+        """Sum for a correction, 4x4, and gradient ``[6]`` by a further motion ``(translation m, rotation rad)``.
+
+        The motion comes after the correction and turns about where that has put the LiDAR's frame.
+        """
         value, gradient = 0.0, np.zeros(6)
         for term in self.terms:
             more, slope = term(correction)
@@ -116,22 +127,20 @@ class Evidence:
 
 
 def gather(frame: Frame, camera_from_lidar: Matrix) -> Evidence:
-    """Find a frame's edges; what it does not have, nor a scan without reflectance, is left out.
+    """Find a frame's edges; a kind with too few points is left out, and reflectance where a scan has none.
 
     Args:
         frame: image, scan and camera; its own extrinsic is not looked at.
         camera_from_lidar: 4x4, that corrections will be relative to.
     """
-    import cv2
-
-    camera = input_camera(frame.camera, HEIGHT, WIDTH, 1)
+    camera = picture_camera(frame.camera)
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
     across, any_way = picture_edges(grey, camera)
     projection = project(frame.points, camera_from_lidar, camera)
     winner = nearest_per_cell(projection, camera)
     rank = ranks(frame.points[projection.index, 3])
     at_depth, at_reflectance = scan_edges(winner, projection.depth, rank)
-    terms: list[Edges | Reflectance] = []
+    terms: list[Term] = []
     for edges, mask in ((across, at_depth), (any_way, at_reflectance)):
         if mask.sum() >= FEWEST_POINTS:
             terms.append(Edges(edges, projection.points[thinned(winner[mask])]))
@@ -142,15 +151,18 @@ def gather(frame: Frame, camera_from_lidar: Matrix) -> Evidence:
     return Evidence(tuple(terms))
 
 
+def picture_camera(camera: PinholeCamera) -> PinholeCamera:
+    """The camera of the picture that is looked at."""
+    return input_camera(camera, HEIGHT, WIDTH, 1)
+
+
 def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
     """Strength of edges relative to their surroundings, ``[H, W]``: of those across the rows, and of all.
 
     A scan's rows run along the picture's, so depth that jumps along them should meet an edge across.
     """
-    import cv2
-
     smooth = blurred(grey, BLUR / 2)
-    along_x, along_y = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy) for dx, dy in ((1, 0), (0, 1)))
+    along_x, along_y = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1)))
     contrast = np.hypot(along_x, along_y)
     usual = cv2.blur(contrast, (SURROUNDINGS, SURROUNDINGS)) + FAINTEST
 
@@ -162,8 +174,6 @@ def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, 
 
 def blurred(image: NDArray[np.floating] | NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
     """By a Gaussian of so many pixels."""
-    import cv2
-
     return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma), np.float32)
 
 
@@ -177,8 +187,6 @@ def scan_edges(
         depth: ``[M]`` of the points, metres.
         rank: ``[M]`` of their reflectance, 0..1.
     """
-    import cv2
-
     hit = winner >= 0
     near = np.append(depth, np.float32(0))[winner]
     bright = np.append(rank, 2.0)[winner].astype(np.float32)
@@ -186,10 +194,12 @@ def scan_edges(
     def row(reach: int) -> NDArray[np.uint8]:
         return np.ones((1, 2 * reach + 1), np.uint8)
 
-    at_depth = hit & (cv2.dilate(near, row(DEPTH_REACH)) - near > np.maximum(JUMP_METRES, JUMP_SHARE * near))
-    darkest, farthest = cv2.erode(bright, row(REFLECTANCE_REACH)), cv2.dilate(near, row(REFLECTANCE_REACH))
-    flat = farthest - near < np.maximum(JUMP_METRES, JUMP_SHARE * near)
-    return at_depth, hit & flat & (bright - darkest > REFLECTANCE_JUMP)
+    jump = np.maximum(JUMP_METRES, JUMP_SHARE * near)
+    at_depth = hit & (cv2.dilate(near, row(DEPTH_REACH)) - near > jump)
+    around = row(REFLECTANCE_REACH)
+    farthest, nearest = cv2.dilate(near, around), cv2.erode(np.where(hit, near, np.float32(np.inf)), around)
+    one_surface = (farthest - near < jump) & (near - nearest < jump)
+    return at_depth, hit & one_surface & (bright - cv2.erode(bright, around) > REFLECTANCE_JUMP)
 
 
 def thinned(rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +13,8 @@ from calibnet.geometry.se3 import Matrix, transform_points
 
 NEAREST = 0.1
 """Metres that a point may come to the camera; also those behind it are taken to be there."""
+NEIGHBOURS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], np.float32)
+"""Pixels from a point at which the map is read: there for the value, around for its slopes."""
 
 
 class Sampled(NamedTuple):
@@ -28,7 +31,7 @@ class Sampled(NamedTuple):
     points: NDArray[np.float32]
 
     def gradient(self, weights: NDArray[np.float64] | float, pivot: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the values' weighted sum by ``(translation m, rotation rad)``: the sum of forces, and of their torques.
+        """Of the values' weighted sum by a motion ``(translation m, rotation rad)``: forces and torques, summed up.
 
         Args:
             weights: ``[N]``, or one for all.
@@ -43,25 +46,20 @@ class Map:
 
     def __init__(self, image: NDArray[np.float32], camera: PinholeCamera) -> None:
         """``image [H, W]`` as seen by ``camera``; beyond its border it goes on as it is there."""
-        import cv2
-
-        slopes = [cv2.Sobel(image, cv2.CV_32F, dx, dy, ksize=3, scale=1 / 8) for dx, dy in ((1, 0), (0, 1))]
-        self.levels = np.ascontiguousarray(np.dstack([image, *slopes]))
-        self.camera = camera
+        self.image, self.camera = image, camera
 
     def under(self, points: NDArray[np.float32], correction: Matrix) -> Sampled:
         """Read it where ``points [N, 3]`` of the camera frame are seen after ``correction``, 4x4."""
-        import cv2
-
-        focal_u, focal_v = self.camera.matrix[0, 0], self.camera.matrix[1, 1]
+        (focal_u, skew, centre_u), (_, focal_v, centre_v), _ = self.camera.matrix
         moved = transform_points(correction, points).astype(np.float32, copy=False)
-        x, y = moved[:, 0], moved[:, 1]
-        inverse = 1 / np.maximum(moved[:, 2], NEAREST)
-        u = focal_u * x * inverse + self.camera.matrix[0, 2]
-        v = focal_v * y * inverse + self.camera.matrix[1, 2]
-        read = cv2.remap(
-            self.levels, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )
-        value, du, dv = read.reshape(-1, 3).T.astype(np.float64)
-        du, dv = focal_u * du * inverse, focal_v * dv * inverse
-        return Sampled(value, np.stack([du, dv, -(du * x + dv * y) * inverse], axis=1), moved)
+        x, y, z = moved.T
+        inverse = 1 / np.maximum(z, NEAREST)
+        u, v = (focal_u * x + skew * y) * inverse + centre_u, focal_v * y * inverse + centre_v
+        at_u, at_v = ((place + NEIGHBOURS[:, axis, None]).astype(np.float32) for axis, place in enumerate((u, v)))
+        read = cv2.remap(self.image, at_u, at_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        value, right, left, below, above = read.astype(np.float64)
+        along_u, along_v = (right - left) / 2, (below - above) / 2
+        along_x = focal_u * along_u * inverse
+        along_y = (skew * along_u + focal_v * along_v) * inverse
+        along_z = np.where(z > NEAREST, -(along_x * x + along_y * y) * inverse, 0.0)
+        return Sampled(value, np.stack([along_x, along_y, along_z], axis=1), moved)

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.alignment.evidence import Evidence
-from calibnet.geometry.se3 import pose_from_vector
+from calibnet.geometry.se3 import pose_from_vector, rotation_jacobian
 
 FIRMNESS = 15.0
-"""Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are as
-large as the covariance says (docs/training.md)."""
+"""Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are about
+as large as the covariance says (docs/training.md)."""
+MOST_FRAMES = 12
+"""That add up; more of them count as firmly as so many, since frames of one drive, and one camera, err alike."""
 MOST_ITERATIONS = 40
-SPREAD = 0.5
+STEP = 0.5
 """Standard deviations to either side over which the curvature is measured: edges are rough at closer range."""
 
 
@@ -22,7 +24,7 @@ def align(
     evidence: Sequence[Evidence],
     known: NDArray[np.float64],
     covariance: NDArray[np.float64],
-    start: NDArray[np.float64] | None = None,
+    starts: Sequence[NDArray[np.float64]] = (),
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the correction, and its covariance.
 
@@ -30,29 +32,33 @@ def align(
         evidence: of the frames, all relative to one extrinsic.
         known: ``[6]``, correction ``(translation m, rotation vector rad)`` that is most likely without it.
         covariance: ``[6, 6]`` of that.
-        start: ``[6]``, where to start; ``known`` by default.
+        starts: corrections ``[6]`` to start from, of which the best result is taken; ``known`` by default.
 
     Returns:
         The most likely correction ``[6]``, and its covariance ``[6, 6]``, from the curvature there.
     """
     from scipy.optimize import minimize
 
-    spread = np.linalg.cholesky(covariance)  # in units of standard deviations all parameters are alike
+    deviation = np.linalg.cholesky(covariance)  # in standard deviations all parameters are alike
+    firmness = FIRMNESS * min(1.0, MOST_FRAMES / max(1, len(evidence)))
 
     def cost(deviations: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        correction = pose_from_vector(known + spread @ deviations)
-        value, gradient = 0.5 * float(deviations @ deviations), np.zeros(6)
+        vector = known + deviation @ deviations
+        correction = pose_from_vector(vector)
+        value, gradient = 0.0, np.zeros(6)
         for frame in evidence:
             more, slope = frame(correction)
-            value, gradient = value + FIRMNESS * more, gradient + FIRMNESS * slope
-        return value, deviations + spread.T @ gradient
+            value, gradient = value + more, gradient + slope
+        gradient[3:] = rotation_jacobian(vector[3:]).T @ gradient[3:]  # of the vector instead of a further turn
+        return 0.5 * float(deviations @ deviations) + firmness * value, deviations + firmness * deviation.T @ gradient
 
-    first = np.zeros(6) if start is None else np.linalg.solve(spread, start - known)
-    options = {"maxiter": MOST_ITERATIONS, "gtol": 0.1}
-    found = minimize(cost, first, jac=True, method="BFGS", options=options).x
+    options = {"maxiter": MOST_ITERATIONS, "gtol": 0.05}
+    offsets = [np.linalg.solve(deviation, start - known) for start in starts or [known]]
+    results = [minimize(cost, offset, jac=True, method="BFGS", options=options) for offset in offsets]
+    found = min(results, key=lambda result: float(result.fun)).x
     curvature = np.empty((6, 6))
-    for axis, offset in enumerate(SPREAD * np.eye(6)):
-        curvature[axis] = (cost(found + offset)[1] - cost(found - offset)[1]) / (2 * SPREAD)
+    for axis, offset in enumerate(STEP * np.eye(6)):
+        curvature[axis] = (cost(found + offset)[1] - cost(found - offset)[1]) / (2 * STEP)
     values, axes = np.linalg.eigh((curvature + curvature.T) / 2)
-    firmer = spread @ axes / np.sqrt(np.maximum(values, 1.0))  # evidence never makes less firm
-    return known + spread @ found, firmer @ firmer.T
+    firmer = deviation @ axes / np.sqrt(np.maximum(values, 1.0))  # evidence never makes less firm
+    return known + deviation @ found, firmer @ firmer.T

@@ -21,10 +21,10 @@ FEWEST_FRAMES = 2
 
 @dataclass(frozen=True)
 class DriveMetrics:
-    """Errors of drives solved as one, and of what the networks alone made of them."""
+    """Errors of drives solved as one, and, where edges were aligned, of what the networks alone made of them."""
 
     estimate: Metrics
-    networks: Metrics
+    networks: Metrics | None
 
 
 class DriveCalibrator(Protocol):
@@ -58,7 +58,7 @@ def evaluate_drives(
     Returns:
         None where no sequence is a drive.
     """
-    errors, of_networks = [], []
+    errors, of_networks, aligned = [], [], False
     for number, sequence in enumerate(sequences):
         if not shares_mount(sequence):
             continue
@@ -74,9 +74,10 @@ def evaluate_drives(
             with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
                 solved = cascade.calibrate_sequence(sequence, estimate, told)
                 estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
+                aligned = aligned or solved.networks is not None
             errors.append(pose_error(estimate, reference))
             of_networks.append(pose_error(networks, reference))
-    return DriveMetrics(Metrics.of(errors), Metrics.of(of_networks)) if errors else None
+    return DriveMetrics(Metrics.of(errors), Metrics.of(of_networks) if aligned else None) if errors else None
 
 
 def shares_mount(sequence: Sequence) -> bool:

@@ -1,10 +1,13 @@
-"""A classical refinement without training, to hold the networks against: `calibnet.alignment` on single frames."""
+"""A classical refinement without training, to hold the networks against: `calibnet.alignment` on single frames.
+
+It starts where networks would, which is mostly farther than edges pull: that is what networks are for.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from calibnet.alignment import align, gather
+from calibnet.alignment import align, gather, picture_camera
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.se3 import Matrix, pose_from_vector
@@ -23,5 +26,5 @@ class EdgeAlignment:
     def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
         """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""
         found, _ = align([gather(frame, initial)], np.zeros(6), self.covariance)
-        change = pose_from_vector(found)
-        return CascadeTrace(initial, (StageTrace(1, self.bounds, frame.camera, initial, change @ initial, change),))
+        change, camera = pose_from_vector(found), picture_camera(frame.camera)
+        return CascadeTrace(initial, (StageTrace(1, self.bounds, camera, initial, change @ initial, change),))

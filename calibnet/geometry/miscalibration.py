@@ -46,6 +46,11 @@ RANGES: tuple[MiscalibrationRange, ...] = tuple(
 """The five ranges of the cascade (paper section 3.5), coarse to fine."""
 
 
+def is_finest(bounds: MiscalibrationRange) -> bool:
+    """Whether no stage comes after that of ``bounds``: only it can judge, and leaves pixels."""
+    return bounds == RANGES[-1]
+
+
 def miscalibration(roll_pitch_yaw_deg: ArrayLike, xyz_m: ArrayLike) -> Matrix:
     """The ``delta`` of given angles (degrees, about camera z, x, y) and offsets (metres)."""
     roll, pitch, yaw = np.radians(roll_pitch_yaw_deg)

@@ -71,6 +71,19 @@ def rotation_from_vector(vector: ArrayLike) -> Matrix:
     return rotation
 
 
+def rotation_jacobian(vector: ArrayLike) -> Matrix:
+    """``J [3, 3]`` of a rotation vector: turning by ``J d`` after ``vector`` is turning by ``vector + d``, d small."""
+    turn = np.asarray(vector, dtype=np.float64)
+    angle = float(np.linalg.norm(turn))
+    x, y, z = turn
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-4:  # where the fractions below lose their digits
+        return np.eye(3) + cross / 2
+    straight, bent = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    jacobian: Matrix = np.eye(3) + straight * cross + bent * cross @ cross
+    return jacobian
+
+
 def rotation_vector(rotation: NDArray[np.floating]) -> Matrix:
     """The vector, in radians, of ``rotation_from_vector`` (for angles below 180 degrees)."""
     axis = _sine_axis(rotation)

@@ -68,9 +68,9 @@ def evaluate(
     """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
 
     Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success
-    rates: for the initial error, a classical refinement (edges of depth onto edges of the image), after
-    each stage on single frames, and for every sequence solved as one: by the networks alone, and with its
-    edges aligned after them.
+    rates: for the initial error, a classical refinement (edges and reflectance of the scan onto the image's
+    edges and brightness), after each stage on single frames, and for every sequence solved as one: by the
+    networks alone and, after stage 5, with its edges aligned.
     """
     names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calibnet.alignment import evidence as module
 from calibnet.alignment import gather
 from calibnet.alignment.evidence import Edges, Reflectance, bins, information_distance, ranks, scan_edges
-from calibnet.geometry import miscalibration, project
+from calibnet.geometry import PinholeCamera, miscalibration, project
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.se3 import pose_from_vector
 from tests.alignment.boxes import BOXES, CAMERA, REFERENCE, boxes
@@ -63,6 +65,41 @@ def test_edges_of_the_scan_lie_at_the_boxes_sides() -> None:
     assert (projection.depth[winner[at_depth]] < 15).all(), "the near side of an edge, not the wall"
     assert at_reflectance.any() and not (at_depth & at_reflectance).any()
     assert (projection.depth[winner[at_reflectance]] > 15).all(), "beside a jump of depth another surface begins"
+
+
+def test_reflectance_beside_another_surface_is_no_edge() -> None:
+    """Bright wall behind a dark box: its points beside the box lie where the camera may see the box."""
+    depth = np.full((1, 40), 30.0, np.float32)
+    depth[0, 15:25] = 8.0
+    rank = np.where(depth < 10, 0.1, 0.9).astype(np.float64)
+    rank[0, 34:] = 0.1  # a mark on the wall itself
+    winner = np.arange(40)[None]
+    at_depth, at_reflectance = scan_edges(winner, depth[0], rank[0])
+    assert set(np.nonzero(at_depth)[1]) == {15, 16, 17, 22, 23, 24}
+    assert set(np.nonzero(at_reflectance)[1]) == {31, 32, 33}
+
+
+def test_few_points_count_by_their_share() -> None:
+    frame = boxes(depth_edges=False)
+    edges = gather(frame, REFERENCE).terms[0]
+    assert isinstance(edges, Edges)
+    few = Edges(edges.edges, edges.points[:: len(edges.points) // 50][:50])
+    assert (edges.weight, few.weight) == (1.0, 0.5)
+    value, gradient = few(np.eye(4))
+    few.weight = 1.0
+    np.testing.assert_allclose((2 * value, *(2 * gradient)), (few(np.eye(4))[0], *few(np.eye(4))[1]))
+
+
+@pytest.mark.parametrize("size", [(1, 64), (2, 2), (40, 1)])
+def test_pictures_of_any_size_and_spoilt_scans_are_taken(size: tuple[int, int]) -> None:
+    frame = boxes()
+    camera = PinholeCamera(size[1], size[0], np.array([[50.0, 0, size[1] / 2], [0, 50.0, size[0] / 2], [0, 0, 1]]))
+    points = frame.points.copy()
+    points[::7, 3], points[::11, 0] = np.nan, np.nan
+    value, gradient = gather(
+        replace(frame, image=np.zeros((*size, 3), np.uint8), camera=camera, points=points), REFERENCE
+    )(np.eye(4))
+    assert np.isfinite(value) and np.isfinite(gradient).all()
 
 
 def test_only_so_many_points_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,11 +2,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from calibnet.alignment import Evidence
+from calibnet.consensus import Consensus
 from calibnet.geometry import RANGES, miscalibration, pose_error
-from calibnet.geometry.se3 import rotation_angle, rotation_from_vector, rotation_vector
+from calibnet.geometry.se3 import (
+    Matrix,
+    pose_from_vector,
+    pose_vector,
+    rotation_angle,
+    rotation_from_vector,
+    rotation_jacobian,
+    rotation_vector,
+)
 from calibnet.network.pose import prior_information
-from calibnet.sequence_estimate import Consensus, Estimate
+from calibnet.sequence_estimate import Estimate
 from tests.inspector.fakes import REFERENCE
 
 PRIOR = np.diag(prior_information(RANGES[2]).double().numpy())
@@ -41,6 +52,13 @@ def test_rotation_vectors_are_inverted(angle: float) -> None:
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
     np.testing.assert_allclose(rotation_vector(rotation), vector, atol=1e-12)
     assert rotation_angle(rotation) == pytest.approx(angle, abs=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.3, 2.5])
+def test_rotation_jacobian_turns_changes_of_the_vector_into_turns(angle: float) -> None:
+    vector, change = angle * np.array([2.0, -1.0, 2.0]) / 3, 1e-5 * np.array([1.0, 2.0, -1.0])
+    turned = rotation_from_vector(rotation_jacobian(vector) @ change) @ rotation_from_vector(vector)
+    np.testing.assert_allclose(turned, rotation_from_vector(vector + change), atol=1e-9)
 
 
 def test_many_frames_are_better_than_one() -> None:
@@ -87,3 +105,39 @@ def test_heads_without_uncertainty_are_averaged_robustly() -> None:
 def test_no_frames_are_an_error() -> None:
     with pytest.raises(ValueError, match="no frame"):
         Consensus(REFERENCE, PRIOR).estimate()
+
+
+class Pull:
+    """Evidence that pulls towards a correction."""
+
+    def __init__(self, towards: NDArray[np.float64], firmness: float) -> None:
+        self.towards, self.firmness = towards, firmness / np.square([0.08] * 3 + [np.radians(0.12)] * 3)
+
+    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+        offset = pose_vector(correction) - self.towards
+        return 0.5 * float(offset @ (self.firmness * offset)), self.firmness * offset
+
+
+def test_evidence_moves_what_frames_agree_on() -> None:
+    consensus = drive(30)
+    agreed, towards = consensus.estimate(), pose_vector(TRUTH) + np.array([0.05, 0, 0, 0, 0.001, 0])
+    still = consensus.aligned([])
+    np.testing.assert_allclose(still.camera_from_lidar, agreed.camera_from_lidar, atol=1e-9)
+    common = np.diag(np.square([0.08] * 3 + [np.radians(0.12)] * 3))
+    np.testing.assert_allclose(still.covariance, agreed.covariance + common, rtol=1e-6)
+    firm = consensus.aligned([Evidence((Pull(towards, 10.0),))], [agreed, still])
+    target = pose_from_vector(towards) @ REFERENCE
+    assert pose_error(firm.camera_from_lidar, target).translation_cm < 0.5
+    assert pose_error(agreed.camera_from_lidar, target).translation_cm > 3
+    assert firm.translation_cm < 0.2 * still.translation_cm and firm.frames == 30
+
+
+def test_frames_that_scatter_too_far_are_not_aligned() -> None:
+    consensus = Consensus(REFERENCE, PRIOR)
+    for shift in (-3.0, -1.0, 1.0, 3.0):
+        correction = TRUTH.copy()
+        correction[0, 3] += shift
+        consensus.add(correction, None)
+    assert consensus.estimate().translation_cm > 30
+    pulled = consensus.aligned([Evidence((Pull(np.ones(6), 10.0),))])
+    np.testing.assert_allclose(pulled.camera_from_lidar, consensus.estimate().camera_from_lidar, atol=1e-6)
