@@ -13,7 +13,7 @@ from calibnet.geometry.se3 import pose_from_vector, rotation_jacobian
 FIRMNESS = 15.0
 """Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are about
 as large as the covariance says (docs/training.md)."""
-MOST_FRAMES = 12
+MOST_FRAMES = 8
 """That add up; more of them count as firmly as so many, since frames of one drive, and one camera, err alike."""
 MOST_ITERATIONS = 40
 STEP = 0.5
