@@ -102,7 +102,7 @@ class Curve:
     def __init__(self, frames: int, aligns: bool) -> None:
         self.aligns, self.points = aligns, list[tuple[int, Estimate]]()
         self._evidence = list[Evidence]()
-        self._to_align, self._to_note = spread(frames, FRAMES_ALIGNED), spread(frames, CURVE_POINTS)
+        self._to_align, self._to_note = spread(frames, FRAMES_ALIGNED), spread(frames, CURVE_POINTS)[:-1]
         self._latest = 0
 
     def note(self, position: int, frame: Frame, consensus: Consensus) -> None:
@@ -116,7 +116,7 @@ class Curve:
     def end(self, consensus: Consensus) -> Estimate:
         """The estimate of all frames; it is the last point of the curve."""
         final = self._estimate(consensus, [consensus.estimate(), *self._earlier])
-        if self.points and self.points[-1][0] == self._latest:
+        if self.points and self.points[-1][0] == self._latest:  # no frame after it could be calibrated
             self.points.pop()
         self.points.append((self._latest, final))
         return final

@@ -110,7 +110,7 @@ Term = Callable[[Matrix], tuple[float, NDArray[np.float64]]]
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The terms of one frame; their sum is smallest where they find that picture and scan fit best."""
+    """The terms of a frame, or several frames; their sum is smallest where they find that picture and scan fit best."""
 
     terms: tuple[Term, ...]
 

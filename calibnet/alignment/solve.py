@@ -39,16 +39,13 @@ def align(
     """
     from scipy.optimize import minimize
 
+    everything = Evidence(tuple(evidence))
     deviation = np.linalg.cholesky(covariance)  # in standard deviations all parameters are alike
     firmness = FIRMNESS * min(1.0, MOST_FRAMES / max(1, len(evidence)))
 
     def cost(deviations: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         vector = known + deviation @ deviations
-        correction = pose_from_vector(vector)
-        value, gradient = 0.0, np.zeros(6)
-        for frame in evidence:
-            more, slope = frame(correction)
-            value, gradient = value + more, gradient + slope
+        value, gradient = everything(pose_from_vector(vector))
         gradient[3:] = rotation_jacobian(vector[3:]).T @ gradient[3:]  # of the vector instead of a further turn
         return 0.5 * float(deviations @ deviations) + firmness * value, deviations + firmness * deviation.T @ gradient
 

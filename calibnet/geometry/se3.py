@@ -65,8 +65,7 @@ def rotation_from_vector(vector: ArrayLike) -> Matrix:
     angle = float(np.linalg.norm(axis))
     if angle < 1e-12:
         return np.eye(3)
-    x, y, z = axis / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = _cross(axis / angle)
     rotation: Matrix = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return rotation
 
@@ -74,9 +73,7 @@ def rotation_from_vector(vector: ArrayLike) -> Matrix:
 def rotation_jacobian(vector: ArrayLike) -> Matrix:
     """``J [3, 3]`` of a rotation vector: turning by ``J d`` after ``vector`` is turning by ``vector + d``, d small."""
     turn = np.asarray(vector, dtype=np.float64)
-    angle = float(np.linalg.norm(turn))
-    x, y, z = turn
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle, cross = float(np.linalg.norm(turn)), _cross(turn)
     if angle < 1e-4:  # where the fractions below lose their digits
         return np.eye(3) + cross / 2
     straight, bent = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
@@ -115,6 +112,12 @@ def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
 def rotation_angle(rotation: NDArray[np.floating]) -> float:
     """Angle of a rotation in radians; exact near zero, where arccos of the trace is not."""
     return float(np.arctan2(np.linalg.norm(_sine_axis(rotation)), 0.5 * (np.trace(rotation) - 1.0)))
+
+
+def _cross(vector: Matrix) -> Matrix:
+    """The matrix of the cross product with ``vector``."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _sine_axis(rotation: NDArray[np.floating]) -> Matrix:
