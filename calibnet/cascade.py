@@ -19,10 +19,11 @@ from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest
 from calibnet.image_views import View, image_branches, image_views
 from calibnet.network.config import load_preset
+from calibnet.network.convolution import pack
 from calibnet.network.displacement import expected_error
 from calibnet.network.inputs import LidarInput, lidar_input
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
-from calibnet.precision import autocast
+from calibnet.precision import autocast, fastest
 from calibnet.sequence_estimate import SequenceEstimate
 from calibnet.stage_detail import stage_detail
 from calibnet.trace import CascadeTrace, StageTrace
@@ -90,6 +91,7 @@ class Cascade:
             path = weights_path(preset, bounds, folder)
             if path.is_file():
                 network = load_network(path).to(device)
+                pack(network, fastest(device))
                 if network.bounds != bounds:
                     raise WeightsError(
                         f"{path} holds the weights of range {network.bounds}; give it its own name back."

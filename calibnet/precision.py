@@ -15,6 +15,11 @@ def has_fast_bf16(device: torch.device) -> bool:
     return device.type == "cpu" and bool(torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported())
 
 
+def fastest(device: torch.device) -> torch.dtype:
+    """The precision in which convolutions are fastest on a device."""
+    return torch.bfloat16 if has_fast_bf16(device) else torch.float32
+
+
 def autocast(device: torch.device) -> torch.autocast:
     """Autocast to bf16 where that is faster, and nothing elsewhere."""
     return torch.autocast(device.type, torch.bfloat16, enabled=has_fast_bf16(device))

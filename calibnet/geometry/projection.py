@@ -61,14 +61,21 @@ def nearest_per_cell(
 
     Returns ``[h, w]`` int64: for every cell the row in ``projection`` of its nearest point, or -1.
     """
-    height, width = -(-camera.height // stride), -(-camera.width // stride)
-    cell = np.floor((projection.pixels + 0.5) / stride).astype(np.int64)
-    flat = np.minimum(cell[:, 1], height - 1) * width + np.minimum(cell[:, 0], width - 1)
+    (height, width), cells = cells_of_points(projection, camera, stride)
     if far_to_near is None:
         far_to_near = projection.far_to_near()
     winner = np.full(height * width, -1, dtype=np.int64)
-    winner[flat[far_to_near]] = far_to_near  # the last assignment wins: the nearest
+    winner[cells[far_to_near]] = far_to_near  # the last assignment wins: the nearest
     return winner.reshape(height, width)
+
+
+def cells_of_points(
+    projection: Projection, camera: PinholeCamera, stride: int
+) -> tuple[tuple[int, int], NDArray[np.int64]]:
+    """Height and width of an image of ``stride`` pixels a cell, and for each point its cell ``[M]``, row by row."""
+    height, width = -(-camera.height // stride), -(-camera.width // stride)
+    column, row = np.floor((projection.pixels.T + 0.5) / stride).astype(np.int64)
+    return (height, width), np.minimum(row, height - 1) * width + np.minimum(column, width - 1)
 
 
 def depth_image(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> NDArray[np.float32]:

@@ -17,6 +17,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
+from calibnet.network.convolution import Conv3d
 from calibnet.network.cost_volume import TEMPERATURE
 
 
@@ -28,10 +29,10 @@ class WindowConv(nn.Module):
     plain 3-D convolution over ``D``.
     """
 
-    def __init__(self, channels: int, window: int, axis: str) -> None:
+    def __init__(self, channels: int, window: int, axis: str, activation: str | None = None) -> None:
         super().__init__()
         self.window, self.along_x = window, axis == "x"
-        self.conv = nn.Conv3d(channels, channels, 3, padding=1)
+        self.conv = Conv3d(channels, channels, 3, padding=1, activation=activation)
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, D, h, w] -> [B, C, D, h, w]``."""
@@ -85,11 +86,11 @@ class VolumeBlock(nn.Module):
 
     def __init__(self, channels: int, window: int) -> None:
         super().__init__()
-        self.x, self.y = WindowConv(channels, window, "x"), WindowConv(channels, window, "y")
+        self.x, self.y = WindowConv(channels, window, "x", "relu"), WindowConv(channels, window, "y")
 
     def forward(self, volume: Tensor) -> Tensor:
         """``[B, C, D, h, w] -> [B, C, D, h, w]``."""
-        return (volume + self.y(self.x(volume).relu())).relu()
+        return (volume + self.y(self.x(volume))).relu()
 
 
 def every_second(volume: Tensor, window: int) -> Tensor:

@@ -14,9 +14,13 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
+from calibnet.network.convolution import Conv2d
 
 TEMPERATURE = 14.0
 """Cosines of unit-norm features become logits times this."""
+
+RUN = 16
+"""Cells of a row that are compared at once, all with the image cells around any of them."""
 
 
 def surroundings(image: Tensor, height: int, radius: int) -> Tensor:
@@ -30,9 +34,9 @@ def surroundings(image: Tensor, height: int, radius: int) -> Tensor:
 def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """Group-wise correlation of every LiDAR cell with the window of image cells around it.
 
-    One batched matrix product of each row of LiDAR cells with the image rows of its window, and a
-    gather of the band around the diagonal; a loop of shifted products takes four times as long on a
-    CPU, and the product of all pairs of cells three times the memory.
+    One batched matrix product of short runs of LiDAR cells with the image cells around them, and a
+    gather of the band around the diagonal; a loop of shifted products takes several times as long on a
+    CPU, and the product of all pairs of cells many times the memory.
 
     Args:
         lidar: ``[B, C, h, w]``, of all of the image or of its lowest rows, where the scan is.
@@ -43,35 +47,33 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     Returns:
         ``[B, D, h, w, groups]`` with zeros where the window leaves the image.
     """
-    batch, channels, height, width = lidar.shape
-    window, padded = 2 * radius + 1, width + 2 * radius
-    rows = surroundings(image, height, radius)
-    rows = rows.reshape(batch * groups, channels // groups, height + 2 * radius, padded)
-    rows = rows.unfold(2, window, 1).permute(0, 2, 1, 4, 3).flatten(3)  # [B*G, h, C/G, Dy * (w + 2r)]
-    cells = lidar.reshape(batch * groups, channels // groups, height, width).permute(0, 2, 3, 1)
-    products = cells @ rows  # [B*G, h, w, Dy * (w + 2r)]
-    index = band_index(width, radius).to(lidar.device).expand(batch * groups, height, -1, -1)
-    volume = products.gather(3, index).view(batch, groups, height, width, -1)
-    return volume.permute(0, 4, 2, 3, 1)
+    batch, _, height, width = lidar.shape
+    window, runs = 2 * radius + 1, -(-width // RUN)
+    beyond = runs * RUN - width
+    rows = F.pad(surroundings(image, height, radius), [0, beyond]).unflatten(1, (groups, -1)).flatten(0, 1)
+    rows = rows.unfold(2, window, 1).unfold(3, RUN + 2 * radius, RUN)  # [B*G, C/G, h, runs, Dy, R + 2r]
+    cells = F.pad(lidar, [0, beyond]).unflatten(1, (groups, -1)).flatten(0, 1).unflatten(3, (runs, RUN))
+    products = cells.permute(0, 2, 3, 4, 1) @ rows.permute(0, 2, 3, 1, 4, 5).flatten(4)
+    index = band_index(RUN, radius).to(lidar.device).expand(*products.shape[:4], -1)
+    volume = products.gather(4, index).flatten(2, 3)[:, :, :width]  # [B*G, h, w, D]
+    return volume.unflatten(0, (batch, groups)).permute(0, 4, 2, 3, 1)
 
 
 @lru_cache(maxsize=32)
 def band_index(width: int, radius: int) -> Tensor:
-    """``[w, D]``: where cell ``x``'s window lies in a row of ``Dy`` padded image rows laid end to end."""
+    """``[w, D]``: where the window of cell ``x`` lies in ``Dy`` rows of ``w + 2r`` image cells laid end to end."""
     with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
         offset = torch.arange(2 * radius + 1)
         start = offset[:, None] * (width + 2 * radius) + offset  # [Dy, Dx]
         return torch.arange(width)[:, None] + start.flatten()
 
 
-def concatenate(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
-    """Concatenation volume ``[B, D, h, w, 2C]`` of features ``[B, C, h, w]``."""
+def pairs(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
+    """Every LiDAR cell and the cells of its window, both ``[B, Dy, Dx, h, w, C]``, of features ``[B, C, h, w]``."""
     window = 2 * radius + 1
-    rows = surroundings(image, lidar.shape[2], radius)
-    moved = rows.unfold(2, window, 1).unfold(3, window, 1)  # [B, C, h, w, Dy, Dx]
-    moved = moved.permute(0, 4, 5, 2, 3, 1).flatten(1, 2)
-    fixed = lidar.permute(0, 2, 3, 1)[:, None].expand_as(moved)
-    return torch.cat([fixed, moved], dim=-1)
+    moved = surroundings(image, lidar.shape[2], radius).unfold(2, window, 1).unfold(3, window, 1)
+    moved = moved.permute(0, 4, 5, 2, 3, 1)
+    return lidar.permute(0, 2, 3, 1)[:, None, None].expand_as(moved), moved
 
 
 def matching_score(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
@@ -85,8 +87,8 @@ class CostVolume(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.radius, self.groups = config.radius, config.groups
-        self.reduce_lidar = nn.Conv2d(config.feature_channels, config.concat_channels, 1)
-        self.reduce_image = nn.Conv2d(config.feature_channels, config.concat_channels, 1)
+        self.reduce_lidar = Conv2d(config.feature_channels, config.concat_channels, 1)
+        self.reduce_image = Conv2d(config.feature_channels, config.concat_channels, 1)
 
     def forward(self, lidar: Tensor, image: Tensor) -> tuple[Tensor, Tensor]:
         """Compare features ``[B, C, h, w]`` of both branches.
@@ -96,8 +98,9 @@ class CostVolume(nn.Module):
             of the two features (the sum over the groups, since the whole vector has unit norm).
         """
         groups = correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), self.radius, self.groups)
-        score = groups.sum(-1)
-        pair = concatenate(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
+        score = groups.sum(-1) if self.groups > 1 else groups[..., 0]
+        fixed, moved = pairs(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
         # a group's share of the cosine is about 1/G: scaled so that all channels start alike
-        volume = torch.cat([groups * self.groups, pair.to(groups.dtype)], dim=-1)
+        shares = (groups * self.groups if self.groups > 1 else groups).unflatten(1, moved.shape[1:3])
+        volume = torch.cat([shares, fixed.to(groups.dtype), moved.to(groups.dtype)], dim=-1).flatten(1, 2)
         return volume.permute(0, 4, 1, 2, 3), score

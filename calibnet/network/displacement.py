@@ -9,6 +9,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
+from calibnet.network.convolution import Conv2d
 from calibnet.network.layers import ConvBlock
 
 
@@ -68,9 +69,9 @@ class DisplacementDecoder(nn.Module):
             ConvBlock(width, width, norm, dilation=4),
             ConvBlock(width, width, norm),
         )
-        self.blend = nn.Conv2d(width, len(self.scales), 3, padding=1)
-        self.residual = nn.Conv2d(width, 2, 3, padding=1)
-        self.log_scale = nn.Conv2d(width, 2, 3, padding=1)
+        self.blend = Conv2d(width, len(self.scales), 3, padding=1)
+        self.residual = Conv2d(width, 2, 3, padding=1)
+        self.log_scale = Conv2d(width, 2, 3, padding=1)
         nn.init.zeros_(self.residual.weight)
         nn.init.zeros_(self.log_scale.weight)
         assert self.log_scale.bias is not None
@@ -86,9 +87,8 @@ class DisplacementDecoder(nn.Module):
         """
         size = lidar_features.shape[-2:]
         expected, peaks = [], []
-        probability = logits[0].float().softmax(1)
-        for stride, scale_logits in zip(self.scales, logits, strict=True):
-            weights = scale_logits.float().softmax(1)
+        probabilities = [scale_logits.float().softmax(1) for scale_logits in logits]
+        for stride, weights in zip(self.scales, probabilities, strict=True):
             offsets = window_offsets(self.config.radius, stride).to(weights.device)
             mean = torch.einsum("bdhw,dc->bchw", weights, offsets)
             peak = weights.amax(1, keepdim=True)
@@ -100,7 +100,7 @@ class DisplacementDecoder(nn.Module):
         depth = cells[:, 2:]
         occupied = (depth > 0).float()
         parts = [
-            probability * 4.0,
+            probabilities[0] * 4.0,
             torch.cat(expected, dim=1) / 32.0,
             *peaks,
             lidar_features.float(),

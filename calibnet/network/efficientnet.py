@@ -11,9 +11,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
-import torch.nn.functional as F
 from safetensors.torch import load_file
 from torch import Tensor, nn
+
+from calibnet.network.convolution import Conv2d
 
 LEVELS = (
     ((1, 16, 3, 1, 1),),  # 1/2, after a stem of 32 channels
@@ -30,15 +31,18 @@ WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensor
 """ImageNet weights, Apache-2.0; docs/training.md says how the file was made."""
 
 
-class SameConv(nn.Conv2d):
+class SameConv(Conv2d):
     """Convolution of an even size with TensorFlow's padding, which is one wider at the far side where the stride is 2.
 
     Padded alike at both sides by one more, it computes that too, behind one row and one column which are dropped:
     cheaper than padding a wide input first.
     """
 
-    def __init__(self, inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> None:
-        super().__init__(inputs, outputs, kernel, stride, padding=(kernel + stride - 1) // 2, groups=groups)
+    def __init__(
+        self, inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1, activation: str | None = None
+    ) -> None:
+        padding = (kernel + stride - 1) // 2
+        super().__init__(inputs, outputs, kernel, stride, padding=padding, groups=groups, activation=activation)
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
@@ -56,15 +60,15 @@ class InvertedResidual(nn.Module):
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, expansion: int) -> None:
         super().__init__()
         width = inputs * expansion
-        self.expand = SameConv(inputs, width, 1) if expansion > 1 else None
-        self.depthwise = SameConv(width, width, kernel, stride, groups=width)
+        self.expand = SameConv(inputs, width, 1, activation="relu6") if expansion > 1 else None
+        self.depthwise = SameConv(width, width, kernel, stride, groups=width, activation="relu6")
         self.narrow = SameConv(width, outputs, 1)
         self.skip = stride == 1 and inputs == outputs
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
-        wide = x if self.expand is None else F.relu6(self.expand(x), inplace=True)
-        y = self.narrow(F.relu6(self.depthwise(wide), inplace=True))
+        wide = x if self.expand is None else self.expand(x)
+        y = self.narrow(self.depthwise(wide))
         return x + y if self.skip else y
 
 

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from calibnet.network import efficientnet
 from calibnet.network.config import NetworkConfig
+from calibnet.network.convolution import Conv2d
 from calibnet.network.layers import ConvBlock, ResidualBlock
 
 IMAGE_CHANNELS = 3
@@ -75,11 +76,11 @@ class Trunk(nn.Module):
         self.pretrained = min(len(pretrained), deepest + 1)
         features = config.feature_channels
         if config.multi_scale_features:
-            self.lateral = nn.ModuleList(nn.Conv2d(widths[level], features, 1) for level in self.levels)
+            self.lateral = nn.ModuleList(Conv2d(widths[level], features, 1) for level in self.levels)
             self.smooth = nn.ModuleList(ConvBlock(features, features, norm) for _ in self.levels)
         else:
-            self.lateral = nn.ModuleList([nn.Conv2d(widths[self.levels[0]], features, 1)])
-        self.project = nn.ModuleList(nn.Conv2d(features, features, 1) for _ in config.volume_scales)
+            self.lateral = nn.ModuleList([Conv2d(widths[self.levels[0]], features, 1)])
+        self.project = nn.ModuleList(Conv2d(features, features, 1) for _ in config.volume_scales)
 
     def forward(self, x: Tensor) -> list[Tensor]:
         """Stem or image to features ``[B, C, H/s, W/s]``, one per volume, fine to coarse."""

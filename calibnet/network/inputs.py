@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera, project
-from calibnet.geometry.projection import nearest_per_cell
+from calibnet.geometry.projection import cells_of_points
 from calibnet.geometry.se3 import Matrix
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -74,15 +74,14 @@ def lidar_input(
 ) -> LidarInput:
     """Project a scan ``[N, 4]`` and find the nearest point of each pixel and of each cell."""
     projection = project(points, camera_from_lidar, camera)
-    # a last row of zeros, which the index -1 of empty cells picks
-    depth = np.append(projection.depth, np.float32(0))
-    intensity = np.append(points[projection.index, 3], np.float32(0))
-    in_camera = np.concatenate([projection.points, np.zeros((1, 3), np.float32)])
     far_to_near = projection.far_to_near()
-    pixel = nearest_per_cell(projection, camera, 1, far_to_near)
-    image = np.stack([depth[pixel], intensity[pixel]]).astype(np.float32)
-    cells = [
-        np.ascontiguousarray(in_camera[nearest_per_cell(projection, camera, scale, far_to_near)].transpose(2, 0, 1))
-        for scale in scales
-    ]
-    return LidarInput(image, cells)
+
+    def nearest(stride: int, *of_points: NDArray[np.float32]) -> NDArray[np.float32]:
+        size, cells = cells_of_points(projection, camera, stride)
+        grid = np.zeros((len(of_points), *size), np.float32)
+        for channel, values in zip(grid, of_points, strict=True):
+            channel.reshape(-1)[cells[far_to_near]] = values[far_to_near]  # the last assignment wins: the nearest
+        return grid
+
+    image = nearest(1, projection.depth, points[projection.index, 3])
+    return LidarInput(image, [nearest(scale, *projection.points.T) for scale in scales])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from calibnet.network.convolution import Conv2d
+
 
 def norm2d(kind: str, channels: int) -> nn.Module:
     """Group norm (statistics of the sample: no lag, no mixing of domains) or batch norm (foldable)."""
@@ -21,7 +23,7 @@ class ConvBlock(nn.Sequential):
 
     def __init__(self, inputs: int, outputs: int, norm: str, stride: int = 1, dilation: int = 1) -> None:
         super().__init__(
-            nn.Conv2d(inputs, outputs, 3, stride, padding=dilation, dilation=dilation, bias=False),
+            Conv2d(inputs, outputs, 3, stride, padding=dilation, dilation=dilation, bias=False),
             norm2d(norm, outputs),
             nn.ReLU(inplace=True),
         )
@@ -33,7 +35,7 @@ class ResidualBlock(nn.Module):
     def __init__(self, channels: int, norm: str) -> None:
         super().__init__()
         self.first = ConvBlock(channels, channels, norm)
-        self.second = nn.Conv2d(channels, channels, 3, padding=1, bias=False)
+        self.second = Conv2d(channels, channels, 3, padding=1, bias=False)
         self.norm = norm2d(norm, channels)
 
     def forward(self, x: Tensor) -> Tensor:

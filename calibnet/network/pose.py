@@ -148,18 +148,20 @@ class GeometricHead(nn.Module):
             scale: ``[B, N, 2]`` expected absolute error of each target coordinate, pixels.
             intrinsics: ``[B, 3, 3]``.
         """
-        occupied = (points[..., 2:] > 0).float()
+        # [B, coordinate, N]: the points lie last in memory
+        points, target, scale = (part.transpose(1, 2).contiguous() for part in (points, target, scale))
+        variance, share = scale**2, (points[:, 2:] > 0) / scale
         rotation = torch.eye(3, device=points.device).expand(len(points), 3, 3)
         translation = torch.zeros(len(points), 3, device=points.device)
         prior = torch.diag(self.prior)
         information = prior.expand(len(points), 6, 6)
         for _ in range(self.ITERATIONS):
-            moved = points @ rotation.transpose(1, 2) + translation[:, None]
-            residual = target - project_points(moved, intrinsics)
-            weight = occupied / (scale * torch.sqrt(scale**2 + residual.detach() ** 2))
-            jacobian = projection_jacobian(moved, intrinsics)  # [B, N, 2, 6]
-            weighted = (jacobian * weight[..., None]).flatten(1, 2).transpose(1, 2)  # [B, 6, 2N]
-            normal = weighted @ jacobian.flatten(1, 2)
+            moved = rotation @ points + translation[..., None]
+            residual = target - (intrinsics @ moved)[:, :2] / moved[:, 2:].clamp(min=MINIMUM_DEPTH)
+            weight = share * (variance + residual.detach() ** 2).rsqrt()
+            jacobian = projection_jacobian(moved, intrinsics)  # [B, 6, 2, N]
+            weighted = (jacobian * weight[:, None]).flatten(2)
+            normal = weighted @ jacobian.flatten(2).transpose(1, 2)
             gradient = (weighted @ residual.flatten(1)[..., None])[..., 0]
             gradient = gradient - self.prior * torch.cat([translation, rotation_vector(rotation)], dim=-1)
             information = normal + prior
@@ -177,14 +179,15 @@ def rotation_vector(rotation: Tensor) -> Tensor:
 
 
 def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
-    """Derivative ``[B, N, 2, 6]`` of the pixel by a left perturbation ``(translation, rotation)``."""
-    x, y, depth = points.unbind(-1)
+    """Derivative ``[B, 6, 2, N]`` of the pixels by a left perturbation ``(translation, rotation)`` of ``[B, 3, N]``."""
+    x, y, depth = points.unbind(1)
     inverse = 1.0 / depth.clamp(min=MINIMUM_DEPTH)
     x, y, zero = x * inverse, y * inverse, torch.zeros_like(x)
-    du = torch.stack([inverse, zero, -x * inverse, -x * y, 1 + x * x, -y], dim=-1)
-    dv = torch.stack([zero, inverse, -y * inverse, -1 - y * y, x * y, x], dim=-1)
+    xy = x * y
+    by_translation = [inverse, zero, zero, inverse, -x * inverse, -y * inverse]  # of (u, v) each
+    by_rotation = [-xy, -1 - y * y, 1 + x * x, xy, -y, x]
     focal = intrinsics.diagonal(dim1=1, dim2=2)[:, None, :2, None]
-    return torch.stack([du, dv], dim=-2) * focal
+    return torch.stack([*by_translation, *by_rotation], dim=1).unflatten(1, (6, 2)) * focal
 
 
 HEADS: dict[str, type[RegressionHead] | type[GeometricHead]] = {

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from calibnet.network.cost_volume import CostVolume, concatenate, correlate
+from calibnet.network.cost_volume import CostVolume, correlate, pairs
 from calibnet.network.displacement import window_offsets
 from tests.network.tiny import TINY
 
@@ -32,7 +32,9 @@ def correlation_by_loop(lidar: Tensor, image: Tensor, radius: int, groups: int) 
     return torch.stack(volume, dim=1)
 
 
-@pytest.mark.parametrize(("radius", "groups", "size"), [(2, 1, (3, 5)), (2, 3, (4, 3)), (4, 2, (2, 6)), (1, 6, (1, 1))])
+@pytest.mark.parametrize(
+    ("radius", "groups", "size"), [(2, 1, (3, 5)), (2, 3, (4, 3)), (4, 2, (2, 6)), (1, 6, (1, 1)), (2, 2, (2, 35))]
+)
 def test_correlation_equals_a_loop_of_shifted_products(radius: int, groups: int, size: tuple[int, int]) -> None:
     torch.manual_seed(0)
     lidar, image = torch.randn(2, 2, 6, *size, dtype=torch.float64).requires_grad_().unbind()
@@ -50,7 +52,8 @@ def test_the_lowest_rows_see_the_image_above_them() -> None:
     lidar, image = torch.randn(2, 2, 6, 5, 7, generator=generator)
     low = lidar[:, :, 3:]
     torch.testing.assert_close(correlate(low, image, 2, 3), correlate(lidar, image, 2, 3)[:, :, 3:])
-    torch.testing.assert_close(concatenate(low, image, 2), concatenate(lidar, image, 2)[:, :, 3:])
+    for part, whole in zip(pairs(low, image, 2), pairs(lidar, image, 2), strict=True):
+        torch.testing.assert_close(part, whole[:, :, :, 3:])
 
 
 def test_correlation_gradients_are_those_of_finite_differences() -> None:
@@ -68,10 +71,10 @@ def test_best_match_names_where_the_image_has_the_lidar_cell() -> None:
     assert window_offsets(2, 8)[score.argmax()].tolist() == [8 * dx, 8 * dy]
 
 
-def test_concatenation_equals_a_loop() -> None:
+def test_pairs_equal_a_loop() -> None:
     torch.manual_seed(0)
     lidar, image = torch.randn(2, 2, 3, 4, 5, dtype=torch.float64)
-    volume = concatenate(lidar, image, 2)
+    volume = torch.cat(pairs(lidar, image, 2), dim=-1).flatten(1, 2)
     assert volume.shape == (2, 25, 4, 5, 6)
     for depth, (dy, dx) in enumerate((dy, dx) for dy in range(-2, 3) for dx in range(-2, 3)):
         expected = torch.cat([lidar, shifted(image, dy, dx)], dim=1).permute(0, 2, 3, 1)

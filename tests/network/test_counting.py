@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from math import prod
 
@@ -10,6 +11,7 @@ from torch import nn
 
 from calibnet.geometry import RANGES
 from calibnet.network.config import NetworkConfig, load_preset
+from calibnet.network.cost_volume import RUN
 from calibnet.network.counting import ModuleCost, count
 from calibnet.network.network import CalibrationNetwork
 from tests.network.tiny import random_inputs, tiny_network
@@ -49,7 +51,8 @@ def test_multiply_adds_are_those_of_layers_and_matrix_products() -> None:
     assert costs["image features"].multiply_adds == layers["features.image_stem"] + layers["features.image_trunk"]
     assert costs["lidar features"].multiply_adds == layers["features.lidar_stem"] + layers["features.lidar_trunk"]
     sizes = [(HEIGHT // scale, WIDTH // scale) for scale in config.scales]
-    products = sum(h * w * config.window * (w + 2 * config.radius) * config.feature_channels for h, w in sizes)
+    compared = RUN * config.window * (RUN + 2 * config.radius)  # pairs of cells for each run of a row
+    products = sum(h * math.ceil(w / RUN) * compared * config.feature_channels for h, w in sizes)
     assert costs["cost volumes"].multiply_adds == layers["cost_volumes"] + products
     soft_argmax = sum(h * w * config.window**2 * 2 for h, w in sizes)
     assert costs["displacement"].multiply_adds == layers["displacement"] + soft_argmax

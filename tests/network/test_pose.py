@@ -142,7 +142,8 @@ def test_jacobian_is_the_derivative_of_the_projection() -> None:
         return project_points(turned[None], intrinsics)[0]
 
     expected = torch.autograd.functional.jacobian(pixels, torch.zeros(6, dtype=torch.float64))
-    torch.testing.assert_close(projection_jacobian(points[None], intrinsics)[0], expected)
+    found = projection_jacobian(points.T[None], intrinsics)[0]  # [6, 2, N]
+    torch.testing.assert_close(found.permute(2, 1, 0), expected)
 
 
 def test_geometric_head_reads_the_field_in_pixels() -> None:
