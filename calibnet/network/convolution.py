@@ -10,7 +10,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import torch
 import torch.nn.functional as F
@@ -43,7 +43,7 @@ class _Convolution(nn.modules.conv._ConvNd):
             return self.packed(x)
         return ACTIVATIONS[self.activation](super().forward(x))
 
-    def train(self, mode: bool = True) -> Any:
+    def train(self, mode: bool = True) -> Self:
         """Weights that are trained are not packed."""
         self.packed = None if mode else self.packed
         return super().train(mode)

@@ -103,11 +103,12 @@ class DisplacementDecoder(nn.Module):
             probabilities[0] * 4.0,
             torch.cat(expected, dim=1) / 32.0,
             *peaks,
-            lidar_features.float(),
+            lidar_features,
             occupied,
             occupied * 4.0 / depth.clamp(min=1.0),
         ]
-        features = self.context(torch.cat(parts, dim=1).contiguous(memory_format=torch.channels_last))
+        inputs = torch.cat([part.to(lidar_features.dtype) for part in parts], dim=1)
+        features = self.context(inputs.contiguous(memory_format=torch.channels_last))
         blend = self.blend(features).float().softmax(1)
         candidates = torch.stack(expected, dim=1)  # [B, S, 2, h, w]
         displacement = (blend[:, :, None] * candidates).sum(1) + self.residual(features).float() * self.scales[0]
