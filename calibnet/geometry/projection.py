@@ -31,27 +31,28 @@ class Projection:
     points: NDArray[np.float32]
 
     def far_to_near(self) -> NDArray[np.int64]:
-        """Rows by falling depth; those of one depth in the order of the scan."""
-        return np.argsort(-self.depth, kind="stable")
+        """Rows by falling depth; those of one depth in the order of the scan.
+
+        The bits of positive numbers sort as they do. With the row behind them they are sorted in half the time.
+        """
+        bits = self.depth.view(np.uint32).astype(np.uint64)
+        keys = (np.uint64(0xFFFFFFFF) - bits) << np.uint64(32) | np.arange(len(bits), dtype=np.uint64)
+        keys.sort()
+        return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
 
 
 def project(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> Projection:
     """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""
-    in_camera = transform_points(camera_from_lidar, points[:, :3])
-    index = np.flatnonzero(in_camera[:, 2] > MINIMUM_DEPTH)
-    in_front = in_camera[index]
-    x, y, depth = in_front.T
+    x, y, depth = transform_points(camera_from_lidar, points[:, :3]).T
+    in_front = np.flatnonzero(depth > MINIMUM_DEPTH)
+    x, y, depth = (coordinate[in_front] for coordinate in (x, y, depth))
     matrix = camera.matrix.astype(np.float32)
     u = (matrix[0, 0] * x + matrix[0, 1] * y) / depth + matrix[0, 2]
     v = matrix[1, 1] * y / depth + matrix[1, 2]
-    inside = (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
-    pixels = np.stack([u[inside], v[inside]], axis=1)
-    return Projection(
-        pixels.astype(np.float32),
-        depth[inside].astype(np.float32),
-        index[inside],
-        in_front[inside].astype(np.float32),
-    )
+    inside = np.flatnonzero((u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5))
+
+    u, v, x, y, depth = (values[inside].astype(np.float32, copy=False) for values in (u, v, x, y, depth))
+    return Projection(np.stack([u, v]).T, depth, in_front[inside], np.stack([x, y, depth]).T)
 
 
 def nearest_per_cell(

@@ -40,10 +40,10 @@ def transform_points(target_from_source: Matrix, points: NDArray[np.floating]) -
     """
     matrix = target_from_source.astype(points.dtype, copy=False)
     x, y, z = points.T
-    moved = np.empty((len(points), 3), points.dtype)
-    for axis in range(3):
-        moved[:, axis] = x * matrix[axis, 0] + y * matrix[axis, 1] + z * matrix[axis, 2] + matrix[axis, 3]
-    return moved
+    moved = np.empty((3, len(points)), points.dtype)  # a coordinate after the other: as they are read next
+    for row, (a, b, c, offset) in zip(moved, matrix[:3], strict=True):
+        row[:] = x * a + y * b + z * c + offset
+    return moved.T
 
 
 def rotation_from_euler_xyz(angles: ArrayLike) -> Matrix:

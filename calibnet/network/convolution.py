@@ -1,8 +1,8 @@
 """Convolutions with the activation behind them, and their form for inference on a CPU.
 
 A plain convolution casts and lays out its weights anew at every call, and its activation reads and writes the result
-once more. Where weights do not change any longer, oneDNN does the first once and both in one pass: the same numbers,
-a fifth faster.
+once more. Where weights do not change any longer, oneDNN does the first once and both in one pass: the same numbers
+in a tenth to a third less time a layer (in bf16; a twentieth less in single precision).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Conv3d(_Convolution, nn.Conv3d):
 def pack(network: nn.Module, precision: torch.dtype) -> None:
     """Bring all convolutions of a network that is not trained any longer into their form for inference.
 
-    PyTorch's compiler makes the same of them, in minutes. Nothing happens on a GPU and without oneDNN.
+    It is what PyTorch's compiler makes of them too, without the wait. Nothing happens on a GPU and without oneDNN.
     """
     on_cpu = all(parameter.device.type == "cpu" for parameter in network.parameters())
     if not (on_cpu and torch.backends.mkldnn.is_available() and platform.machine() in ("x86_64", "AMD64")):
