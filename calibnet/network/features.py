@@ -42,12 +42,13 @@ def lidar_channels(lidar: Tensor) -> Tensor:
     copies (nearest wins) make 16 beams look more like 64, so that one network serves both.
     """
     depth, intensity = lidar[:, :1].float(), lidar[:, 1:].float()
-    occupied = (depth > 0).float()
-    inverse = occupied * (4.0 / depth.clamp(min=1.0))
-    logarithm = occupied * (depth.clamp(min=1.0).log() * 0.5 - 1.0)
+    occupied, at_least_one = (depth > 0).float(), depth.clamp(min=1.0)
+    inverse = occupied * (4.0 / at_least_one)
+    logarithm = occupied * (at_least_one.log() * 0.5 - 1.0)
     near = dilate(dilate(inverse, 2, dim=2), 1, dim=3)
     wide = dilate(dilate(near, 3, dim=2), 2, dim=3)
-    return torch.cat([inverse, logarithm, occupied, intensity * occupied, near, wide], dim=1)
+    channels = [inverse, logarithm, occupied, intensity * occupied, near, wide]
+    return torch.cat([channel[:, 0, :, :, None] for channel in channels], dim=-1).permute(0, 3, 1, 2)  # channels last
 
 
 class Trunk(nn.Module):
