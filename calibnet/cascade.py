@@ -91,11 +91,11 @@ class Cascade:
             path = weights_path(preset, bounds, folder)
             if path.is_file():
                 network = load_network(path).to(device)
-                pack(network, fastest(device))
                 if network.bounds != bounds:
                     raise WeightsError(
                         f"{path} holds the weights of range {network.bounds}; give it its own name back."
                     )
+                pack(network, fastest(device))
                 loaded.append(Stage(number, bounds, network))
             else:
                 reason = (

@@ -27,6 +27,8 @@ FUSED: dict[str | None, tuple[str, list[float]]] = {
     "relu6": ("hardtanh", [0.0, 6.0]),
 }
 """The same activations as oneDNN calls them."""
+HAS_ONEDNN = torch.backends.mkldnn.is_available() and platform.machine() in ("x86_64", "AMD64")
+"""Whether it is there in the form this was tried in."""
 
 
 class _Convolution(nn.modules.conv._ConvNd):
@@ -78,7 +80,7 @@ def pack(network: nn.Module, precision: torch.dtype) -> None:
     It is what PyTorch's compiler makes of them too, without the wait. Nothing happens on a GPU and without oneDNN.
     """
     on_cpu = all(parameter.device.type == "cpu" for parameter in network.parameters())
-    if not (on_cpu and torch.backends.mkldnn.is_available() and platform.machine() in ("x86_64", "AMD64")):
+    if not (on_cpu and HAS_ONEDNN):
         return
     for layer in network.modules():
         if isinstance(layer, _Convolution):

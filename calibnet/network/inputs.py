@@ -78,9 +78,10 @@ def lidar_input(
 
     def nearest(stride: int, *of_points: NDArray[np.float32]) -> NDArray[np.float32]:
         size, cells = cells_of_points(projection, camera, stride)
+        cells = cells[far_to_near]
         grid = np.zeros((len(of_points), *size), np.float32)
         for channel, values in zip(grid, of_points, strict=True):
-            channel.reshape(-1)[cells[far_to_near]] = values[far_to_near]  # the last assignment wins: the nearest
+            channel.reshape(-1)[cells] = values[far_to_near]  # the last assignment wins: the nearest
         return grid
 
     image = nearest(1, projection.depth, points[projection.index, 3])
