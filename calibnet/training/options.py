@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from calibnet.network.config import Head
+
 
 @dataclass(frozen=True)
 class TrainingOptions:
@@ -26,4 +28,5 @@ class TrainingOptions:
     train_image_branch: bool = False  # of an initialised stage; frozen, all stages share it, computed once a frame
     after: str | None = None  # folder of the stages before, whose errors are most of the miscalibrations drawn
     scene_cache: str | None = None
+    head: Head | None = None  # of the pose, instead of the preset's
     warm_up: int | None = None  # samples that first train the features alone; by default none for an initialised stage

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -57,14 +57,16 @@ class Trainer:
         self.fabric.launch()
         self.bounds = MiscalibrationRange.parse(options.range)
         self.folder = Path(options.output)
-        self.network = CalibrationNetwork(load_preset(options.preset), self.bounds)
-        config = self.network.config
+        config = load_preset(options.preset)
+        if options.head:
+            config = replace(config, head=options.head)
+        self.network = CalibrationNetwork(config, self.bounds)
         self.network.features.load_pretrained()
         for parameter in self.network.features.pretrained_levels()[: self.FROZEN_LEVELS].parameters():
             parameter.requires_grad_(False)
         start = load_network(Path(options.initialize)) if options.initialize else None
         if start is not None:
-            self.network.load_state_dict(start.state_dict())
+            self._start_from(start)
             if config.share_image_branch and not options.train_image_branch:
                 for name, parameter in self.network.features.named_parameters():
                     parameter.requires_grad_(not name.startswith("image_"))
@@ -99,6 +101,20 @@ class Trainer:
             raise ConfigError(
                 f"{self.checkpoint} is there from an earlier run: add --resume, or remove it to start again."
             )
+
+    def _start_from(self, start: CalibrationNetwork) -> None:
+        """Take over the weights of another stage; a head of another kind starts anew."""
+        given = start.state_dict()
+        if start.config.head != self.network.config.head:
+            new = {name: tensor for name, tensor in self.network.state_dict().items() if name.startswith("pose.")}
+            given = {name: tensor for name, tensor in given.items() if not name.startswith("pose.")} | new
+        try:
+            self.network.load_state_dict(given)
+        except RuntimeError:  # lists every name and shape
+            raise ConfigError(
+                f"{self.options.initialize} holds another network than preset {self.options.preset}; "
+                "start from weights of that preset."
+            ) from None
 
     def _draw_residuals(self, folder: Path, start: CalibrationNetwork | None) -> None:
         """Let most miscalibrations be what the stages in ``folder`` leave, and what the start's own first look does.
@@ -236,8 +252,9 @@ class Trainer:
 
     def _resume(self) -> None:
         tensors, state = read_checkpoint(self.checkpoint)
-        if (state["options"]["preset"], state["options"]["range"]) != (self.options.preset, self.options.range):
-            raise ConfigError(f"{self.checkpoint} is of another preset or range; choose another --output folder.")
+        theirs, ours = state["options"], asdict(self.options)
+        if any(theirs.get(key) != ours[key] for key in ("preset", "range", "head")):
+            raise ConfigError(f"{self.checkpoint} is of another preset, range or head; choose another --output folder.")
         restore(tensors, self.network, self.average, self.optimizer.optimizer)
         self.steps, self.seconds = int(state["steps"]), float(state["seconds"])
 

@@ -176,8 +176,35 @@ def test_a_checkpoint_of_something_else_is_refused(tiny_world: Scenes, tmp_path:
     with pytest.raises(WeightsError, match="not a training checkpoint"):
         Trainer(options(tmp_path), Watcher(), resume=True)
     (tmp_path / "tiny-2deg-0.2m.checkpoint").write_bytes(original)
-    with pytest.raises(ConfigError, match="another preset or range"):
+    with pytest.raises(ConfigError, match="another preset, range or head"):
         Trainer(options(tmp_path, range="2/0.2"), Watcher(), resume=True)
+    checkpoint.write_bytes(original)
+    with pytest.raises(ConfigError, match="another preset, range or head"):
+        Trainer(options(tmp_path, head="regression"), Watcher(), resume=True)
+
+
+def test_another_head_than_the_presets_starts_anew_on_what_is_before_it(tiny_world: Scenes, tmp_path: Path) -> None:
+    first = Trainer(options(tmp_path / "first", batches=2), Watcher()).run()
+    other = options(tmp_path / "second", batches=2, head="regression", initialize=str(first))
+    trainer, before = Trainer(other, Watcher()), load_file(first)
+    start = trainer.network.state_dict()
+    assert all(torch.equal(start[name], tensor) for name, tensor in before.items())
+    new = start.keys() - before.keys()
+    assert new and all(name.startswith("pose.") for name in new)
+    path = trainer.run()
+    assert load_network(path).config.head == "regression" and read_record(path)["options"]["head"] == "regression"
+    back = Trainer(options(tmp_path / "third", initialize=str(path)), Watcher())
+    assert back.network.config.head == "geometric"
+
+
+def test_weights_of_another_network_are_no_start(
+    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = Trainer(options(tmp_path / "first", batches=2), Watcher()).run()
+    monkeypatch.setattr(trainer_module, "load_preset", lambda name: replace(TINY, context_channels=24))
+    with pytest.raises(ConfigError, match=f"{first}.*another network than preset tiny") as raised:
+        Trainer(options(tmp_path / "second", initialize=str(first)), Watcher())
+    assert "\n" not in str(raised.value)
 
 
 def test_later_stages_keep_the_image_branch_of_the_first(tiny_world: Scenes, tmp_path: Path) -> None:
