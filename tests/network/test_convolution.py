@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import pytest
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
-from calibnet.network.convolution import HAS_ONEDNN, Conv2d, Conv3d, pack
+from calibnet.network.convolution import HAS_ONEDNN, SIZES, Conv2d, Conv3d, pack
 from tests.network.tiny import random_inputs, tiny_network
 
 pytestmark = pytest.mark.skipif(not HAS_ONEDNN, reason="this machine has no oneDNN for x86")
@@ -54,6 +55,17 @@ def test_a_network_packs_all_its_layers_and_says_the_same() -> None:
         after = network(inputs)
     torch.testing.assert_close(after.logits, before.logits, rtol=1e-3, atol=1e-4)
     torch.testing.assert_close(after.field.displacement, before.field.displacement, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("precision", [torch.float32, torch.bfloat16])
+def test_packed_it_says_the_same_of_every_size(precision: torch.dtype) -> None:
+    convolution = Conv2d(80, 96, 1).eval()
+    sizes = [images(1, 80, height, 22) for height in range(1, SIZES + 3)]
+    pack(convolution, precision)
+    for x in [*sizes, *sizes]:  # more than are kept, and some again
+        with torch.no_grad():
+            expected = F.conv2d(x.to(precision), convolution.weight.to(precision), convolution.bias.to(precision))
+            torch.testing.assert_close(convolution(x), expected)
 
 
 def test_what_is_trained_again_is_not_packed() -> None:
