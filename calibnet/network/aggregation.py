@@ -17,7 +17,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
-from calibnet.network.convolution import Conv3d
+from calibnet.network.convolution import ACTIVATIONS, Conv3d
 from calibnet.network.cost_volume import TEMPERATURE
 
 
@@ -53,6 +53,17 @@ def pointwise(conv: nn.Module, volume: Tensor, bias: bool = True) -> Tensor:
     assert isinstance(conv, nn.Conv3d)
     rows, weight = volume.permute(0, 2, 3, 4, 1), conv.weight.flatten(1)
     return F.linear(rows, weight, conv.bias if bias else None).permute(0, 4, 1, 2, 3)
+
+
+class Pointwise(Conv3d):
+    """A 1x1x1 convolution with its activation: such a product as long as it is not packed, which then is faster."""
+
+    def __init__(self, inputs: int, outputs: int, activation: str | None = None) -> None:
+        super().__init__(inputs, outputs, 1, activation=activation)
+
+    def forward(self, volume: Tensor) -> Tensor:
+        """``[B, C, D, h, w] -> [B, C', D, h, w]``."""
+        return self.packed(volume) if self.packed is not None else ACTIVATIONS[self.activation](pointwise(self, volume))
 
 
 def pointwise_each(heads: nn.ModuleList, volumes: list[Tensor]) -> list[Tensor]:
@@ -196,8 +207,7 @@ class Aggregation(nn.Module):
         super().__init__()
         inputs = config.groups + 2 * config.concat_channels
         self.enter = nn.ModuleList(
-            nn.Sequential(nn.Conv3d(inputs, channels, 1), nn.ReLU(inplace=True))
-            for channels in config.channels_at_scales
+            nn.Sequential(Pointwise(inputs, channels, activation="relu")) for channels in config.channels_at_scales
         )
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(nn.Conv3d(channels, 1, 1) for channels in config.channels_at_scales)
@@ -212,10 +222,7 @@ class Aggregation(nn.Module):
             be kept, and logits ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by
             itself, and what the hourglasses add to it.
         """
-        before = [
-            pointwise(enter.get_submodule("0"), volume).relu()
-            for enter, volume in zip(self.enter, volumes, strict=True)
-        ]
+        before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]
         after = before
         for hourglass in self.hourglasses[:-1]:
             after = hourglass(after)
