@@ -56,7 +56,7 @@ def pointwise(conv: nn.Module, volume: Tensor, bias: bool = True) -> Tensor:
 
 
 class Pointwise(Conv3d):
-    """A 1x1x1 convolution with its activation: such a product as long as it is not packed, which then is faster."""
+    """A 1x1x1 convolution with its activation: as `pointwise` computes it, until it is packed, which is faster yet."""
 
     def __init__(self, inputs: int, outputs: int, activation: str | None = None) -> None:
         super().__init__(inputs, outputs, 1, activation=activation)
@@ -206,7 +206,7 @@ class Aggregation(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         inputs = config.groups + 2 * config.concat_channels
-        self.enter = nn.ModuleList(
+        self.enter = nn.ModuleList(  # each a sequence of one: so its weights are named in the files
             nn.Sequential(Pointwise(inputs, channels, activation="relu")) for channels in config.channels_at_scales
         )
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
