@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
+from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +79,11 @@ class StageTrace:
     number: int
     range: MiscalibrationRange
     camera: PinholeCamera
-    before: NDArray[np.float64] = field(repr=False)
-    after: NDArray[np.float64] = field(repr=False)
-    correction: NDArray[np.float64] = field(repr=False)
+    before: Extrinsic = field(repr=False)
+    after: Extrinsic = field(repr=False)
+    correction: Transform = field(repr=False)
     milliseconds: dict[str, float] = field(default_factory=dict)
-    information: NDArray[np.float64] | None = field(default=None, repr=False)
+    information: Matrix6 | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
     match_error_px: float = math.nan
 
@@ -110,7 +111,7 @@ class CascadeTrace:
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
     """
 
-    initial: NDArray[np.float64] = field(repr=False)
+    initial: Extrinsic = field(repr=False)
     stages: tuple[StageTrace, ...]
     milliseconds: dict[str, float] = field(default_factory=dict)
     match_error_limit_px: float = math.inf
@@ -121,6 +122,50 @@ class CascadeTrace:
         return not self.stages or not self.stages[-1].match_error_px > self.match_error_limit_px
 
     @property
-    def corrected(self) -> NDArray[np.float64]:
+    def corrected(self) -> Extrinsic:
         """``camera_from_lidar`` after the last stage; the initial one where the picture does not confirm that."""
         return self.stages[-1].after if self.stages and self.confirmed else self.initial
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The extrinsic that a number of frames agree on.
+
+    Attributes:
+        camera_from_lidar: 4x4.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, a perturbation in the camera frame: of networks
+            alone as they state it, widened until it explains how far the frames scatter; where edges were
+            aligned, with what the networks get wrong in all frames alike, as far as the pictures leave it open.
+        frames: that went into it.
+    """
+
+    camera_from_lidar: Extrinsic = field(repr=False)
+    covariance: Matrix6 = field(repr=False)
+    frames: int
+
+    @property
+    def rotation_deg(self) -> float:
+        """Standard deviation of the rotation: the root of the summed variances of its axes."""
+        return float(np.degrees(np.sqrt(np.trace(self.covariance[3:, 3:]))))
+
+    @property
+    def translation_cm(self) -> float:
+        """Standard deviation of the translation, likewise."""
+        return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
+
+
+@dataclass(frozen=True, eq=False)
+class DriveEstimate(Estimate):
+    """What `calibnet.cascade.Cascade.calibrate_drive` returns.
+
+    Attributes:
+        history: the estimate after more and more frames of the last pass, with the index of the latest in its
+            sequence; the last one is the estimate.
+        skipped: frames that could not be calibrated in that pass.
+        networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
+            frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
+    """
+
+    history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
+    skipped: int = 0
+    networks: Estimate | None = field(repr=False, default=None)

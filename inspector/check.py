@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from calibnet.evaluation.metrics import Distribution, Metrics
-from inspector.recorded_run import RecordedRun
-from inspector.recording_file import RecordingError
+from inspector.read.file import RecordingError
+from inspector.read.run import RecordedRun
 
 SUITE = "calib-inspect check"
 STATISTICS = {"median": "median", "p95": "95th percentile"}

@@ -21,7 +21,7 @@ STEPS_PER_FRAME = 6
 RUN = "run"
 """Property: the options that identify the run."""
 PROVENANCE = "provenance"
-"""Property: what a reader needs besides, see `inspector.recording.Recording`."""
+"""Property: what a reader needs besides, see `inspector.record.recording.Recording`."""
 
 IMAGE = "image"
 TABLE = "table"

@@ -24,9 +24,3 @@ def existing(folder: Path) -> Path:
 def kitti_folder() -> Path:
     """KITTI frames: ``odometry``, ``raw`` and ``object`` lie below it."""
     return existing(SHARED / "kitti")
-
-
-@pytest.fixture(scope="session")
-def rigs_folder() -> Path:
-    """Frames of other makes of sensor, one folder a rig, with a ``calibration.yaml`` each."""
-    return existing(SHARED / "rigs")

@@ -80,7 +80,7 @@ def test_calibnet_knows_no_user_interface() -> None:
 def test_inspector_computes_no_calibration() -> None:
     """It reads traces and names types; only the commands put a cascade and a recording together."""
     computing = ("torch", "lightning_fabric", "calibnet.network", "calibnet.cascade", "calibnet.drive")
-    computing += ("calibnet.alignment", "calibnet.consensus", "calibnet.training")
+    computing += ("calibnet.alignment", "calibnet.drive.consensus", "calibnet.training")
     assert violations("inspector", computing, exempt=("inspector/cli",), types=False) == []
 
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from calibnet.alignment.pull import Map
 from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import resize_image
 from calibnet.geometry import PinholeCamera, project
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.geometry.se3 import Matrix
-from calibnet.network.inputs import input_camera, resize_image
+from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector6
 
 HEIGHT, WIDTH = 320, 1024
 """Size of the picture that is looked at, in area; all pixels below are its own."""
@@ -55,7 +55,7 @@ class Edges:
         self.edges, self.points = edges, points
         self.weight = min(1.0, len(points) / ENOUGH_POINTS)
 
-    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
         """Minus the mean strength of the edges that the points fall onto, weighted, and its gradient ``[6]``."""
         sampled = self.edges.under(self.points, correction)
         gradient = sampled.gradient(-self.weight / len(self.points), correction[:3, 3])
@@ -65,12 +65,12 @@ class Edges:
 class Reflectance:
     """Points' reflectance and the picture's brightness: how little each tells of the other."""
 
-    def __init__(self, brightness: Map, points: NDArray[np.float32], reflectance: NDArray[np.float64]) -> None:
+    def __init__(self, brightness: Map, points: NDArray[np.float32], reflectance: Floats) -> None:
         """Brightness and ``reflectance [N]`` of ``points [N, 3]``, both 0..1 and about evenly spread over that."""
         self.brightness, self.points = brightness, points
         self.row, self.into_row = bins(reflectance)
 
-    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
         """Normalised information distance of the joint histogram, weighted, and its gradient ``[6]``."""
         sampled, count = self.brightness.under(self.points, correction), len(self.points)
         column, into_column = bins(sampled.values)
@@ -85,14 +85,14 @@ class Reflectance:
         return INFORMATION_WEIGHT * distance, sampled.gradient(weights, correction[:3, 3])
 
 
-def bins(levels: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def bins(levels: Floats) -> tuple[NDArray[np.int64], Floats]:
     """The lower one of the two bins that each level 0..1 is shared between, and the upper one's share."""
     position = levels.clip(0.0, 1.0) * (BINS - 1)
     lower = np.minimum(position.astype(np.int64), BINS - 2)
     return lower, position - lower
 
 
-def information_distance(joint: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+def information_distance(joint: Floats) -> tuple[float, Floats]:
     """``(H(x, y) - I(x; y)) / H(x, y)`` of a joint distribution, 0 (each tells the other) to 1, and its derivative."""
     log_joint = np.log(np.maximum(joint, 1e-12))
     x, y = joint.sum(1, keepdims=True), joint.sum(0, keepdims=True)
@@ -105,7 +105,7 @@ def information_distance(joint: NDArray[np.float64]) -> tuple[float, NDArray[np.
     return 2 - apart / together, (apart * slope_of_together - together * slope_of_apart) / together**2
 
 
-Term = Callable[[Matrix], tuple[float, NDArray[np.float64]]]
+Term = Callable[[Transform], tuple[float, Vector6]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class Evidence:
 
     terms: tuple[Term, ...]
 
-    def __call__(self, correction: Matrix) -> tuple[float, NDArray[np.float64]]:
+    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
         """Sum for a correction, 4x4, and gradient ``[6]`` by a further motion ``(translation m, rotation rad)``.
 
         The motion comes after the correction and turns about where that has put the LiDAR's frame.
@@ -126,7 +126,7 @@ class Evidence:
         return value, gradient
 
 
-def gather(frame: Frame, camera_from_lidar: Matrix) -> Evidence:
+def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
     """Find a frame's edges; a kind with too few points is left out, and reflectance where a scan has none.
 
     Args:
@@ -153,7 +153,7 @@ def gather(frame: Frame, camera_from_lidar: Matrix) -> Evidence:
 
 def picture_camera(camera: PinholeCamera) -> PinholeCamera:
     """The camera of the picture that is looked at."""
-    return input_camera(camera, HEIGHT, WIDTH, 1)
+    return camera.fitted(HEIGHT, WIDTH, 1)
 
 
 def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
@@ -178,7 +178,7 @@ def blurred(image: NDArray[np.floating] | NDArray[np.uint8], sigma: float) -> ND
 
 
 def scan_edges(
-    winner: NDArray[np.int64], depth: NDArray[np.float32], rank: NDArray[np.float64]
+    winner: NDArray[np.int64], depth: NDArray[np.float32], rank: Floats
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Pixels ``[H, W]`` with a point beside which depth falls away, and with one beside which only reflectance does.
 
@@ -207,6 +207,6 @@ def thinned(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     return rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64)]
 
 
-def ranks(values: NDArray[np.float32]) -> NDArray[np.float64]:
+def ranks(values: NDArray[np.float32]) -> Floats:
     """The share of values that are smaller than each: every sensor has another scale of reflectance."""
     return np.searchsorted(np.sort(values), values) / max(len(values), 1)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera
-from calibnet.geometry.se3 import Matrix, transform_points
+from calibnet.geometry.se3 import transform_points
+from calibnet.geometry.types import Floats, Transform, Vector3, Vector6
 
 NEAREST = 0.1
 """Metres that a point may come to the camera; also those behind it are taken to be there."""
@@ -26,11 +27,11 @@ class Sampled(NamedTuple):
         points: ``[N, 3]``, where the points were moved to.
     """
 
-    values: NDArray[np.float64]
-    forces: NDArray[np.float64]
+    values: Floats
+    forces: Floats
     points: NDArray[np.float32]
 
-    def gradient(self, weights: NDArray[np.float64] | float, pivot: NDArray[np.float64]) -> NDArray[np.float64]:
+    def gradient(self, weights: Floats | float, pivot: Vector3) -> Vector6:
         """Of the values' weighted sum by a motion ``(translation m, rotation rad)``: forces and torques, summed up.
 
         Args:
@@ -48,7 +49,7 @@ class Map:
         """``image [H, W]`` as seen by ``camera``; beyond its border it goes on as it is there."""
         self.image, self.camera = image, camera
 
-    def under(self, points: NDArray[np.float32], correction: Matrix) -> Sampled:
+    def under(self, points: NDArray[np.float32], correction: Transform) -> Sampled:
         """Read it where ``points [N, 3]`` of the camera frame are seen after ``correction``, 4x4."""
         (focal_u, skew, centre_u), (_, focal_v, centre_v), _ = self.camera.matrix
         moved = transform_points(correction, points).astype(np.float32, copy=False)

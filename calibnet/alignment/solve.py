@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.alignment.evidence import Evidence
 from calibnet.geometry.se3 import pose_from_vector, rotation_jacobian
+from calibnet.geometry.types import Matrix6, Vector6
 
 FIRMNESS = 15.0
 """Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are about
@@ -22,10 +22,10 @@ STEP = 0.5
 
 def align(
     evidence: Sequence[Evidence],
-    known: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    starts: Sequence[NDArray[np.float64]] = (),
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    known: Vector6,
+    covariance: Matrix6,
+    starts: Sequence[Vector6] = (),
+) -> tuple[Vector6, Matrix6]:
     """Find the correction, and its covariance.
 
     Args:
@@ -43,7 +43,7 @@ def align(
     deviation = np.linalg.cholesky(covariance)  # in standard deviations all parameters are alike
     firmness = FIRMNESS * min(1.0, MOST_FRAMES / max(1, len(evidence)))
 
-    def cost(deviations: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def cost(deviations: Vector6) -> tuple[float, Vector6]:
         vector = known + deviation @ deviations
         value, gradient = everything(pose_from_vector(vector))
         gradient[3:] = rotation_jacobian(vector[3:]).T @ gradient[3:]  # of the vector instead of a further turn

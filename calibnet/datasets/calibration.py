@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.errors import DatasetError
+from calibnet.geometry.types import Extrinsic, Intrinsics, Rotation, Transform
 
 RIGID_TOLERANCE = 2e-3
 """Largest entry of ``R^T R - I`` that is rounding: matrices written with three decimals pass."""
@@ -23,11 +23,11 @@ class Calibration:
         camera_from_lidar: 4x4, metres.
     """
 
-    matrix: NDArray[np.float64] = field(repr=False)
-    camera_from_lidar: NDArray[np.float64] = field(repr=False)
+    matrix: Intrinsics = field(repr=False)
+    camera_from_lidar: Extrinsic = field(repr=False)
 
 
-def checked_intrinsics(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+def checked_intrinsics(matrix: Intrinsics, path: Path, key: str) -> Intrinsics:
     """Return the 3x3 ``matrix`` if it is that of a pinhole camera.
 
     Raises:
@@ -43,7 +43,7 @@ def checked_intrinsics(matrix: NDArray[np.float64], path: Path, key: str) -> NDA
     return matrix
 
 
-def checked_rotation(rotation: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
     """Return the 3x3 ``rotation`` if it is one.
 
     Raises:
@@ -60,7 +60,7 @@ def checked_rotation(rotation: NDArray[np.float64], path: Path, key: str) -> NDA
     return rotation
 
 
-def checked_rigid(matrix: NDArray[np.float64], path: Path, key: str) -> NDArray[np.float64]:
+def checked_rigid(matrix: Transform, path: Path, key: str) -> Transform:
     """Return the 4x4 ``matrix`` if it is a rigid transform.
 
     Raises:

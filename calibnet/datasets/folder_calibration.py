@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rigid
 from calibnet.errors import DatasetError
+from calibnet.geometry.types import Floats
 
 DISTORTION_LENGTHS = (4, 5, 8)
 """OpenCV's models: k1 k2 p1 p2, then k3, then k4 k5 k6."""
@@ -31,7 +31,7 @@ class FolderCalibration:
     width: int
     height: int
     calibration: Calibration
-    distortion: NDArray[np.float64] = field(repr=False)
+    distortion: Floats = field(repr=False)
 
 
 def read_folder_calibration(path: Path) -> FolderCalibration:
@@ -82,7 +82,7 @@ def _pixels(content: dict[str, Any], key: str, path: Path) -> int:
     return value
 
 
-def _numbers(content: dict[str, Any], key: str, path: Path, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
+def _numbers(content: dict[str, Any], key: str, path: Path, *shapes: tuple[int, ...]) -> Floats:
     wanted = " or ".join("x".join(map(str, shape)) for shape in shapes)
     try:
         array = np.array(_value(content, key, path), dtype=np.float64)

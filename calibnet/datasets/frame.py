@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera
+from calibnet.geometry.types import Extrinsic
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Frame:
     image: NDArray[np.uint8] = field(repr=False)
     points: NDArray[np.float32] = field(repr=False)
     camera: PinholeCamera
-    camera_from_lidar: NDArray[np.float64] = field(repr=False)
+    camera_from_lidar: Extrinsic = field(repr=False)
     source: str = ""
 
 

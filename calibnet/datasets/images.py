@@ -1,4 +1,4 @@
-"""Reading camera images: whole, as stored, RGB."""
+"""Camera images: read whole, as stored, RGB; resized without aliasing."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.errors import DatasetError
+from calibnet.geometry import PinholeCamera
 
 _END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
 """First bytes of a PNG or JPEG file to the marker that ends a whole one."""
@@ -36,3 +37,11 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     if image is None:
         raise DatasetError(f"Image {path} is damaged or not an image; copy or download it again.")
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+
+
+def resize_image(image: NDArray[np.uint8], camera: PinholeCamera) -> NDArray[np.uint8]:
+    """Resize ``[H, W, 3]`` to the size of ``camera``; averaging, as fine texture would alias."""
+    size = (camera.width, camera.height)
+    shrinks = camera.width <= image.shape[1] and camera.height <= image.shape[0]
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return resized.astype(np.uint8, copy=False)

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rotation
 from calibnet.datasets.paired import FrameFiles
 from calibnet.errors import DatasetError
+from calibnet.geometry.types import Extrinsic, Floats
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 NOMINAL_PERIOD = 0.1
@@ -20,7 +20,7 @@ DATE_OF_FOCAL_LENGTH = {721.5377: "2011_09_26", 707.0912: "2011_09_30", 718.856:
 """Recording date, and so the rig, of a rectified focal length: odometry folders name no date."""
 
 
-def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, NDArray[np.float64]]:
+def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Floats]:
     """Read the rows ``key: numbers`` of a KITTI calibration file.
 
     Args:
@@ -57,7 +57,7 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, NDA
     return values
 
 
-def rectified_calibration(projection: NDArray[np.float64], camera0_from_lidar: NDArray[np.float64]) -> Calibration:
+def rectified_calibration(projection: Floats, camera0_from_lidar: Extrinsic) -> Calibration:
     """The exact calibration of a rectified camera.
 
     Args:

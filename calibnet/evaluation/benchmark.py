@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from calibnet.cascade import Cascade, Stage
+from calibnet.cascade.cascade import Cascade, Stage
 from calibnet.datasets import Frame
 from calibnet.evaluation.runner import draw_miscalibration
-from calibnet.precision import autocast, has_fast_bf16
+from calibnet.runtime.precision import autocast, has_fast_bf16
 from calibnet.training.samples import collate, make_sample, plain
 
 BATCHES = (1, 4)
@@ -105,12 +105,12 @@ def benchmark(
         repeats: runs a frame that count.
         observer: called after every run.
     """
-    bounds = cascade.stages[0].range
+    range_ = cascade.stages[0].range
     totals: list[float] = []
     traces = []
     for run in range(WARM_UP + repeats * len(frames)):
         frame = frames[run % len(frames)]
-        initial = draw_miscalibration(bounds, 0, run, 0) @ frame.camera_from_lidar
+        initial = draw_miscalibration(range_, 0, run, 0) @ frame.camera_from_lidar
         started = time.perf_counter()
         trace = cascade.calibrate(frame, initial)
         if run >= WARM_UP:

@@ -13,8 +13,8 @@ from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
-from calibnet.geometry.se3 import Matrix
-from calibnet.sequence_estimate import SequenceEstimate
+from calibnet.geometry.types import Extrinsic
+from calibnet.trace import DriveEstimate
 
 FEWEST_FRAMES = 2
 
@@ -30,17 +30,17 @@ class DriveMetrics:
 class DriveCalibrator(Protocol):
     """What is measured; `calibnet.cascade.Cascade` is one."""
 
-    def calibrate_sequence(
-        self, frames: Sequence, initial: Matrix, observer: Callable[[int, int], None] | None = None
-    ) -> SequenceEstimate:
-        """Correct the extrinsic that all frames share; see `Cascade.calibrate_sequence`."""
+    def calibrate_drive(
+        self, frames: Sequence, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        """Correct the extrinsic that all frames share; see `Cascade.calibrate_drive`."""
         ...
 
 
 def evaluate_drives(
     cascade: DriveCalibrator,
     sequences: list[Sequence],
-    bounds: MiscalibrationRange,
+    range_: MiscalibrationRange,
     repeats: int,
     seed: int,
     observer: Callable[[str, int, int], None] | None = None,
@@ -50,7 +50,7 @@ def evaluate_drives(
     Args:
         cascade: what to measure.
         sequences: the drives; what is not one drive on one mount (`shares_mount`) is left out.
-        bounds: range of the miscalibrations, of which there is one a drive and repeat.
+        range_: range of the miscalibrations, of which there is one a drive and repeat.
         repeats: miscalibrations a drive.
         seed: of the miscalibrations.
         observer: called with the drive's name and the numbers of frames read and to be read.
@@ -64,7 +64,7 @@ def evaluate_drives(
             continue
         reference = sequence[0].camera_from_lidar
         for repeat in range(repeats):
-            delta = sample_miscalibration(bounds, np.random.default_rng([seed, number, repeat, 1]))
+            delta = sample_miscalibration(range_, np.random.default_rng([seed, number, repeat, 1]))
             estimate = networks = delta @ reference
 
             def told(read: int, total: int, name: str = sequence.name) -> None:
@@ -72,7 +72,7 @@ def evaluate_drives(
                     observer(name, read, total)
 
             with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
-                solved = cascade.calibrate_sequence(sequence, estimate, told)
+                solved = cascade.calibrate_drive(sequence, estimate, told)
                 estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
                 aligned = aligned or solved.networks is not None
             errors.append(pose_error(estimate, reference))

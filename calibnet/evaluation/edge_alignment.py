@@ -10,7 +10,8 @@ import numpy as np
 from calibnet.alignment import align, gather, picture_camera
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange
-from calibnet.geometry.se3 import Matrix, pose_from_vector
+from calibnet.geometry.se3 import pose_from_vector
+from calibnet.geometry.types import Extrinsic
 from calibnet.network.pose import prior_information
 from calibnet.trace import CascadeTrace, StageTrace
 
@@ -18,13 +19,13 @@ from calibnet.trace import CascadeTrace, StageTrace
 class EdgeAlignment:
     """A `calibnet.evaluation.runner.Calibrator` without weights."""
 
-    def __init__(self, bounds: MiscalibrationRange) -> None:
-        """Expect errors of ``bounds``."""
-        self.bounds = bounds
-        self.covariance = np.diag(1 / prior_information(bounds).double().numpy())
+    def __init__(self, range_: MiscalibrationRange) -> None:
+        """Expect errors of ``range_``."""
+        self.range = range_
+        self.covariance = np.diag(1 / prior_information(range_).double().numpy())
 
-    def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""
         found, _ = align([gather(frame, initial)], np.zeros(6), self.covariance)
         change, camera = pose_from_vector(found), picture_camera(frame.camera)
-        return CascadeTrace(initial, (StageTrace(1, self.bounds, camera, initial, change @ initial, change),))
+        return CascadeTrace(initial, (StageTrace(1, self.range, camera, initial, change @ initial, change),))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.geometry import PoseError
+from calibnet.geometry.types import Floats
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Distribution:
     p95: float
 
     @classmethod
-    def of(cls, errors: NDArray[np.float64]) -> Distribution:
+    def of(cls, errors: Floats) -> Distribution:
         """Summarise errors ``[N]``; the standard deviation is that of the frames, not of a sample."""
         return cls(
             mean=float(errors.mean()),

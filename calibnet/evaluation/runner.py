@@ -13,14 +13,14 @@ from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.trace import CascadeTrace
 
 
 class Calibrator(Protocol):
     """What is measured; `calibnet.cascade.Cascade` is one."""
 
-    def calibrate(self, frame: Frame, initial: Matrix, detail: bool = False) -> CascadeTrace:
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct ``initial``; see `Cascade.calibrate`."""
         ...
 
@@ -68,7 +68,7 @@ class Evaluation:
     Attributes:
         sequences: names of what was measured on.
         rig: its sensors; several are joined by a semicolon.
-        bounds: range the miscalibrations were drawn from.
+        range: range the miscalibrations were drawn from.
         repeats: miscalibrations a frame.
         seed: of the miscalibrations.
         frames: number of frames.
@@ -86,7 +86,7 @@ class Evaluation:
 
     sequences: tuple[str, ...]
     rig: str
-    bounds: MiscalibrationRange
+    range: MiscalibrationRange
     repeats: int
     seed: int
     frames: int
@@ -116,7 +116,7 @@ class Evaluation:
         content: dict[str, Any] = {
             "sequences": list(self.sequences),
             "rig": self.rig,
-            "range": str(self.bounds),
+            "range": str(self.range),
             "repeats": self.repeats,
             "seed": self.seed,
             "frames": self.frames,
@@ -137,15 +137,15 @@ class Evaluation:
         return content
 
 
-def draw_miscalibration(bounds: MiscalibrationRange, seed: int, frame: int, repeat: int) -> Matrix:
+def draw_miscalibration(range_: MiscalibrationRange, seed: int, frame: int, repeat: int) -> Transform:
     """The ``delta`` of one run: whatever else is measured, and in which order, it stays the same."""
-    return sample_miscalibration(bounds, np.random.default_rng([seed, frame, repeat]))
+    return sample_miscalibration(range_, np.random.default_rng([seed, frame, repeat]))
 
 
 def evaluate(
     cascade: Calibrator,
     sequences: Sequence[FrameSequence],
-    bounds: MiscalibrationRange,
+    range_: MiscalibrationRange,
     repeats: int,
     seed: int,
     observer: Observer | None = None,
@@ -155,7 +155,7 @@ def evaluate(
     Args:
         cascade: what to measure.
         sequences: where the frames come from; their own extrinsics are the reference.
-        bounds: range of the miscalibrations.
+        range_: range of the miscalibrations.
         repeats: miscalibrations a frame, at least 1.
         seed: of the miscalibrations.
         observer: called after every run.
@@ -171,7 +171,7 @@ def evaluate(
         for frame in sequence:
             reference = frame.camera_from_lidar
             for repeat in range(repeats):
-                initial = draw_miscalibration(bounds, seed, frame.index, repeat) @ reference
+                initial = draw_miscalibration(range_, seed, frame.index, repeat) @ reference
                 errors: dict[int, PoseError] = {}
                 unconfirmed = False
                 try:
@@ -195,7 +195,7 @@ def evaluate(
     return Evaluation(
         sequences=tuple(sequence.name for sequence in sequences),
         rig="; ".join(dict.fromkeys(sequence.rig for sequence in sequences)),
-        bounds=bounds,
+        range=range_,
         repeats=repeats,
         seed=seed,
         frames=len(runs) // repeats,

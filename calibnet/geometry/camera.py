@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+
+from calibnet.geometry.types import Intrinsics
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,7 +15,7 @@ class PinholeCamera:
 
     width: int
     height: int
-    matrix: NDArray[np.float64] = field(repr=False)
+    matrix: Intrinsics = field(repr=False)
 
     @property
     def focal(self) -> tuple[float, float]:
@@ -35,7 +36,13 @@ class PinholeCamera:
         scale = np.array([[sx, 0.0, 0.5 * sx - 0.5], [0.0, sy, 0.5 * sy - 0.5], [0.0, 0.0, 1.0]])
         return PinholeCamera(width, height, scale @ self.matrix)
 
-    def cropped(self, left: int, top: int, width: int, height: int) -> PinholeCamera:
-        """The camera of the window at ``(left, top)``; negative offsets pad."""
-        shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
-        return PinholeCamera(width, height, shift @ self.matrix)
+    def fitted(self, height: float, width: float, multiple: int) -> PinholeCamera:
+        """The camera of the image resized to the area of ``height`` x ``width`` pixels, its own aspect kept.
+
+        Both sides are rounded to multiples of ``multiple`` (the coarsest stride of a network), so the two focal
+        lengths may scale by slightly different factors.
+        """
+        scale = (height * width / (self.height * self.width)) ** 0.5
+        rows = max(1, round(self.height * scale / multiple)) * multiple
+        columns = max(1, round(self.width * scale / multiple)) * multiple
+        return self.resized(columns, rows)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibnet.geometry.se3 import Matrix, rotation_from_vector, rotation_vector, transform
+from calibnet.geometry.se3 import rotation_from_vector, rotation_vector, transform
+from calibnet.geometry.types import Extrinsic, Floats, Rotation
 
-ROUNDS = 200
+ITERATIONS = 200
 SETTLED = 1e-13
 SMOOTHING = 1e-4
 """Share of the median distance below which a point's pull stops growing; it would be infinite at the point."""
@@ -19,7 +19,7 @@ RECENTRINGS = 3
 """Rotation vectors are exact distances only from the centre they are taken at."""
 
 
-def median_pose(extrinsics: Sequence[Matrix]) -> Matrix:
+def median_pose(extrinsics: Sequence[Extrinsic]) -> Extrinsic:
     """The pose with the smallest sum of distances, of angles and of translations, to all of them.
 
     Args:
@@ -34,21 +34,21 @@ def median_pose(extrinsics: Sequence[Matrix]) -> Matrix:
     if not extrinsics:
         raise ValueError("There are no extrinsics to take the median of.")
     stack = np.array(extrinsics)
-    rotation: Matrix = stack[0, :3, :3]
+    rotation: Rotation = stack[0, :3, :3]
     for _ in range(RECENTRINGS):
         vectors = np.array([rotation_vector(other @ rotation.T) for other in stack[:, :3, :3]])
         rotation = rotation_from_vector(geometric_median(vectors)) @ rotation
     return transform(rotation, geometric_median(stack[:, :3, 3]))
 
 
-def geometric_median(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def geometric_median(points: Floats) -> Floats:
     """Weiszfeld's iteration: the point with the smallest sum of distances to ``points`` ``[N, K]``."""
-    middle: NDArray[np.float64] = np.median(points, axis=0)
+    middle: Floats = np.median(points, axis=0)
     distances = np.linalg.norm(points - middle, axis=1)
     smallest = max(SMOOTHING * float(np.median(distances)), SMALLEST)
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         pulls = 1.0 / np.hypot(np.linalg.norm(points - middle, axis=1), smallest)
-        moved: NDArray[np.float64] = (pulls[:, None] / pulls.sum() * points).sum(axis=0)
+        moved: Floats = (pulls[:, None] / pulls.sum() * points).sum(axis=0)
         if np.linalg.norm(moved - middle) < SETTLED:
             break
         middle = moved

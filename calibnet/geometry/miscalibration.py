@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 
 from calibnet.errors import ConfigError
 from calibnet.geometry.se3 import (
-    Matrix,
     euler_xyz,
     rotation_from_euler_xyz,
     rotation_from_vector,
     rotation_vector,
     transform,
 )
+from calibnet.geometry.types import Transform
 
 
 @dataclass(frozen=True, order=True)
@@ -41,49 +41,49 @@ class MiscalibrationRange:
 
 
 RANGES: tuple[MiscalibrationRange, ...] = tuple(
-    MiscalibrationRange(*bounds) for bounds in ((20, 1.5), (10, 1.0), (5, 0.5), (2, 0.2), (1, 0.1))
+    MiscalibrationRange(*range_) for range_ in ((20, 1.5), (10, 1.0), (5, 0.5), (2, 0.2), (1, 0.1))
 )
 """The five ranges of the cascade (paper section 3.5), coarse to fine."""
 
 
-def is_finest(bounds: MiscalibrationRange) -> bool:
-    """Whether no stage comes after that of ``bounds``: only it can judge, and leaves pixels."""
-    return bounds == RANGES[-1]
+def is_finest(range_: MiscalibrationRange) -> bool:
+    """Whether no stage comes after that of ``range_``: only it can judge, and leaves pixels."""
+    return range_ == RANGES[-1]
 
 
-def miscalibration(roll_pitch_yaw_deg: ArrayLike, xyz_m: ArrayLike) -> Matrix:
+def miscalibration(roll_pitch_yaw_deg: ArrayLike, xyz_m: ArrayLike) -> Transform:
     """The ``delta`` of given angles (degrees, about camera z, x, y) and offsets (metres)."""
     roll, pitch, yaw = np.radians(roll_pitch_yaw_deg)
     return transform(rotation_from_euler_xyz([pitch, yaw, roll]), xyz_m)
 
 
-def sample_miscalibration(bounds: MiscalibrationRange, generator: np.random.Generator) -> Matrix:
-    """Draw one ``delta`` uniformly within ``bounds``."""
-    angles = generator.uniform(-bounds.rotation_deg, bounds.rotation_deg, 3)
-    return miscalibration(angles, generator.uniform(-bounds.translation_m, bounds.translation_m, 3))
+def sample_miscalibration(range_: MiscalibrationRange, generator: np.random.Generator) -> Transform:
+    """Draw one ``delta`` uniformly within ``range_``."""
+    angles = generator.uniform(-range_.rotation_deg, range_.rotation_deg, 3)
+    return miscalibration(angles, generator.uniform(-range_.translation_m, range_.translation_m, 3))
 
 
-def scaled(delta: Matrix, factor: float) -> Matrix:
+def scaled(delta: Transform, factor: float) -> Transform:
     """The ``delta`` that turns and moves ``factor`` times as far about the same axes."""
     return transform(rotation_from_vector(factor * rotation_vector(delta[:3, :3])), factor * delta[:3, 3])
 
 
-def bounds_of(delta: Matrix) -> MiscalibrationRange:
+def range_of(delta: Transform) -> MiscalibrationRange:
     """The smallest range that contains ``delta``: its largest angle and its largest offset of any axis."""
     angles = np.degrees(np.abs(euler_xyz(delta[:3, :3])))
     return MiscalibrationRange(float(angles.max()), float(np.abs(delta[:3, 3]).max()))
 
 
-def stages_within(bounds: MiscalibrationRange) -> tuple[int, ...]:
-    """Numbers (1..5) of the stages that a run starting within ``bounds`` goes through.
+def stages_within(range_: MiscalibrationRange) -> tuple[int, ...]:
+    """Numbers (1..5) of the stages that a run starting within ``range_`` goes through.
 
-    The first is the finest whose range covers ``bounds`` (``5/0.5`` gives ``3, 4, 5``), so a start
+    The first is the finest whose range covers ``range_`` (``5/0.5`` gives ``3, 4, 5``), so a start
     between two ranges begins with the wider of them; beyond all ranges the run begins with stage 1.
     """
     slack = 1e-6
     covering = [
         number
         for number, stage in enumerate(RANGES, start=1)
-        if stage.rotation_deg >= bounds.rotation_deg - slack and stage.translation_m >= bounds.translation_m - slack
+        if stage.rotation_deg >= range_.rotation_deg - slack and stage.translation_m >= range_.translation_m - slack
     ]
     return tuple(range(max(covering, default=1), len(RANGES) + 1))

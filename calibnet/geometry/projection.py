@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry.camera import PinholeCamera
-from calibnet.geometry.se3 import Matrix, transform_points
+from calibnet.geometry.se3 import transform_points
+from calibnet.geometry.types import Extrinsic
 
 MINIMUM_DEPTH = 0.5
 """Metres in front of the camera below which a point is the car itself or numerically useless."""
@@ -41,7 +42,7 @@ class Projection:
         return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
 
 
-def project(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> Projection:
+def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera) -> Projection:
     """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""
     x, y, depth = transform_points(camera_from_lidar, points[:, :3]).T
     in_front = np.flatnonzero(depth > MINIMUM_DEPTH)
@@ -79,7 +80,9 @@ def cells_of_points(
     return (height, width), np.minimum(row, height - 1) * width + np.minimum(column, width - 1)
 
 
-def depth_image(points: NDArray[np.float32], camera_from_lidar: Matrix, camera: PinholeCamera) -> NDArray[np.float32]:
+def depth_image(
+    points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera
+) -> NDArray[np.float32]:
     """Sparse depth ``[H, W]`` in metres, 0 where no point falls."""
     projection = project(points, camera_from_lidar, camera)
     winner = nearest_per_cell(projection, camera)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Matrix = NDArray[np.float64]
+from calibnet.geometry.types import Extrinsic, Floats, Rotation, Transform, Vector3, Vector6
 
 
-def transform(rotation: ArrayLike, translation: ArrayLike) -> Matrix:
+def transform(rotation: ArrayLike, translation: ArrayLike) -> Transform:
     """Build a 4x4 transform from a 3x3 rotation and a translation of 3 metres."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation
@@ -18,13 +18,13 @@ def transform(rotation: ArrayLike, translation: ArrayLike) -> Matrix:
     return matrix
 
 
-def invert(matrix: Matrix) -> Matrix:
+def invert(matrix: Transform) -> Transform:
     """Invert a rigid 4x4 transform: ``source_from_target``."""
     rotation = matrix[:3, :3]
     return transform(rotation.T, -rotation.T @ matrix[:3, 3])
 
 
-def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def orthonormal(matrix: Transform) -> Transform:
     """Remove the rounding of single precision from the rotation of a 4x4 transform."""
     u, _, vt = np.linalg.svd(matrix[:3, :3])
     exact = matrix.copy()
@@ -32,7 +32,7 @@ def orthonormal(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return exact
 
 
-def transform_points(target_from_source: Matrix, points: NDArray[np.floating]) -> NDArray[np.floating]:
+def transform_points(target_from_source: Transform, points: NDArray[np.floating]) -> NDArray[np.floating]:
     """Map points ``[N, 3]`` from source to target; the points' own precision is kept.
 
     Not a matrix product: so slim a one gains nothing from the threads of BLAS, which then wait in a loop for
@@ -46,7 +46,7 @@ def transform_points(target_from_source: Matrix, points: NDArray[np.floating]) -
     return moved.T
 
 
-def rotation_from_euler_xyz(angles: ArrayLike) -> Matrix:
+def rotation_from_euler_xyz(angles: ArrayLike) -> Rotation:
     """Rotation ``Rx(a) Ry(b) Rz(c)`` from three angles in radians."""
     a, b, c = np.asarray(angles, dtype=np.float64)
     ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
@@ -59,46 +59,46 @@ def rotation_from_euler_xyz(angles: ArrayLike) -> Matrix:
     )
 
 
-def rotation_from_vector(vector: ArrayLike) -> Matrix:
+def rotation_from_vector(vector: ArrayLike) -> Rotation:
     """Rodrigues: the rotation by ``|vector|`` radians about ``vector``."""
     axis = np.asarray(vector, dtype=np.float64)
     angle = float(np.linalg.norm(axis))
     if angle < 1e-12:
         return np.eye(3)
     cross = _cross(axis / angle)
-    rotation: Matrix = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    rotation: Rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return rotation
 
 
-def rotation_jacobian(vector: ArrayLike) -> Matrix:
+def rotation_jacobian(vector: ArrayLike) -> Floats:
     """``J [3, 3]`` of a rotation vector: turning by ``J d`` after ``vector`` is turning by ``vector + d``, d small."""
     turn = np.asarray(vector, dtype=np.float64)
     angle, cross = float(np.linalg.norm(turn)), _cross(turn)
     if angle < 1e-4:  # where the fractions below lose their digits
         return np.eye(3) + cross / 2
     straight, bent = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
-    jacobian: Matrix = np.eye(3) + straight * cross + bent * cross @ cross
+    jacobian: Floats = np.eye(3) + straight * cross + bent * cross @ cross
     return jacobian
 
 
-def rotation_vector(rotation: NDArray[np.floating]) -> Matrix:
+def rotation_vector(rotation: NDArray[np.floating]) -> Vector3:
     """The vector, in radians, of ``rotation_from_vector`` (for angles below 180 degrees)."""
     axis = _sine_axis(rotation)
     sine = float(np.linalg.norm(axis))
     return axis * (rotation_angle(rotation) / sine) if sine > 1e-12 else axis
 
 
-def pose_vector(correction: Matrix) -> NDArray[np.float64]:
+def pose_vector(correction: Transform) -> Vector6:
     """A 4x4 correction as ``(translation m, rotation vector rad)``."""
     return np.concatenate([correction[:3, 3], rotation_vector(correction[:3, :3])])
 
 
-def pose_from_vector(vector: NDArray[np.float64]) -> Matrix:
+def pose_from_vector(vector: Vector6) -> Transform:
     """The inverse of `pose_vector`."""
     return transform(rotation_from_vector(vector[3:]), vector[:3])
 
 
-def euler_xyz(rotation: NDArray[np.floating]) -> Matrix:
+def euler_xyz(rotation: NDArray[np.floating]) -> Vector3:
     """The three angles, in radians, of ``rotation_from_euler_xyz`` (for |b| < 90 degrees)."""
     return np.array(
         [
@@ -114,13 +114,13 @@ def rotation_angle(rotation: NDArray[np.floating]) -> float:
     return float(np.arctan2(np.linalg.norm(_sine_axis(rotation)), 0.5 * (np.trace(rotation) - 1.0)))
 
 
-def _cross(vector: Matrix) -> Matrix:
+def _cross(vector: Vector3) -> Floats:
     """The matrix of the cross product with ``vector``."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _sine_axis(rotation: NDArray[np.floating]) -> Matrix:
+def _sine_axis(rotation: NDArray[np.floating]) -> Vector3:
     """The rotation's axis, as long as the sine of its angle."""
     return 0.5 * np.array(
         [
@@ -149,7 +149,7 @@ class PoseError:
     z_cm: float
 
 
-def pose_error(estimate: Matrix, reference: Matrix) -> PoseError:
+def pose_error(estimate: Extrinsic, reference: Extrinsic) -> PoseError:
     """Compare two ``camera_from_lidar``: angle of ``R_est R_ref^T`` and ``|t_est - t_ref|``."""
     rotation = estimate[:3, :3] @ reference[:3, :3].T
     offset = 100.0 * (estimate[:3, 3] - reference[:3, 3])

@@ -46,7 +46,7 @@ class NetworkConfig:
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
     largest_match_error: float = math.inf  # pixels that the last stage may expect its matches to be off, to be believed
-    rounds: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
+    looks: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
     gains: tuple[float, ...] = (1.0,) * len(RANGES)  # by which each stage's corrections are extended
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
@@ -87,8 +87,8 @@ class NetworkConfig:
                 f"zooms has one positive number a stage, {len(RANGES)} in all",
             ),
             (
-                len(self.rounds) != len(RANGES) or min(self.rounds) < 1,
-                f"rounds has one number of at least 1 a stage, {len(RANGES)} in all",
+                len(self.looks) != len(RANGES) or min(self.looks) < 1,
+                f"looks has one number of at least 1 a stage, {len(RANGES)} in all",
             ),
             (
                 len(self.gains) != len(RANGES) or min(self.gains) <= 0,
@@ -110,25 +110,25 @@ class NetworkConfig:
             if wrong:
                 raise ConfigError(f"Preset {self.name!r}: {message}.")
 
-    def zoom(self, bounds: MiscalibrationRange) -> float:
+    def zoom(self, range_: MiscalibrationRange) -> float:
         """Size of the image of the stage with this range, relative to the input's.
 
         A wide range is about coarse things, and its search window has to reach far; a narrow one is about fractions
         of a cell.
         """
-        return dict(zip(RANGES, self.zooms, strict=True)).get(bounds, 1.0)
+        return dict(zip(RANGES, self.zooms, strict=True)).get(range_, 1.0)
 
-    def gain_of(self, bounds: MiscalibrationRange) -> float:
+    def gain_of(self, range_: MiscalibrationRange) -> float:
         """What the corrections of the stage with this range are multiplied by.
 
         Trained to be least wrong on average, a network falls short where it is unsure; most of what is left then
         lies in the direction in which it has gone.
         """
-        return dict(zip(RANGES, self.gains, strict=True)).get(bounds, 1.0)
+        return dict(zip(RANGES, self.gains, strict=True)).get(range_, 1.0)
 
-    def rounds_of(self, bounds: MiscalibrationRange) -> int:
+    def looks_of(self, range_: MiscalibrationRange) -> int:
         """How often the stage with this range looks at most; another look costs its time again, from much nearer."""
-        return dict(zip(RANGES, self.rounds, strict=True)).get(bounds, 1)
+        return dict(zip(RANGES, self.looks, strict=True)).get(range_, 1)
 
     @property
     def volume_scales(self) -> tuple[int, ...]:

@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, bounds_of, orthonormal, scaled
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, range_of, scaled
+from calibnet.geometry.types import Transform
 from calibnet.network.aggregation import Aggregation
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
 from calibnet.network.displacement import DisplacementDecoder, DisplacementField
 from calibnet.network.features import FeatureExtractor
-from calibnet.network.inputs import input_camera
 from calibnet.network.layers import channels_last
 from calibnet.network.pose import HEADS, Pose
 
@@ -77,38 +76,38 @@ def no_clock(part: str) -> None:
 class CalibrationNetwork(nn.Module):
     """Features, cost volumes, 3-D hourglass, displacement field, pose."""
 
-    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+    def __init__(self, config: NetworkConfig, range_: MiscalibrationRange) -> None:
         super().__init__()
-        self.config, self.bounds = config, bounds
+        self.config, self.range = config, range_
         self.features = FeatureExtractor(config)
         self.cost_volumes = nn.ModuleList(CostVolume(config) for _ in config.volume_scales)
         self.aggregation = Aggregation(config)
         self.displacement = DisplacementDecoder(config)
-        self.pose = HEADS[config.head](config, bounds)
+        self.pose = HEADS[config.head](config, range_)
         channels_last(self)
 
     def input_camera(self, camera: PinholeCamera) -> PinholeCamera:
         """The camera of this stage's image of a frame."""
-        config, zoom = self.config, self.config.zoom(self.bounds)
-        return input_camera(camera, zoom * config.input_height, zoom * config.input_width, config.scales[-1])
+        config, zoom = self.config, self.config.zoom(self.range)
+        return camera.fitted(zoom * config.input_height, zoom * config.input_width, config.scales[-1])
 
     @property
-    def rounds(self) -> int:
+    def looks(self) -> int:
         """How often this stage runs at most, one look after the other."""
-        return self.config.rounds_of(self.bounds)
+        return self.config.looks_of(self.range)
 
-    def is_settled(self, correction: NDArray[np.float64]) -> bool:
+    def is_settled(self, correction: Transform) -> bool:
         """Whether the next stage can take over: what this look corrected (4x4) is within that one's range."""
-        position = RANGES.index(self.bounds) if self.bounds in RANGES else len(RANGES)
-        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], bounds_of(correction)
+        position = RANGES.index(self.range) if self.range in RANGES else len(RANGES)
+        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], range_of(correction)
         return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
 
-    def correction(self, output: NetworkOutput) -> NDArray[np.float64]:
+    def correction(self, output: NetworkOutput) -> Transform:
         """The 4x4 correction of the first frame of a batch, extended by the stage's gain."""
         estimate = output.pose.correction[0].double().cpu().numpy()
         if not np.isfinite(estimate).all():
             return estimate.astype(np.float64)
-        return scaled(orthonormal(estimate), self.config.gain_of(self.bounds))
+        return scaled(orthonormal(estimate), self.config.gain_of(self.range))
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""

@@ -35,9 +35,9 @@ class Pose(NamedTuple):
     information: Tensor | None
 
 
-def prior_information(bounds: MiscalibrationRange) -> Tensor:
+def prior_information(range_: MiscalibrationRange) -> Tensor:
     """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration."""
-    sigma = [bounds.translation_m / 3**0.5] * 3 + [math.radians(bounds.rotation_deg) / 3**0.5] * 3
+    sigma = [range_.translation_m / 3**0.5] * 3 + [math.radians(range_.rotation_deg) / 3**0.5] * 3
     return torch.tensor(sigma).clamp(min=1e-4) ** -2
 
 
@@ -88,10 +88,10 @@ class RegressionHead(nn.Module):
 
     POOLED = (4, 8)
 
-    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+    def __init__(self, config: NetworkConfig, range_: MiscalibrationRange) -> None:
         super().__init__()
         width, norm = config.context_channels, config.normalization
-        self.bounds = bounds
+        self.range = range_
         self.reduce = nn.Sequential(ConvBlock(width + 5, width, norm, stride=2), ConvBlock(width, width, norm))
         cells = self.POOLED[0] * self.POOLED[1]
         self.hidden = nn.Sequential(nn.Linear(width * cells, 256), nn.ReLU(inplace=True))
@@ -103,8 +103,8 @@ class RegressionHead(nn.Module):
         inputs = torch.cat([field.features, field.displacement / 32.0, field.log_scale, inverse], dim=1)
         pooled = F.adaptive_avg_pool2d(self.reduce(inputs.contiguous(memory_format=torch.channels_last)), self.POOLED)
         hidden = self.hidden(pooled.flatten(1))
-        translation = self.translation(hidden).float() * self.bounds.translation_m
-        half_angle = torch.deg2rad(torch.tensor(self.bounds.rotation_deg / 2))
+        translation = self.translation(hidden).float() * self.range.translation_m
+        half_angle = torch.deg2rad(torch.tensor(self.range.rotation_deg / 2))
         vector = self.quaternion(hidden).float()
         quaternion = torch.cat(
             [torch.ones_like(vector[:, :1]) + 0.1 * vector[:, :1], vector[:, 1:] * half_angle], dim=1
@@ -123,9 +123,9 @@ class GeometricHead(nn.Module):
     ITERATIONS = 5
     prior: Tensor
 
-    def __init__(self, config: NetworkConfig, bounds: MiscalibrationRange) -> None:
+    def __init__(self, config: NetworkConfig, range_: MiscalibrationRange) -> None:
         super().__init__()
-        self.register_buffer("prior", prior_information(bounds), persistent=False)
+        self.register_buffer("prior", prior_information(range_), persistent=False)
 
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
         """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""

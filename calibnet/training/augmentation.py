@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import resize_image
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
-from calibnet.network.inputs import resize_image
 
 Generator = np.random.Generator
 

@@ -12,9 +12,9 @@ from lightning_fabric.plugins.precision import MixedPrecision
 from torch.utils.data import Sampler
 
 from calibnet.errors import CalibnetError
-from calibnet.interruption import SIGNALS
 from calibnet.network.network import NetworkInputs
-from calibnet.precision import autocast
+from calibnet.runtime.interruption import SIGNALS
+from calibnet.runtime.precision import autocast
 from calibnet.training.losses import Target
 
 Batch = tuple[NetworkInputs, Target]

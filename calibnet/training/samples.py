@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
 from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.images import resize_image
 from calibnet.errors import DatasetError
 from calibnet.geometry import (
     MiscalibrationRange,
@@ -22,7 +23,8 @@ from calibnet.geometry import (
     transform_points,
 )
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.network.inputs import LidarInput, below, lidar_input, resize_image
+from calibnet.geometry.types import Extrinsic, Floats, Transform
+from calibnet.network.batch import LidarInput, below, lidar_input
 from calibnet.network.network import NetworkInputs
 from calibnet.training.augmentation import augment
 from calibnet.training.losses import Target
@@ -43,8 +45,8 @@ class Sample:
     visible: list[NDArray[np.bool_]]
 
 
-def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDArray[np.float64],
-                  camera: PinholeCamera, correction: NDArray[np.float64]) -> list[NDArray[np.bool_]]:  # fmt: skip
+def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: Extrinsic,
+                  camera: PinholeCamera, correction: Transform) -> list[NDArray[np.bool_]]:  # fmt: skip
     """Per scale ``[h, w]``: does the camera, truly placed, see the cell's point?
 
     A point is taken as hidden when another one within 4 px is clearly nearer: the scanner looks over
@@ -70,9 +72,9 @@ def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: NDA
 
 def make_sample(
     frame: Frame,
-    delta: NDArray[np.float64],
+    delta: Transform,
     scales: tuple[int, ...],
-    shift: NDArray[np.float64] | tuple[float, float] = (0.0, 0.0),
+    shift: Floats | tuple[float, float] = (0.0, 0.0),
 ) -> Sample:
     """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
 
@@ -148,7 +150,7 @@ class TrainingSamples(Dataset[Sample]):
     def __init__(
         self,
         sources: Many[Source],
-        bounds: MiscalibrationRange,
+        range_: MiscalibrationRange,
         scales: tuple[int, ...],
         area: float,
         batch: int,
@@ -164,13 +166,13 @@ class TrainingSamples(Dataset[Sample]):
 
         A stage whose image is larger than ``area`` by the square of ``magnification`` is trained on cuttings of it.
         """
-        self.sources, self.bounds, self.scales = list(sources), bounds, scales
+        self.sources, self.range, self.scales = list(sources), range_, scales
         self.batch, self.seed, self.warm_up, self.magnification = batch, seed, warm_up, magnification
         weights = np.array([source.weight for source in sources], dtype=np.float64)
         self.probability = weights / weights.sum()
         factor = (area / (160 * 512)) ** 0.5
         self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
-        self.residuals: list[NDArray[np.float64]] = []
+        self.residuals: list[Transform] = []
         self.residual_share = self.RESIDUAL_SHARE
         self.cache: dict[tuple[int, int], Frame] = {}
 
@@ -222,7 +224,7 @@ class TrainingSamples(Dataset[Sample]):
             if not synthetic or generator.random() < strength:
                 return source
 
-    def draw(self, generator: np.random.Generator) -> NDArray[np.float64]:
+    def draw(self, generator: np.random.Generator) -> Transform:
         """A miscalibration anywhere in the range, or, mostly, as the looks before leave behind.
 
         Sometimes a small one, as a stage must also know when to stop.
@@ -231,5 +233,5 @@ class TrainingSamples(Dataset[Sample]):
             residual = self.residuals[generator.integers(len(self.residuals))]
             return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
         share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
-        bounds = MiscalibrationRange(self.bounds.rotation_deg * share, self.bounds.translation_m * share)
-        return sample_miscalibration(bounds, generator)
+        range_ = MiscalibrationRange(self.range.rotation_deg * share, self.range.translation_m * share)
+        return sample_miscalibration(range_, generator)

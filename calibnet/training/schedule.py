@@ -15,13 +15,13 @@ class Step:
     """One stage's turn.
 
     Attributes:
-        bounds: the stage.
+        range: the stage.
         share: of the whole budget.
         neighbour: stage whose weights it starts from; None for the first, which learns the features.
         learning_rate: relative to the first one's.
     """
 
-    bounds: MiscalibrationRange
+    range: MiscalibrationRange
     share: float
     neighbour: MiscalibrationRange | None
     learning_rate: float
@@ -53,16 +53,16 @@ def all_stages(options: TrainingOptions) -> list[TrainingOptions]:
     """
     whole = Path(options.output)
     folders = [whole if step.neighbour else whole / FEATURES for step in SCHEDULE]
-    paths = [weights_path(options.preset, step.bounds, folder) for step, folder in zip(SCHEDULE, folders, strict=True)]
+    paths = [weights_path(options.preset, step.range, folder) for step, folder in zip(SCHEDULE, folders, strict=True)]
 
-    def latest(bounds: MiscalibrationRange, position: int) -> Path:
+    def latest(range_: MiscalibrationRange, position: int) -> Path:
         """Weights of a stage as they are before the step at this position."""
-        return next(paths[earlier] for earlier in reversed(range(position)) if SCHEDULE[earlier].bounds == bounds)
+        return next(paths[earlier] for earlier in reversed(range(position)) if SCHEDULE[earlier].range == range_)
 
     return [
         replace(
             options,
-            range=str(step.bounds),
+            range=str(step.range),
             output=str(folders[position]),
             minutes=options.minutes and options.minutes * step.share,
             samples=options.samples and max(options.batch, round(options.samples * step.share)),

@@ -16,9 +16,9 @@ from torch.utils.data import DataLoader
 
 from calibnet.errors import CalibrationError, ConfigError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.interruption import StopRequest
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.runtime.interruption import StopRequest
 from calibnet.training.batches import Batch, BatchNumbers, FloatInputs, leave_signals_to_main, next_batch
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
 from calibnet.training.data import training_sources
@@ -55,12 +55,12 @@ class Trainer:
         strategy = "ddp_find_unused_parameters_true" if torch.cuda.device_count() > 1 else "auto"
         self.fabric = Fabric(accelerator="auto", devices="auto", strategy=strategy, plugins=[FloatInputs()])
         self.fabric.launch()
-        self.bounds = MiscalibrationRange.parse(options.range)
+        self.range = MiscalibrationRange.parse(options.range)
         self.folder = Path(options.output)
         config = load_preset(options.preset)
         if options.head:
             config = replace(config, head=options.head)
-        self.network = CalibrationNetwork(config, self.bounds)
+        self.network = CalibrationNetwork(config, self.range)
         self.network.features.load_pretrained()
         for parameter in self.network.features.pretrained_levels()[: self.FROZEN_LEVELS].parameters():
             parameter.requires_grad_(False)
@@ -81,10 +81,10 @@ class Trainer:
             self.warm_up = 0
         if options.samples:
             self.warm_up = min(self.warm_up, options.samples // 3)
-        zoom = config.zoom(self.bounds)
+        zoom = config.zoom(self.range)
         area = config.input_height * config.input_width * min(zoom, 1.0) ** 2
         self.data = TrainingSamples(
-            sources, self.bounds, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
+            sources, self.range, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
         )
         if options.after:
             self._draw_residuals(Path(options.after), start)
@@ -121,11 +121,11 @@ class Trainer:
 
         Not so the look of a neighbour of which this stage starts, nor of a stage that looks only once.
         """
-        before = stages_before(self.options.preset, self.bounds, folder)
-        looks_again = start is not None and start.bounds == self.bounds and start.rounds > 1
+        before = stages_before(self.options.preset, self.range, folder)
+        looks_again = start is not None and start.range == self.range and start.looks > 1
         if before or looks_again:
             self.data.residuals = residual_errors(
-                before, self.data, self.bounds, self.RESIDUALS, start if looks_again else None
+                before, self.data, self.range, self.RESIDUALS, start if looks_again else None
             )
         if not before:
             self.data.residual_share = self.data.OWN_SHARE
@@ -133,7 +133,7 @@ class Trainer:
     @property
     def checkpoint(self) -> Path:
         """The file a run is resumed from."""
-        return weights_path(self.options.preset, self.bounds, self.folder).with_suffix(".checkpoint")
+        return weights_path(self.options.preset, self.range, self.folder).with_suffix(".checkpoint")
 
     @property
     def samples(self) -> int:
@@ -260,7 +260,7 @@ class Trainer:
 
     def _save_weights(self, figures: ValidationFigures | None) -> Path:
         record = training_record(self.options, self.samples, self.seconds / 60, self.fabric.device.type, figures)
-        path = weights_path(self.options.preset, self.bounds, self.folder)
+        path = weights_path(self.options.preset, self.range, self.folder)
         if self.fabric.is_global_zero:
             save_network(path, self.network, self.average.module.state_dict(), record)
         return path

@@ -10,7 +10,7 @@ import torch
 from calibnet.datasets import Sequence
 from calibnet.geometry import pose_error, sample_miscalibration
 from calibnet.network.network import CalibrationNetwork
-from calibnet.precision import autocast
+from calibnet.runtime.precision import autocast
 from calibnet.training.samples import Sample, collate, make_sample, plain
 
 
@@ -36,7 +36,7 @@ class Validation:
             for frame in sequence:
                 small = plain(frame, network.input_camera(frame.camera))
                 self.samples += [
-                    make_sample(small, sample_miscalibration(network.bounds, generator), config.volume_scales)
+                    make_sample(small, sample_miscalibration(network.range, generator), config.volume_scales)
                     for _ in range(repeats)
                 ]
 

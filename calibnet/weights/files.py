@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 HEADER = "calib-inspect"
 
 
-def weights_path(preset: str, bounds: MiscalibrationRange, folder: Path | None = None) -> Path:
+def weights_path(preset: str, range_: MiscalibrationRange, folder: Path | None = None) -> Path:
     """Where the weights of a preset's stage lie: in ``folder``, or in the package."""
-    name = f"{preset}-{bounds.rotation_deg:g}deg-{bounds.translation_m:g}m.safetensors"
+    name = f"{preset}-{range_.rotation_deg:g}deg-{range_.translation_m:g}m.safetensors"
     return (folder or Path(__file__).parent) / name
 
 
@@ -29,10 +29,10 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
     import torch
     from safetensors.torch import save_file
 
-    bounds = network.bounds
+    range_ = network.range
     header = {
         "config": asdict(network.config),
-        "range": str(bounds),
+        "range": str(range_),
         "record": record,
     }
     tensors = {name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()}
@@ -93,6 +93,7 @@ def load_network(path: Path) -> CalibrationNetwork:
     from calibnet.network.network import CalibrationNetwork
 
     header = read_header(path)
+    header["config"] = {"looks" if key == "rounds" else key: value for key, value in header["config"].items()}
     try:
         config = parse_config(header["config"], f"The header of {path}")
         network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))

@@ -46,7 +46,7 @@ def benchmark(
     from rich.console import Console
     from rich.progress import Progress
 
-    from calibnet.cascade import Cascade
+    from calibnet.cascade.cascade import Cascade
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
     from calibnet.evaluation import benchmark as timing
 

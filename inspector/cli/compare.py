@@ -14,8 +14,8 @@ from inspector.cli.recordings import RECORDING, open_run
 from inspector.cli.viewing import choose_outputs, saved_lines, viewing_options
 
 if TYPE_CHECKING:
-    from inspector.comparison import Comparison
-    from inspector.outputs import Outputs
+    from inspector.compare.comparison import Comparison
+    from inspector.record.outputs import Outputs
 
 
 @click.command()
@@ -44,9 +44,9 @@ def compare(
     if len(called) != len(recordings):
         raise click.UsageError(f"--names has {len(called)} names for {len(recordings)} recordings.")
 
-    from inspector.comparison import Comparison
-    from inspector.comparison_recording import record_comparison
-    from inspector.stream import RecordingLostError
+    from inspector.compare.comparison import Comparison
+    from inspector.compare.recording import record_comparison
+    from inspector.record.stream import RecordingLostError
 
     outputs = choose_outputs(f"compare-{'-'.join(called)}", save, headless, serve, bind, connect)
     refuse_overwriting(outputs.file, recordings)

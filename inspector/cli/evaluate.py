@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from calibnet.cascade import Cascade
+    from calibnet.cascade.cascade import Cascade
     from calibnet.evaluation.drives import DriveMetrics
     from calibnet.evaluation.metrics import Metrics
     from calibnet.evaluation.runner import Calibrator, Evaluation
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @click.argument("more", nargs=-1, metavar="")
 @click.option("--camera", type=click.IntRange(0, 3), help="Camera of the KITTI datasets.  [default: 2]")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
-@click.option("--range", "bounds", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
+@click.option("--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
@@ -54,7 +54,7 @@ def evaluate(
     more: tuple[str, ...],
     camera: int | None,
     frames: str,
-    bounds: MiscalibrationRange,
+    range_: MiscalibrationRange,
     repeats: int,
     seed: int,
     stages: tuple[int, ...] | None,
@@ -79,15 +79,15 @@ def evaluate(
     ]
     prepare_json(json_file)
 
-    from calibnet.cascade import Cascade
+    from calibnet.cascade.cascade import Cascade
     from calibnet.geometry import stages_within
 
-    cascade = Cascade.load(preset, stages or stages_within(bounds), weights)
+    cascade = Cascade.load(preset, stages or stages_within(range_), weights)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
     console = console_beside(json_file)
     with Bars() as bars:
-        measurement = Measurement(opened, bounds, repeats, seed, bars)
+        measurement = Measurement(opened, range_, repeats, seed, bars)
         evaluation = measurement.single_frames(cascade, "single frames")
         references = {"no correction": evaluation.initial}
         if classical:
@@ -115,7 +115,7 @@ class Measurement:
     """What is measured on, and the bars that show how far it is; one method a kind of row."""
 
     sequences: list[Sequence]
-    bounds: MiscalibrationRange
+    range: MiscalibrationRange
     repeats: int
     seed: int
     bars: Bars
@@ -127,14 +127,14 @@ class Measurement:
         chosen = self.sequences if sequences is None else sequences
         advance = self.bars.add(title, self.repeats * sum(map(len, chosen)))
         return runner.evaluate(
-            calibrator, chosen, self.bounds, self.repeats, self.seed, observer=lambda run: advance(run.sequence)
+            calibrator, chosen, self.range, self.repeats, self.seed, observer=lambda run: advance(run.sequence)
         )
 
     def classical(self) -> Metrics:
         """The same by aligning edges."""
         from calibnet.evaluation.edge_alignment import EdgeAlignment
 
-        return self.single_frames(EdgeAlignment(self.bounds), "edge alignment").final
+        return self.single_frames(EdgeAlignment(self.range), "edge alignment").final
 
     def drives(self, cascade: Cascade) -> DriveMetrics | None:
         """Every sequence solved as one."""
@@ -142,7 +142,7 @@ class Measurement:
 
         show = self.bars.add("whole sequences", None)
         return evaluate_drives(
-            cascade, self.sequences, self.bounds, self.repeats, self.seed, lambda name, *_: show(name)
+            cascade, self.sequences, self.range, self.repeats, self.seed, lambda name, *_: show(name)
         )
 
     def audit(self, cascade: Cascade, donors: dict[int, Sequence]) -> dict[str, Evaluation]:
@@ -219,7 +219,7 @@ def report(evaluation: Evaluation, console: Console) -> None:
     runs = len(evaluation.runs)
     console.print(
         f"{', '.join(evaluation.sequences)} ({evaluation.rig}): {evaluation.frames} frames x {evaluation.repeats} = "
-        f"{runs} runs from ±{evaluation.bounds.rotation_deg:g}° / ±{evaluation.bounds.translation_m:g} m, "
+        f"{runs} runs from ±{evaluation.range.rotation_deg:g}° / ±{evaluation.range.translation_m:g} m, "
         f"seed {evaluation.seed}"
     )
     rows = [("initial", evaluation.initial)]

@@ -12,7 +12,7 @@ from inspector.cli.options import FOLDER
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run, write_file
 
 if TYPE_CHECKING:
-    from inspector.exported import Exported
+    from inspector.export.exported import Exported
 
 ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
@@ -64,7 +64,7 @@ def export(
         if ROS_NAME.fullmatch(name) is None:
             raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
 
-    from inspector import export_formats as formats
+    from inspector.export import formats as formats
 
     exported = chosen(recording, folder, frame, drive)
     if form == "ros":
@@ -81,7 +81,7 @@ def export(
 
 def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool) -> Exported:
     """The extrinsic that the options name."""
-    from inspector.exported import exported_drive, exported_folder, exported_frame, exported_median
+    from inspector.export.exported import exported_drive, exported_folder, exported_frame, exported_median
 
     if folder is not None:
         return exported_folder(folder)

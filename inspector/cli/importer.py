@@ -63,15 +63,15 @@ def import_folder(found: Recognised) -> None:
     """
     from rich.console import Console
 
-    from calibnet.cascade import Cascade
+    from calibnet.cascade.cascade import Cascade
     from calibnet.datasets import open_sequence
-    from calibnet.drive import spread
+    from calibnet.drive.solve import spread
     from calibnet.geometry import MiscalibrationRange
-    from inspector.contents import Contents, Detail
-    from inspector.outputs import Outputs
-    from inspector.recording import RunDescription
-    from inspector.session import Session
-    from inspector.start import Start
+    from inspector.record.contents import Contents, Detail
+    from inspector.record.outputs import Outputs
+    from inspector.record.recording import RunDescription
+    from inspector.run.session import Session
+    from inspector.run.start import Start
 
     sequence: Sequence = open_sequence(found.dataset, found.root, **found.options)
     positions = spread(len(sequence), MOST_FRAMES)

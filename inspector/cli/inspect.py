@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from calibnet.errors import ConfigError
+from calibnet.geometry.types import Transform
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, STAGES
 from inspector.cli.viewing import RECORDINGS, choose_outputs, saved_lines, viewing_options
@@ -19,11 +20,10 @@ if TYPE_CHECKING:
 
     from calibnet.datasets import Sequence
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.geometry.se3 import Matrix
-    from inspector.contents import Contents
-    from inspector.outputs import Outputs
-    from inspector.start import Start
-    from inspector.summary import Summary
+    from inspector.record.contents import Contents
+    from inspector.record.outputs import Outputs
+    from inspector.run.start import Start
+    from inspector.run.summary import Summary
 
 DEFAULT_RANGE = "5/0.5"
 DEMO_LENGTH = 12
@@ -32,7 +32,7 @@ _SHARED_OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
     click.option(
         "--range",
-        "bounds",
+        "range_",
         type=RANGE,
         help=f"Draw the miscalibration from ± these degrees and metres.  [default: {DEFAULT_RANGE}]",
     ),
@@ -152,7 +152,7 @@ def folder(directory: Path, **options: Any) -> int:
     """
     from calibnet.datasets import open_sequence
 
-    as_is = options["bounds"] is None and options["given"] is None
+    as_is = options["range_"] is None and options["given"] is None
     return calibrate(open_sequence("folder", directory), as_is=as_is, **options)
 
 
@@ -185,8 +185,8 @@ def calibrate(
     sequence: Sequence,
     *,
     frames: str,
-    bounds: MiscalibrationRange | None,
-    given: Matrix | None,
+    range_: MiscalibrationRange | None,
+    given: Transform | None,
     per_frame: bool,
     seed: int,
     sequence_estimate: bool,
@@ -208,15 +208,15 @@ def calibrate(
     """Run the cascade on a sequence as the options say; returns the exit code."""
     from rich.console import Console
 
-    from calibnet.cascade import Cascade
+    from calibnet.cascade.cascade import Cascade
     from calibnet.datasets import select_frames
     from calibnet.geometry import MiscalibrationRange
-    from inspector.recording import RunDescription
-    from inspector.session import Session
-    from inspector.start import Start
-    from inspector.stream import RecordingLostError
+    from inspector.record.recording import RunDescription
+    from inspector.record.stream import RecordingLostError
+    from inspector.run.session import Session
+    from inspector.run.start import Start
 
-    if bounds is not None and given is not None:
+    if range_ is not None and given is not None:
         raise click.UsageError("Give --range or --miscalibrate, not both.")
     if given is not None and per_frame:
         raise click.UsageError("--per-frame draws from --range; --miscalibrate is the same for all frames.")
@@ -236,7 +236,7 @@ def calibrate(
         save = save or report / RECORDING
     outputs = choose_outputs(sequence.name, save, headless, serve, bind, connect)
     outputs.check()
-    start = Start(bounds or MiscalibrationRange.parse(DEFAULT_RANGE), seed, per_frame, given, as_is)
+    start = Start(range_ or MiscalibrationRange.parse(DEFAULT_RANGE), seed, per_frame, given, as_is)
     cascade = Cascade.load(preset, stages or start.stages, weights)
     console = Console(stderr=True, highlight=False)
     announce(console, sequence, start, cascade)
@@ -268,7 +268,7 @@ def calibrate(
 
 def choose_contents(detail: str | None, parts: tuple[str, ...] | None, color: str) -> Contents:
     """What is recorded of each frame; --log alone means --detail custom."""
-    from inspector.contents import Coloring, Contents, Detail, Part
+    from inspector.record.contents import Coloring, Contents, Detail, Part
 
     level = Detail(detail or ("full" if parts is None else "custom"))
     if (level is Detail.CUSTOM) != (parts is not None):
@@ -292,7 +292,7 @@ def describe(start: Start) -> str:
         return "from the calibration as it is"
     if start.given is not None:
         return "miscalibrated as given"
-    return f"miscalibrated within {start.bounds}{', anew every frame' if start.per_frame else ''}, seed {start.seed}"
+    return f"miscalibrated within {start.range}{', anew every frame' if start.per_frame else ''}, seed {start.seed}"
 
 
 def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:
@@ -333,7 +333,7 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
 
 def size_line(file: Path, frames: int) -> str:
     """What a frame's bytes go to."""
-    from inspector.sizes import sizes_by_group
+    from inspector.read.sizes import sizes_by_group
 
     parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
     return f"Kilobytes a frame: {', '.join(parts)}."

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.geometry.types import Transform
+
 if TYPE_CHECKING:
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.geometry.se3 import Matrix
 
 STAGE_COUNT = 5
 FRAMES_PATTERN = re.compile(r"-?\d+|(-?\d+)?:(-?\d+)?(:-?[1-9]\d*)?")
@@ -69,12 +70,12 @@ class FramesType(click.ParamType[str]):
         return text
 
 
-class MiscalibrationType(click.ParamType["Matrix"]):
+class MiscalibrationType(click.ParamType["Transform"]):
     """``roll,pitch,yaw,x,y,z`` in degrees and metres to a 4x4 ``delta`` in the camera frame."""
 
     name = "ROLL,PITCH,YAW,X,Y,Z"
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Matrix:
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Transform:
         """Parse the text; a value that is a matrix already is kept."""
         import numpy as np
 
@@ -92,13 +93,13 @@ class MiscalibrationType(click.ParamType["Matrix"]):
 
 
 class PartsType(click.ParamType[tuple[str, ...]]):
-    """Names of `inspector.contents.Part` with commas between them, to a tuple."""
+    """Names of `inspector.record.contents.Part` with commas between them, to a tuple."""
 
     name = "PART,PART"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
         """Check every name; a value that is a tuple already is kept."""
-        from inspector.contents import Part
+        from inspector.record.contents import Part
 
         if isinstance(value, tuple):
             return value

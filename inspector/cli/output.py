@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.whole_file import write_whole
+from calibnet.runtime.whole_file import write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -36,8 +36,8 @@ def pictures(recording: Path, out: Path, size: tuple[int, int], frame: int | Non
 
     Needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers).
     """
-    from inspector.recorded_run import read_run
-    from inspector.screenshots import take_pictures
+    from inspector.read.run import read_run
+    from inspector.read.screenshots import take_pictures
 
     numbers = [recorded.index for recorded in read_run(recording).frames]
     shown = numbers[0] if frame is None else frame

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from inspector.recorded_run import RecordedRun
+    from inspector.read.run import RecordedRun
 
 RECORDING = click.Path(path_type=Path)
 """An ``.rrd``; whether it can be read is for `open_run` to say."""
@@ -17,7 +17,7 @@ OUTPUT_FILE = click.Path(path_type=Path, dir_okay=False)
 
 def open_run(path: Path) -> RecordedRun:
     """Read a recording; say on stderr if it is cut off."""
-    from inspector.recorded_run import read_run
+    from inspector.read.run import read_run
 
     run = read_run(path)
     if run.warning:
@@ -27,7 +27,7 @@ def open_run(path: Path) -> RecordedRun:
 
 def write_file(path: Path, content: bytes) -> None:
     """Write a file whole or not at all, and its folder if need be."""
-    from inspector.whole_file import write_whole
+    from calibnet.runtime.whole_file import write_whole
 
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, content)

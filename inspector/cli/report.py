@@ -42,7 +42,7 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
 
 def write_report_of(recording: Path, out: Path) -> None:
     """Make the report and say where it is."""
-    from inspector.recorded_run import read_run
+    from inspector.read.run import read_run
     from inspector.report.write import write_report
 
     run = read_run(recording)
@@ -53,8 +53,8 @@ def write_report_of(recording: Path, out: Path) -> None:
 
 def serve_report(folder: Path) -> None:
     """Serve a report and the viewer until Ctrl-C or SIGTERM; open the browser where there is a display."""
-    from calibnet.interruption import StopRequest
-    from inspector.outputs import has_display
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.record.outputs import has_display
     from inspector.report.serve import ReportServer, fetch_viewer, served_files
 
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network to train.")
 @click.option("--head", type=click.Choice(get_args(Head)), help="Pose head to train instead of the preset's.")
-@click.option("--range", "bounds", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
+@click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
 @click.option(
     "--all",
     "every_stage",
@@ -104,7 +104,7 @@ if TYPE_CHECKING:
 def train(
     preset: str,
     head: Head | None,
-    bounds: MiscalibrationRange | None,
+    range_: MiscalibrationRange | None,
     every_stage: bool,
     data: tuple[str, ...],
     validate: tuple[str, ...],
@@ -138,7 +138,7 @@ def train(
     if (minutes is None) == (samples is None):
         raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
 
-    if (bounds is not None) == every_stage:
+    if (range_ is not None) == every_stage:
         raise click.UsageError("Give either --range, the stage to train, or --all.")
 
     from calibnet.training.options import TrainingOptions
@@ -147,7 +147,7 @@ def train(
     options = TrainingOptions(
         preset=preset,
         head=head,
-        range=str(bounds or ""),
+        range=str(range_ or ""),
         output=str(output),
         data=list(data),
         validate=list(validate),
@@ -183,7 +183,7 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
 
     observers: list[Observer] = [ConsoleObserver(console)]
     if save is not None:
-        from inspector.training_log import TrainingLog
+        from inspector.record.training import TrainingLog
 
         observers.append(TrainingLog(save, f"{options.preset} ±{options.range}"))
     path = Trainer(options, Observers(observers), resume).run()

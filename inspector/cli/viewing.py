@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from inspector.outputs import Outputs
+    from inspector.record.outputs import Outputs
 
 RECORDINGS = Path("recordings")
 
@@ -36,7 +36,7 @@ def choose_outputs(
     name: str, save: Path | None, headless: bool, serve: bool, bind: str, connect: str | None
 ) -> Outputs:
     """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows."""
-    from inspector.outputs import Outputs, has_display
+    from inspector.record.outputs import Outputs, has_display
 
     viewer = has_display() and not (headless or serve or connect)
     if save is None and not (viewer or serve or connect):
@@ -46,7 +46,7 @@ def choose_outputs(
 
 def saved_lines(file: Path, frames: int) -> list[str]:
     """What to say about a recording that was written."""
-    from inspector.outputs import open_command
+    from inspector.record.outputs import open_command
 
     size = file.stat().st_size
     return [

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
+
+from calibnet.geometry.types import Floats
 
 WIDTH, HEIGHT = 560, 250
 LEFT, RIGHT, TOP, BOTTOM = 48, 10, 28, 40
@@ -33,7 +34,7 @@ class Series:
 
     name: str
     css: str
-    values: NDArray[np.float64] = field(repr=False)
+    values: Floats = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ def headroom(highest: float) -> float:
     return 1.06 * highest if highest > 0.0 else 1.0
 
 
-def thinned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """At most `LINE_POINTS` points of a line, with every peak and every dip kept."""
     if len(x) <= LINE_POINTS:
         return x, y

@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.median import median_pose
-from calibnet.geometry.se3 import Matrix
-from inspector.recorded_run import RecordedFrame, RecordedRun
+from calibnet.geometry.types import Extrinsic, Floats
+from inspector.read.run import RecordedFrame, RecordedRun
 
 DISTANCE_M = 10.0
 """Frames are ranked by how far, at most, a point at this distance is misplaced."""
@@ -49,12 +48,12 @@ class State:
         return Metrics.of(self.errors)
 
     @property
-    def rotation_deg(self) -> NDArray[np.float64]:
+    def rotation_deg(self) -> Floats:
         """``[N]`` degrees."""
         return np.array([error.rotation_deg for error in self.errors])
 
     @property
-    def translation_cm(self) -> NDArray[np.float64]:
+    def translation_cm(self) -> Floats:
         """``[N]`` centimetres."""
         return np.array([error.translation_cm for error in self.errors])
 
@@ -75,7 +74,7 @@ class Figures:
     run: RecordedRun
     states: tuple[State, ...]
     changes: tuple[PoseError, ...] = field(repr=False)
-    median: Matrix | None = field(repr=False)
+    median: Extrinsic | None = field(repr=False)
     median_error: PoseError | None
 
     @classmethod
@@ -90,15 +89,15 @@ class Figures:
         yardsticks = [median if frame.reference is None else frame.reference for frame in frames]
         one_mount = float(np.ptp(yardsticks, axis=0).max()) < SAME_MOUNT
 
-        def errors(extrinsics: Sequence[Matrix]) -> tuple[PoseError, ...]:
+        def errors(extrinsics: Sequence[Extrinsic]) -> tuple[PoseError, ...]:
             return tuple(pose_error(mine, other) for mine, other in zip(extrinsics, yardsticks, strict=True))
 
         start = "miscalibrated" if run.has_reference else "start"
         states = [State(start, None, None, errors([frame.initial for frame in frames]))]
-        for number, bounds in run.stages:
+        for number, range_ in run.stages:
             last = number == run.stages[-1].number
             after = errors([frame.corrected if last else frame.stages[number] for frame in frames])
-            states.append(State(f"stage {number}", number, bounds, after))
+            states.append(State(f"stage {number}", number, range_, after))
         return cls(
             run,
             tuple(states),
@@ -164,8 +163,8 @@ class Figures:
             "measured_against": "reference" if self.has_reference else "median of the corrected extrinsics",
             "initial": self._summary(self.initial),
             "stages": [
-                {"number": number, "range": bounds, **self._summary(state)}
-                for (number, bounds), state in zip(run.stages, self.states[1:], strict=True)
+                {"number": number, "range": range_, **self._summary(state)}
+                for (number, range_), state in zip(run.stages, self.states[1:], strict=True)
             ],
             "change": _distributions(self.change),
             "median_extrinsic": None if self.median is None else self.median.tolist(),

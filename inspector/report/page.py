@@ -9,8 +9,8 @@ from string import Template
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
-from inspector.contents import Coloring
-from inspector.recorded_run import RecordedRun
+from inspector.read.run import RecordedRun
+from inspector.record.contents import Coloring
 from inspector.report.charts import charts, series_styles
 from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.pictures import depth_scale

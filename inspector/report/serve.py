@@ -19,7 +19,7 @@ from urllib.error import URLError
 from urllib.parse import unquote, urlsplit
 
 from calibnet.errors import CalibnetError
-from inspector.outputs import LOCALHOST, Outputs
+from inspector.record.outputs import LOCALHOST, Outputs
 from inspector.report.write import METRICS, PAGE, PICTURES, RECORDING, VIEWER
 
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from calibnet.errors import ConfigError
+from calibnet.runtime.whole_file import write_whole
 from inspector import entities
-from inspector.recorded_run import RecordedRun
+from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures
 from inspector.report.page import Example, make_page
 from inspector.report.pictures import draw_overlay
-from inspector.whole_file import write_whole
 
 PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
 VIEWER = "viewer"

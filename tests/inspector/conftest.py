@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -11,21 +9,12 @@ from typing import Any
 
 import pytest
 
-
-def _fakes() -> ModuleType:
-    """`fakes.py` under a name of its own: test folders are no packages (importlib mode)."""
-    if "inspector_fakes" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("inspector_fakes", Path(__file__).with_name("fakes.py"))
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["inspector_fakes"] = module
-        spec.loader.exec_module(module)
-    return sys.modules["inspector_fakes"]
+from tests.support import fakes as fakes_module
 
 
 @pytest.fixture(scope="session")
 def fakes() -> ModuleType:
-    return _fakes()
+    return fakes_module
 
 
 @pytest.fixture(scope="session")
@@ -34,11 +23,11 @@ def record() -> Callable[..., None]:
     from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
-    from inspector.contents import Coloring, Contents, Detail, Part
-    from inspector.outputs import Outputs
-    from inspector.recording import RunDescription
-    from inspector.session import Session
-    from inspector.start import Start
+    from inspector.record.contents import Coloring, Contents, Detail, Part
+    from inspector.record.outputs import Outputs
+    from inspector.record.recording import RunDescription
+    from inspector.run.session import Session
+    from inspector.run.start import Start
 
     def make(
         file: Path,
@@ -54,9 +43,9 @@ def record() -> Callable[..., None]:
         **cascade: Any,
     ) -> Any:
         session = Session(
-            sequence or _fakes().FakeSequence(length),
+            sequence or fakes_module.FakeSequence(length),
             range(length),
-            _fakes().FakeCascade(**cascade),
+            fakes_module.FakeCascade(**cascade),
             Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
             Outputs(file),
             RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),

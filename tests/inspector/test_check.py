@@ -13,7 +13,7 @@ import pytest
 from inspector.check import Bound, Verdict, check_run
 from inspector.cli.errors import run
 from inspector.cli.main import cli
-from inspector.recorded_run import read_run
+from inspector.read.run import read_run
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:

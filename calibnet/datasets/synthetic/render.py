@@ -11,7 +11,7 @@ from calibnet.datasets.synthetic.rig import Rig, sample_rig
 from calibnet.datasets.synthetic.shading import caster
 from calibnet.datasets.synthetic.world import Scene, build_scene
 from calibnet.geometry import invert
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 Generator = np.random.Generator
 TRAINING_SECTOR = float(np.radians(65.0))
@@ -21,7 +21,7 @@ TRAINING_SECTOR = float(np.radians(65.0))
 def render_frame(
     scene: Scene,
     rig: Rig,
-    vehicle_pose: Matrix,
+    vehicle_pose: Transform,
     generator: Generator,
     index: int = 0,
     timestamp: float = 0.0,

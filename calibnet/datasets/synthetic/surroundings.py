@@ -9,7 +9,7 @@ import numpy as np
 from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate, quads
 from calibnet.datasets.synthetic.population import vehicle
 from calibnet.datasets.synthetic.textures import atlas
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 if TYPE_CHECKING:
     from calibnet.datasets.synthetic.world import Scene
@@ -18,7 +18,9 @@ EGO_SPEED = 10.0
 """Metres a second: a metre a frame at 10 Hz."""
 
 
-def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Matrix) -> list[Mesh]:
+def moving_traffic(
+    scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Transform
+) -> list[Mesh]:
     """Moving vehicles: every lane is an endless queue on a jittered grid that moves at one speed."""
     style = scene.style
     parts: list[Mesh] = []
@@ -47,7 +49,7 @@ def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahe
     return parts
 
 
-def horizon(scene: Scene, ego: Matrix) -> Mesh:
+def horizon(scene: Scene, ego: Transform) -> Mesh:
     """Distant land and a skyline around the vehicle, beyond any LiDAR's reach."""
     generator = np.random.default_rng([scene.seed, 3])
     groups = ("leaves", "facade", "soil") if scene.style.kind in ("street", "industrial") else ("leaves", "grass")

@@ -17,7 +17,7 @@ from calibnet.datasets.synthetic.surroundings import horizon, moving_traffic
 from calibnet.datasets.synthetic.textures import atlas
 from calibnet.datasets.synthetic.weather import Weather, sample_weather
 from calibnet.geometry import rotation_from_euler_xyz, transform
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 Generator = np.random.Generator
 
@@ -70,7 +70,7 @@ class Scene:
         """The fence of one side of the road."""
         return self.fences[0 if side < 0 else 1]
 
-    def pose(self, station: float, lateral: float | None = None, yaw: float = 0.0) -> Matrix:
+    def pose(self, station: float, lateral: float | None = None, yaw: float = 0.0) -> Transform:
         """``world_from_vehicle`` of a vehicle that drives at a station, in the own lane by default."""
         lateral = self.style.lane_center(0, own=True) if lateral is None else lateral
         slope = float(self.line.height(station + 1.0) - self.line.height(station - 1.0)) / 2.0
@@ -78,7 +78,7 @@ class Scene:
         turn = rotation_from_euler_xyz([0.0, 0.0, heading]) @ rotation_from_euler_xyz([0.0, -np.arctan(slope), 0.0])
         return transform(turn, self.line.place(station, lateral))
 
-    def mesh(self, world_from_vehicle: Matrix, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
+    def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
         """Everything around a vehicle at a time, as triangles in the world."""
         station = self.line.nearest_station(world_from_vehicle[:3, 3])
         first, last = int((station - behind) // CHUNK), int((station + ahead) // CHUNK)

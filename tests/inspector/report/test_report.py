@@ -17,7 +17,7 @@ import pytest
 from calibnet.errors import CalibnetError
 from inspector.cli.errors import run
 from inspector.cli.main import cli
-from inspector.recorded_run import RecordedRun, read_run
+from inspector.read.run import RecordedRun, read_run
 from inspector.report.metrics import Figures, misplacement_cm
 from inspector.report.pictures import PICTURE_WIDTH, draw_overlay
 from inspector.report.verdict import headline, verdict
@@ -74,7 +74,7 @@ def test_page_states_the_figures_of_the_run(known: RecordedRun, tmp_path: Path, 
     for state in figures.states:
         assert f"<td>{state.metrics.rotation_deg.p95:.2f}°</td>" in page
         assert f"<td>{state.metrics.translation_cm.mean:.1f}\u00a0cm</td>" in page
-    assert "<td>100%</td><td>100%</td>" in page  # 0.027 of 5° and 0.5 m is within both bounds
+    assert "<td>100%</td><td>100%</td>" in page  # 0.027 of 5° and 0.5 m is within both range_
     assert "stage 3" in page and "±5° / 0.5 m" in page
     assert page.count('<div class="compare">') == 3
     assert page.count("<svg viewBox") == 4  # two curves, two histograms

@@ -1,0 +1,1 @@
+"""One extrinsic from all frames of a drive."""

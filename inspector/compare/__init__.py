@@ -1,0 +1,1 @@
+"""Several recorded runs of one sequence side by side."""

@@ -1,0 +1,104 @@
+"""Writing a comparison: the runs' overlays and error curves on one timeline, each run under its own name.
+
+Only what a view shows is copied; raw volumes and activations stay in the runs' own recordings.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rerun as rr
+from rerun.chunk import Chunk
+
+from inspector import entities
+from inspector.colors import Rgb
+from inspector.compare.blueprint import COMPARISON_TABLE, make_comparison_blueprint
+from inspector.compare.comparison import ComparedRun, Comparison
+from inspector.compare.table import comparison_table
+from inspector.record.stream import Stream
+
+if TYPE_CHECKING:
+    from pyarrow import RecordBatch
+
+SHARED = (f"{entities.IMAGE}/**", f"{entities.LEGEND_POINTS}/**", f"{entities.OVERLAY_REFERENCE}/**")
+"""The same in all runs, and taken from one."""
+OWN = (f"{entities.OVERLAY_MISCALIBRATED}/**", f"{entities.OVERLAY_CORRECTED}/**")
+"""Of every run."""
+RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
+CHUNKS_A_FLUSH = 16
+
+
+def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
+    """Write the comparison.
+
+    Args:
+        comparison: the runs.
+        sinks: Rerun sinks, see `inspector.record.outputs`.
+
+    Raises:
+        RecordingError: a run's recording is damaged.
+        RecordingLostError: nothing can be written any more.
+    """
+    blueprint = make_comparison_blueprint(comparison)
+    stream = Stream(entities.COMPARISON_APPLICATION_ID, _recording_id(comparison), comparison.title, sinks, blueprint)
+    try:
+        table = rr.TextDocument(comparison_table(comparison), media_type=rr.MediaType.MARKDOWN)
+        stream.rec.log(COMPARISON_TABLE, table, static=True)
+        for number, run in enumerate(comparison.runs):
+            _log_curves(stream.rec, run, RUN_COLORS[number % len(RUN_COLORS)])
+        for count, chunk in enumerate(_copied(comparison), start=1):
+            rr.send_chunks(chunk, recording=stream.rec)
+            if count % CHUNKS_A_FLUSH == 0:
+                stream.flush()
+    finally:
+        stream.close()
+
+
+def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
+    """Errors after the last stage, from the extrinsics: a recording need not have curves."""
+    errors = [error for frame in run.frames if (error := frame.error(frame.corrected)) is not None]
+    if len(errors) < len(run.frames):
+        return
+    times = [
+        rr.TimeColumn(entities.FRAME, sequence=[frame.index for frame in run.frames]),
+        rr.TimeColumn(entities.TIME, duration=[frame.seconds for frame in run.frames]),
+    ]
+    curves = {"rotation": [error.rotation_deg for error in errors], "translation": [e.translation_cm for e in errors]}
+    for kind, values in curves.items():
+        path = run.path(entities.error_corrected(kind))
+        rec.send_columns(path, times, rr.Scalars.columns(scalars=values))
+        line = rr.SeriesLines(names=run.name, colors=color, widths=2.0)
+        rec.log(path, line, rr.SeriesPoints(names=run.name, colors=color, marker_sizes=3.0), static=True)
+
+
+def _copied(comparison: Comparison) -> Iterator[Chunk]:
+    """All chunks under their new paths, cut down to the frames that are compared."""
+    wanted = np.array(comparison.indices)
+    referenced = [run for run in comparison.runs if run.run.has_reference]
+    for chunk in (referenced or comparison.runs)[0].run.chunks(*SHARED):
+        yield from _only(chunk, wanted)
+    for run in comparison.runs:
+        for chunk in run.run.chunks(*OWN):
+            for kept in _only(chunk, wanted):
+                yield kept.with_entity_path(f"/{run.path(chunk.entity_path.lstrip('/'))}")
+
+
+def _only(chunk: Chunk, frames: np.ndarray[Any, np.dtype[np.int64]]) -> list[Chunk]:
+    """The chunk's rows of some frames; what is said once stays as it is."""
+    if chunk.is_static:
+        return [chunk]
+    batch: RecordBatch = chunk.to_record_batch()
+    kept = np.isin(np.asarray(batch[entities.FRAME]), frames)
+    if kept.all():
+        return [chunk]
+    return Chunk.from_record_batch(batch.take(np.flatnonzero(kept))) if kept.any() else []
+
+
+def _recording_id(comparison: Comparison) -> str:
+    """The same for the same runs, frames and names."""
+    runs = [(run.name, run.run.title, sorted(run.run.settings.items())) for run in comparison.runs]
+    text = repr((runs, comparison.indices))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,109 @@
+"""The text panel of a comparison: figures of every run, differences to the first, and what was set differently."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from calibnet.evaluation.metrics import Metrics
+from inspector.compare.comparison import ComparedRun, Comparison
+from inspector.record.tabs.table import NOTHING, markdown
+
+RECORD_KEYS = ("samples", "minutes", "commit", "interim")
+"""What tells weights apart, of their training record."""
+UNCOMPARED = ("detail", "parts", "color")
+"""Settings that change what is shown and not what is computed."""
+
+Column = tuple[str, Callable[[Metrics], float], Callable[[float], str]]
+
+
+def _degrees(value: float) -> str:
+    return f"{value:.2f}°"
+
+
+def _centimetres(value: float) -> str:
+    return f"{value:.1f} cm"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %"
+
+
+COLUMNS: tuple[Column, ...] = (
+    ("rotation, median", lambda metrics: metrics.rotation_deg.median, _degrees),
+    ("rotation, p95", lambda metrics: metrics.rotation_deg.p95, _degrees),
+    ("translation, median", lambda metrics: metrics.translation_cm.median, _centimetres),
+    ("translation, p95", lambda metrics: metrics.translation_cm.p95, _centimetres),
+    ("< 2° and < 5 cm", lambda metrics: metrics.success_2deg_5cm, _percent),
+    ("< 1° and < 2.5 cm", lambda metrics: metrics.success_1deg_2_5cm, _percent),
+)
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Markdown: errors, how far the results lie apart, and the settings that differ."""
+    known = [run.corrected is not None for run in comparison.runs]
+    lines = [*_errors(comparison), ""] if any(known) else []
+    if not all(known):
+        lines += ["*A run without a reference has no errors.*", ""]
+    lines += [f"### How far the results lie from those of {comparison.first.name}", "", *_distances(comparison), ""]
+    return "\n".join([*lines, "### What was set differently", "", *_settings(comparison), ""])
+
+
+def _errors(comparison: Comparison) -> list[str]:
+    first, count = comparison.first, len(comparison.indices)
+    if comparison.one_start:
+        rows = [["all, at the start", *_figures(first.initial, None)]]
+    else:
+        rows = [[f"{run.name}, at the start", *_figures(run.initial, None)] for run in comparison.runs]
+    rows += [
+        [f"**{run.name}**", *_figures(run.corrected, None if run is first else first.corrected)]
+        for run in comparison.runs
+    ]
+    return [
+        f"### Errors over {count} frame{'' if count == 1 else 's'}",
+        "",
+        *markdown(["", *(name for name, _, _ in COLUMNS)], rows),
+        "",
+        f"In brackets the difference to **{first.name}**. p95: 95 % of the frames are below.",
+    ]
+
+
+def _figures(metrics: Metrics | None, other: Metrics | None) -> list[str]:
+    """One cell a column, with the difference to ``other`` where there is one."""
+    if metrics is None:
+        return [NOTHING] * len(COLUMNS)
+    cells = []
+    for _, value, say in COLUMNS:
+        cell = say(value(metrics))
+        change = 0.0 if other is None else value(metrics) - value(other)
+        if say(abs(change)) != say(0.0):
+            cell += f" ({'−' if change < 0 else '+'}{say(abs(change))})"
+        cells.append(cell)
+    return cells
+
+
+def _distances(comparison: Comparison) -> list[str]:
+    rows = [[run.name, *_figures(run.distance(comparison.first), None)[:4]] for run in comparison.runs[1:]]
+    return markdown(["", *(name for name, _, _ in COLUMNS[:4])], rows)
+
+
+def _settings(comparison: Comparison) -> list[str]:
+    described = [_described(run) for run in comparison.runs]
+    names = list(dict.fromkeys(name for settings in described for name in settings))
+    rows = []
+    for name in names:
+        values = [str(settings.get(name, NOTHING)) for settings in described]
+        if len(set(values)) > 1:
+            rows.append([name, *values])
+    return markdown(["", *(run.name for run in comparison.runs)], rows) if rows else ["Nothing."]
+
+
+def _described(run: ComparedRun) -> dict[str, Any]:
+    """Settings, versions and weights of a run by a name for people."""
+    settings = {name: value for name, value in run.run.settings.items() if name not in UNCOMPARED}
+    versions = {f"version of {name}": value for name, value in run.run.provenance.items()}
+    weights = {
+        f"weights of stage {number}": ", ".join(f"{key} {record[key]}" for key in RECORD_KEYS if key in record)
+        for number, record in run.run.weights.items()
+    }
+    return {**settings, **weights, **versions}

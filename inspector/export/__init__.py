@@ -1,0 +1,1 @@
+"""A recorded extrinsic in the formats of other tools."""

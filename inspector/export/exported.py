@@ -1,0 +1,106 @@
+"""What an export says: one extrinsic, its camera and where both come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from calibnet.datasets.folder_calibration import read_folder_calibration
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.median import median_pose
+from calibnet.geometry.types import Extrinsic, Floats
+from inspector.read.file import RecordingError
+from inspector.read.run import RecordedFrame, RecordedRun
+
+SAME_MOUNT = 1e-6
+"""References that differ by less, in metres and in entries of the rotation, are of one mount."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """A calibration on its way to another tool.
+
+    Attributes:
+        camera_from_lidar: 4x4, metres.
+        camera: intrinsics; of the rectified images.
+        distortion: OpenCV's coefficients of the raw images; zeros where the images are rectified already.
+        origin: where it comes from, for the file's comment.
+    """
+
+    camera_from_lidar: Extrinsic = field(repr=False)
+    camera: PinholeCamera
+    distortion: Floats = field(repr=False)
+    origin: str
+
+
+def exported_frame(run: RecordedRun, index: int) -> Exported:
+    """The corrected extrinsic of one frame, exactly.
+
+    Raises:
+        RecordingError: the recording has no such frame.
+    """
+    for frame in run.frames:
+        if frame.index == index:
+            if not frame.confirmed:
+                raise RecordingError(
+                    f"Picture and scan of frame {index} of {run.path} do not fit together, so it has no result; "
+                    "choose another frame."
+                )
+            return Exported(frame.corrected, frame.camera, np.zeros(5), f"{run.title}, frame {index}")
+    first, last = run.frames[0].index, run.frames[-1].index
+    raise RecordingError(f"{run.path} has no complete frame {index}, only frames from {first} to {last}; choose one.")
+
+
+def exported_median(run: RecordedRun) -> Exported:
+    """The median of the corrected extrinsics of all frames, see `median_pose`.
+
+    Raises:
+        RecordingError: the frames are not all of one camera on one mount.
+    """
+    first = run.frames[0]
+    if not all(_same_mount(first, frame) for frame in run.frames[1:]):
+        raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
+    count = sum(frame.confirmed for frame in run.frames)
+    if not count:
+        raise RecordingError(
+            f"In no frame of {run.path} do picture and scan fit together, so there is no result to export; check that "
+            "they belong together, and record again from a wider --range."
+        )
+    origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
+    return Exported(median_pose(run.results), first.camera, np.zeros(5), origin)
+
+
+def exported_drive(run: RecordedRun) -> Exported:
+    """The extrinsic that the run solved from all frames together.
+
+    Raises:
+        RecordingError: the run did not do that.
+    """
+    if run.drive is None:
+        raise RecordingError(
+            f"{run.path} has no estimate from the whole drive; record it with --sequence-estimate, or use --median."
+        )
+    return Exported(run.drive, run.frames[0].camera, np.zeros(5), f"{run.title}, all frames solved together")
+
+
+def exported_folder(folder: Path) -> Exported:
+    """The calibration of a plain folder: of its ``calibration.yaml``.
+
+    Raises:
+        DatasetError: the file is missing or malformed.
+    """
+    path = folder / "calibration.yaml"
+    content = read_folder_calibration(path)
+    camera = PinholeCamera(content.width, content.height, content.calibration.matrix)
+    return Exported(content.calibration.camera_from_lidar, camera, content.distortion, f"{folder.name}/{path.name}")
+
+
+def _same_mount(one: RecordedFrame, other: RecordedFrame) -> bool:
+    same_camera = (one.camera.width, one.camera.height) == (other.camera.width, other.camera.height)
+    if not (same_camera and np.array_equal(one.camera.matrix, other.camera.matrix)):
+        return False
+    if one.reference is None or other.reference is None:
+        return True
+    return float(np.abs(one.reference - other.reference).max()) < SAME_MOUNT

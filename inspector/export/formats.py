@@ -1,0 +1,119 @@
+"""A calibration as text that other tools read. Every format says its own convention."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from calibnet.geometry import invert
+from calibnet.geometry.types import Floats, Rotation
+from inspector.export.exported import Exported
+
+AXES = "LiDAR x forward, y left, z up; camera x right, y down, z forward (optical frame); metres"
+CONVENTION = f"camera_from_lidar maps LiDAR points into the camera, x_camera = R x_lidar + t; {AXES}"
+
+
+class RosFrames(NamedTuple):
+    """Names of the two frames, and whether the LiDAR is the parent."""
+
+    camera: str = "camera_optical_frame"
+    lidar: str = "lidar"
+    lidar_is_parent: bool = True
+
+
+def as_kitti(exported: Exported) -> str:
+    """A ``calib.txt`` of KITTI odometry: ``P0`` to ``P3`` and ``Tr``, 3x4 row by row.
+
+    All four cameras are the calibrated one, so that tools for whichever of them work. Comments come
+    last and look like entries, for readers take every line for one.
+    """
+    projection = np.hstack([exported.camera.matrix, np.zeros((3, 1))])
+    lines = [_entry(f"P{camera}", projection) for camera in range(4)]
+    lines.append(_entry("Tr", exported.camera_from_lidar[:3]))
+    lines.append(f"# convention: Tr = {CONVENTION}")
+    lines.append("# cameras: P0 to P3 are the same rectified camera, pixels = P0 Tr x_lidar, without baseline")
+    lines.append(f"# source: calib-inspect, {exported.origin}")
+    return "\n".join([*lines, ""])
+
+
+def as_ros(exported: Exported, frames: RosFrames) -> str:
+    """A ROS 2 launch file (YAML) of a static transform, with the same as a command line in its comment."""
+    lidar_is_parent = frames.lidar_is_parent
+    parent, child = (frames.lidar, frames.camera) if lidar_is_parent else (frames.camera, frames.lidar)
+    parent_from_child = invert(exported.camera_from_lidar) if lidar_is_parent else exported.camera_from_lidar
+    names = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    values = [*parent_from_child[:3, 3], *quaternion_xyzw(parent_from_child[:3, :3])]
+    numbers = " ".join(f"--{name} {value:.15f}" for name, value in zip(names, values, strict=True))
+    arguments = f"{numbers} --frame-id {parent} --child-frame-id {child}"
+    return "\n".join(
+        [
+            f"# Static transform {parent} -> {child}: the pose of {child} in {parent}, that is {parent}_from_{child};",
+            f"# {AXES}; quaternion x y z w.",
+            f"# Source: calib-inspect, {exported.origin}",
+            "# On the command line:",
+            f"#   ros2 run tf2_ros static_transform_publisher {arguments}",
+            "launch:",
+            "  - node:",
+            "      pkg: tf2_ros",
+            "      exec: static_transform_publisher",
+            "      name: lidar_camera_calibration",
+            f'      args: "{arguments}"',
+            "",
+        ]
+    )
+
+
+def as_opencv(exported: Exported) -> str:
+    """A YAML file for ``cv2.FileStorage``; ``rvec`` and ``tvec`` are what ``cv2.projectPoints`` takes."""
+    storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    storage.writeComment(CONVENTION)
+    storage.writeComment("camera_matrix in pixels, their centres at integers; distortion is that of the raw images")
+    storage.writeComment(f"Source: calib-inspect, {exported.origin}")
+    storage.write("image_width", exported.camera.width)
+    storage.write("image_height", exported.camera.height)
+    storage.write("camera_matrix", exported.camera.matrix)
+    storage.write("distortion_coefficients", exported.distortion.reshape(1, -1))
+    storage.write("camera_from_lidar", exported.camera_from_lidar)
+    storage.write("rvec", cv2.Rodrigues(exported.camera_from_lidar[:3, :3])[0])
+    storage.write("tvec", exported.camera_from_lidar[:3, 3:])
+    return str(storage.releaseAndGetString())
+
+
+def as_json(exported: Exported) -> str:
+    """One object; the key ``convention`` says what the matrices mean."""
+    matrix = exported.camera_from_lidar
+    content = {
+        "convention": f"{CONVENTION}; quaternion x y z w; pixel centres at integers",
+        "source": f"calib-inspect, {exported.origin}",
+        "camera_from_lidar": matrix.tolist(),
+        "lidar_from_camera": invert(matrix).tolist(),
+        "translation_m": matrix[:3, 3].tolist(),
+        "quaternion_xyzw": quaternion_xyzw(matrix[:3, :3]).tolist(),
+        "image_width": exported.camera.width,
+        "image_height": exported.camera.height,
+        "camera_matrix": exported.camera.matrix.tolist(),
+        "distortion_coefficients": exported.distortion.tolist(),
+    }
+    return f"{json.dumps(content, indent=2)}\n"
+
+
+def quaternion_xyzw(rotation: Rotation) -> Floats:
+    """The unit quaternion of a 3x3 rotation, ``w`` not negative; exact at half turns as well (Bar-Itzhack)."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    symmetric = np.array(
+        [
+            [xx - yy - zz, xy + yx, xz + zx, zy - yz],
+            [xy + yx, yy - xx - zz, yz + zy, xz - zx],
+            [xz + zx, yz + zy, zz - xx - yy, yx - xy],
+            [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+        ]
+    )
+    quaternion: Floats = np.linalg.eigh(symmetric)[1][:, -1]
+    return -quaternion if quaternion[3] < 0.0 else quaternion
+
+
+def _entry(name: str, matrix: Floats) -> str:
+    return f"{name}: {' '.join(repr(value) for value in matrix.ravel().tolist())}"

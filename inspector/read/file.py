@@ -1,0 +1,107 @@
+"""Opening the file of a recording, whole or cut off, and streaming the chunks of a few entities."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import tempfile
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rerun.chunk import RrdReader
+
+from calibnet.errors import CalibnetError
+from inspector import entities
+from inspector.record.outputs import rerun_binary
+
+if TYPE_CHECKING:
+    from rerun.chunk import Chunk, StoreEntry
+
+
+class RecordingError(CalibnetError):
+    """A recording is missing, damaged, foreign, or without what a command needs of it."""
+
+
+class RecordingFile:
+    """The chunks of one recording of ours.
+
+    Attributes:
+        path: the file.
+        cut: whether the file ends before its footer, because the run was killed or the copy is not complete.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the file; nothing but its footer is read yet.
+
+        Raises:
+            RecordingError: there is no such file, it is not a recording, not ours, or too damaged.
+        """
+        self.path = path
+        self.cut = False
+        self._copy: tempfile.TemporaryDirectory[str] | None = None  # lives as long as this object
+        if not path.is_file():
+            raise RecordingError(f"There is no recording {path}; check the path, or make one with --save {path}.")
+        self._reader, entries = self._open()
+        self._entry = self._ours(entries)
+
+    def chunks(self, *paths: str) -> Iterator[Chunk]:
+        """Every chunk of some entities.
+
+        Args:
+            paths: entity paths or patterns such as ``extrinsic/**``; chunks of others are not read.
+
+        Raises:
+            RecordingError: a chunk is damaged.
+        """
+        source = self._reader.stream(store=self._entry) if self.cut else self._reader.store(store=self._entry).stream()
+        try:
+            yield from source.filter(content=[f"/{path}" for path in paths])
+        except RuntimeError:
+            raise RecordingError(f"{self.path} is damaged in the middle; copy it again or record it again.") from None
+
+    def _open(self) -> tuple[RrdReader, list[StoreEntry]]:
+        """The file's reader and what the file holds; of a copy where the file ends within a chunk."""
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with contextlib.suppress(RuntimeError, ValueError):
+                opened = _listed(self.path)
+                self.cut = any("no footer" in str(warning.message) for warning in caught)
+                return opened
+            with contextlib.suppress(RuntimeError, ValueError):
+                opened = _listed(self._repaired_copy())
+                self.cut = True
+                return opened
+        raise self._unreadable()
+
+    def _repaired_copy(self) -> Path:
+        """Everything that precedes the cut, in a file that the reader accepts; of a foreign file, no such file."""
+        self._copy = tempfile.TemporaryDirectory(prefix="calib-inspect-")
+        copy = Path(self._copy.name) / "repaired.rrd"
+        command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self.path), "-o", str(copy)]
+        subprocess.run(command, capture_output=True, check=False)
+        return copy
+
+    def _ours(self, entries: list[StoreEntry]) -> StoreEntry:
+        for entry in entries:
+            if entry.application_id == entities.APPLICATION_ID:
+                return entry
+        if not entries:
+            raise self._unreadable()
+        others = ", ".join(sorted({repr(entry.application_id) for entry in entries}))
+        raise RecordingError(
+            f"{self.path} was recorded by {others}, not by calib-inspect seq, raw, object, folder or demo; "
+            "give a recording that one of these made."
+        )
+
+    def _unreadable(self) -> RecordingError:
+        return RecordingError(
+            f"{self.path} is not a Rerun recording, or so much of it is missing that nothing can be read; "
+            "copy it again or record it again."
+        )
+
+
+def _listed(file: Path) -> tuple[RrdReader, list[StoreEntry]]:
+    reader = RrdReader(file)
+    return reader, reader.recordings()

@@ -1,0 +1,244 @@
+"""A recording read back: settings, extrinsics and, on demand, the pictures of a frame.
+
+Comparisons, checks, exports and reports read nothing else, so whoever has the ``.rrd`` can make them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import PinholeCamera, PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
+from inspector import entities
+from inspector.read.file import RecordingError, RecordingFile
+
+if TYPE_CHECKING:
+    from pyarrow import RecordBatch
+    from rerun.chunk import Chunk
+
+
+PROPERTIES = "__properties"
+"""Where Rerun keeps a recording's name and properties."""
+PICTURES = (entities.IMAGE, entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_CORRECTED)
+
+
+class RecordedStage(NamedTuple):
+    """A stage that ran: 1 to 5, and the miscalibration it is for, for instance ``"5/0.5"``."""
+
+    number: int
+    range: str
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFrame:
+    """The numbers of one frame, exactly as the run computed them.
+
+    Attributes:
+        index: the frame's number in its sequence.
+        seconds: since the sequence's first frame.
+        source: name of its image file.
+        camera: its own camera, at full size.
+        initial: ``camera_from_lidar`` that the run started from, 4x4.
+        corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where the
+            picture did not confirm that.
+        stages: ``camera_from_lidar`` after every stage by its number, coarse to fine.
+        reference: the true one, or None where nobody knows it.
+    """
+
+    index: int
+    seconds: float
+    source: str
+    camera: PinholeCamera
+    initial: Extrinsic = field(repr=False)
+    corrected: Extrinsic = field(repr=False)
+    stages: dict[int, Extrinsic] = field(repr=False)
+    reference: Extrinsic | None = field(repr=False)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the picture confirmed what the last stage found, so that it is the result."""
+        return not self.stages or np.array_equal(self.corrected, self.stages[max(self.stages)])
+
+    def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
+        """Error of an extrinsic against the reference; None without one."""
+        return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
+
+
+class OverlayPoints(NamedTuple):
+    """Points over an image: ``uv`` ``[N, 2]`` float32, pixel centres at integers; ``rgb`` ``[N, 3]`` uint8."""
+
+    uv: NDArray[np.float32]
+    rgb: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """A whole run; pictures stay in the file until they are asked for.
+
+    Attributes:
+        path: the recording.
+        title: for instance ``"kitti-odometry/04, miscalibrated within 5/0.5, seed 0"``.
+        settings: the options that identify the run, such as ``sequence``, ``rig``, ``seed``, ``preset``.
+        provenance: versions of ``calib_inspect``, ``torch`` and ``rerun``.
+        weights: training record of every stage's weights, by its number, where known.
+        stages: the stages that ran, coarse to fine.
+        has_reference: whether the frames have a reference, and with it errors.
+        frames: the complete frames, in order; at least one.
+        drive: ``camera_from_lidar`` solved from all frames together; None where the run did not do that.
+        warning: one sentence when the file is cut off, to show the user; else empty.
+    """
+
+    path: Path
+    title: str
+    settings: dict[str, Any]
+    provenance: dict[str, Any]
+    weights: dict[int, dict[str, Any]] = field(repr=False)
+    stages: tuple[RecordedStage, ...]
+    has_reference: bool
+    frames: tuple[RecordedFrame, ...] = field(repr=False)
+    drive: Extrinsic | None = field(repr=False)
+    warning: str
+    _file: RecordingFile = field(repr=False)
+
+    @property
+    def results(self) -> list[Extrinsic]:
+        """The extrinsics that the picture confirmed; of all frames, if it confirmed none."""
+        return [frame.corrected for frame in self.frames if frame.confirmed] or [one.corrected for one in self.frames]
+
+    def image(self, index: int) -> bytes:
+        """The frame's image as JPEG."""
+        (blob,) = self._row(entities.IMAGE, index, "EncodedImage:blob")
+        return np.asarray(blob.values[0].values).tobytes()
+
+    def overlay(self, entity: str, index: int) -> OverlayPoints:
+        """The points drawn over the frame's image, far to near.
+
+        Args:
+            entity: `entities.OVERLAY_MISCALIBRATED`, ``_CORRECTED``, ``_REFERENCE`` or `entities.overlay_stage`.
+            index: the frame's number.
+        """
+        positions, colors = self._row(entity, index, "Points2D:positions", "Points2D:colors")
+        rgba = np.asarray(colors.values).astype(np.uint32)
+        rgb = np.stack([rgba >> shift & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
+        uv = np.asarray(positions.values.flatten()).reshape(-1, 2)
+        return OverlayPoints(uv - np.float32(0.5), rgb)  # Rerun's pixel centres are at x.5
+
+    def chunks(self, *paths: str) -> Iterator[Chunk]:
+        """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
+        return self._file.chunks(*paths)
+
+    def _row(self, entity: str, index: int, *components: str) -> list[Any]:
+        for chunk in self._file.chunks(entity):
+            batch = chunk.to_record_batch()
+            if set(components) <= set(batch.schema.names):
+                found = np.flatnonzero(np.asarray(batch[entities.FRAME]) == index)
+                if found.size:
+                    return [batch[component][int(found[-1])] for component in components]
+        raise RecordingError(f"{self.path} holds no {entity} of frame {index}; choose another frame, or record again.")
+
+
+def read_run(path: Path) -> RecordedRun:
+    """Read everything but the pictures.
+
+    Raises:
+        RecordingError: the file is missing, damaged, foreign, too old, or has no complete frame.
+    """
+    file = RecordingFile(path)
+    tables = _read_tables(file)
+    properties = {name: _single(tables.get(f"{PROPERTIES}/{name}", [])) for name in (entities.RUN, entities.PROVENANCE)}
+    provenance = properties[entities.PROVENANCE]
+    if not provenance and not file.cut:
+        raise RecordingError(
+            f"{path} comes from an earlier calib-inspect, which kept no extrinsics as numbers; record it again."
+        )
+    numbers, ranges = provenance.pop("stage_numbers", []), provenance.pop("stage_ranges", [])
+    (has_reference,) = provenance.pop("has_reference", [False])
+    frames = _frames(tables, numbers, has_reference, file.cut) if numbers else ()
+    if not frames:
+        raise RecordingError(f"{path} ends before its first frame is complete; copy it again or record it again.")
+    versions = {name: value for name, (value,) in provenance.items()}
+    history = {} if file.cut else _matrices(tables[entities.EXTRINSIC_DRIVE])  # its last row is the result
+    weights = json.loads(versions.pop("weights", "{}"))
+    return RecordedRun(
+        path=path,
+        title=_single(tables[PROPERTIES]).get("RecordingInfo:name", [path.stem])[0],
+        settings={name: value for name, (value,) in properties[entities.RUN].items()},
+        provenance=versions,
+        weights={int(number): record for number, record in weights.items()},
+        stages=tuple(RecordedStage(*stage) for stage in zip(numbers, ranges, strict=True)),
+        has_reference=has_reference,
+        frames=frames,
+        drive=history[max(history)] if history else None,
+        warning=f"{path} is cut off: only its {len(frames)} complete frames are used." if file.cut else "",
+        _file=file,
+    )
+
+
+def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
+    """Chunks by entity; of a file that is cut off the pictures too, for a frame may lack one of them."""
+    wanted = ("extrinsic/**", f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
+    tables: dict[str, list[RecordBatch]] = defaultdict(list)
+    for chunk in file.chunks(*wanted):
+        entity, batch = chunk.entity_path.lstrip("/"), chunk.to_record_batch()
+        tables[entity].append(batch.select([entities.FRAME]) if entity in PICTURES else batch)
+    return tables
+
+
+def _single(batches: list[RecordBatch]) -> dict[str, list[Any]]:
+    """The one row of static data as lists by component."""
+    return {
+        name: batch[name][0].as_py()
+        for batch in batches
+        for name in batch.schema.names
+        if not name.startswith("rerun.")
+    }
+
+
+def _frames(
+    tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool
+) -> tuple[RecordedFrame, ...]:
+    """The frames of which everything is there."""
+    initial = _matrices(tables[entities.EXTRINSIC_INITIAL])
+    after = {number: _matrices(tables[entities.extrinsic_stage(number)]) for number in stages}
+    # earlier recordings have the stages only: what the last one found was the result
+    corrected = after[max(stages)] | _matrices(tables[entities.EXTRINSIC_CORRECTED])
+    reference = _matrices(tables[entities.EXTRINSIC_REFERENCE])
+    pictures = [{row[entities.FRAME] for row in _rows(tables[entity])} for entity in PICTURES] if cut else []
+    cameras = {row[entities.FRAME]: row for row in _rows(tables[entities.CAMERA])}
+    needed = [initial, *after.values(), *([reference] if has_reference else []), *pictures]
+    return tuple(
+        RecordedFrame(
+            index=index,
+            seconds=row[entities.TIME],
+            source=row["source"][0],
+            camera=PinholeCamera(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3))),
+            initial=initial[index],
+            corrected=corrected[index],
+            stages={number: matrices[index] for number, matrices in after.items()},
+            reference=reference.get(index),
+        )
+        for index, row in sorted(cameras.items())
+        if all(index in known for known in needed)
+    )
+
+
+def _matrices(batches: list[RecordBatch]) -> dict[int, Extrinsic]:
+    """4x4 matrices by frame."""
+    return {row[entities.FRAME]: np.reshape(row[entities.MATRIX], (4, 4)) for row in _rows(batches)}
+
+
+def _rows(batches: list[RecordBatch]) -> Iterator[dict[str, Any]]:
+    """Rows as dictionaries; times in seconds."""
+    for batch in batches:
+        for row in batch.to_pylist():
+            if entities.TIME in row:
+                row[entities.TIME] = row[entities.TIME].total_seconds()
+            yield row

@@ -1,0 +1,173 @@
+"""One calibrated frame as the inspector sees it, and what a whole recording contains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import PoseError, invert, pose_error, project
+from calibnet.geometry.projection import Projection
+from calibnet.geometry.types import Extrinsic, Vector3
+from calibnet.trace import CascadeTrace, StageTrace
+from inspector.record.contents import Contents
+
+Place = tuple[float, float, float]
+"""``(x, y, z)`` in metres, or a direction; unlike an array, it can be compared."""
+
+
+class Skipped(Protocol):
+    """A stage that did not run, and why."""
+
+    @property
+    def number(self) -> int:
+        """1 to 5."""
+        ...
+
+    @property
+    def reason(self) -> str:
+        """One sentence that names the stage."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """A frame, what the cascade did to it and, where known, the truth.
+
+    Attributes:
+        frame: what was calibrated.
+        trace: the run of the cascade on it.
+        reference: the true ``camera_from_lidar``, or None where nobody knows it.
+        skipped: stages that were asked for and have no weights.
+    """
+
+    frame: Frame
+    trace: CascadeTrace
+    reference: Extrinsic | None = field(default=None, repr=False)
+    skipped: tuple[Skipped, ...] = ()
+
+    def projected(self, camera_from_lidar: Extrinsic) -> Projection:
+        """The scan in the frame's image, rows far to near; each extrinsic of the run is projected once."""
+        key = camera_from_lidar.tobytes()
+        if key not in self._projections:
+            seen = project(self.frame.points[self._in_front], camera_from_lidar, self.frame.camera)
+            order = seen.far_to_near()
+            self._projections[key] = Projection(
+                seen.pixels[order], seen.depth[order], self._in_front[seen.index[order]], seen.points[order]
+            )
+        return self._projections[key]
+
+    @cached_property
+    def _projections(self) -> dict[bytes, Projection]:
+        return {}
+
+    @cached_property
+    def _in_front(self) -> NDArray[np.intp]:
+        """Rows of the scan before the camera under any extrinsic of the run: half of what a scanner sees."""
+        extrinsics = [self.trace.initial, *(stage.after for stage in self.trace.stages)]
+        extrinsics += [] if self.reference is None else [self.reference]
+        ahead = np.stack([extrinsic[2] for extrinsic in extrinsics]).astype(np.float32)
+        depths = ahead[:, :3] @ self.frame.points[:, :3].T + ahead[:, 3:]
+        return np.flatnonzero(depths.max(axis=0) > 0.0)
+
+    def image_px(self, stage: StageTrace, pixels: float) -> float:
+        """A length in a stage's input image as one in the frame's own."""
+        return pixels * self.frame.camera.width / stage.camera.width
+
+    def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
+        """Error of an extrinsic against the reference; None without one."""
+        return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
+
+
+class Grid(NamedTuple):
+    """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width`` of them."""
+
+    stride: int
+    height: int
+    width: int
+
+
+@dataclass(frozen=True)
+class StageLayout:
+    """A stage that appears in the recording.
+
+    Attributes:
+        number: 1 to 5.
+        range: for instance ``"5/0.5"``.
+        grids: stride, height and width in cells of each cost volume that is shown, fine to coarse.
+    """
+
+    number: int
+    range: str
+    grids: tuple[Grid, ...]
+
+    @property
+    def short(self) -> str:
+        """For legends and tabs."""
+        return f"Stage {self.number}"
+
+    @property
+    def title(self) -> str:
+        """For view names, for instance ``"Stage 3 (±5°/0.5 m)"``."""
+        degrees, metres = self.range.split("/")
+        return f"Stage {self.number} (±{degrees}°/{metres} m)"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a recording contains, known after its first frame; the blueprint shows exactly this.
+
+    Attributes:
+        stages: those that ran.
+        has_reference: whether errors and a reference overlay exist.
+        contents: what is logged of each frame.
+        image: width and height of the first frame's image, in pixels.
+        position: of the camera in the LiDAR frame, metres.
+        forward: its viewing direction there, of unit length.
+        as_one: whether an estimate from the whole drive follows the frames.
+    """
+
+    stages: tuple[StageLayout, ...]
+    has_reference: bool
+    contents: Contents
+    image: tuple[int, int] = (1242, 375)
+    position: Place = (0.0, 0.0, 0.0)
+    forward: Place = (1.0, 0.0, 0.0)
+    as_one: bool = False
+
+    @property
+    def start(self) -> str:
+        """What the extrinsic before the first stage is called."""
+        return "Miscalibrated" if self.has_reference else "As given"
+
+    @classmethod
+    def of(cls, observation: Observation, contents: Contents, as_one: bool = False) -> Layout:
+        """The layout of a recording that starts with this observation."""
+        stages = tuple(
+            StageLayout(
+                stage.number,
+                str(stage.range),
+                tuple(Grid(scale.stride, *scale.occupied.shape) for scale in contents.scales(stage.detail)),
+            )
+            for stage in observation.trace.stages
+        )
+        camera = observation.frame.camera
+        lidar_from_camera = invert(observation.trace.corrected)
+        return cls(
+            stages,
+            observation.reference is not None,
+            contents,
+            (camera.width, camera.height),
+            _place(lidar_from_camera[:3, 3]),
+            _place(lidar_from_camera[:3, 2]),
+            as_one,
+        )
+
+
+def _place(values: Vector3) -> Place:
+    x, y, z = values.tolist()
+    return x, y, z

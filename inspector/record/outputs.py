@@ -1,0 +1,198 @@
+"""Where a recording goes: a file, a viewer on this machine, a web viewer, or one that runs elsewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+import rerun as rr
+
+from calibnet.errors import ConfigError
+from calibnet.runtime.interruption import StopRequest
+
+LOCALHOST = "127.0.0.1"
+START_TIMEOUT_S = 30.0
+SETTLE_S = 1.5
+RESERVE_BYTES = 32 * 1024 * 1024
+"""Free disk space below which recording stops, while the footer can still be written."""
+
+
+@dataclass
+class Outputs:
+    """The sinks of one recording, and the processes they need.
+
+    Attributes:
+        file: ``.rrd`` to write; replaced when the first frame is there, not before.
+        viewer: open the viewer in a window.
+        serve: offer the web viewer.
+        connect: gRPC address of a viewer that runs already.
+        bind: address that servers started here listen on.
+    """
+
+    file: Path | None = None
+    viewer: bool = False
+    serve: bool = False
+    connect: str | None = None
+    bind: str = LOCALHOST
+    page: str | None = field(default=None, init=False)
+    _server: subprocess.Popen[bytes] | None = field(default=None, init=False, repr=False)
+
+    def check(self) -> None:
+        """Find out before the work whether the outputs can be opened.
+
+        Raises:
+            ConfigError: the file cannot be written, or nothing listens at ``connect``.
+        """
+        if self.file is not None:
+            check_writable(self.file)
+            self.check_space()
+        if self.connect is not None:
+            address = urlsplit(self.connect)
+            if address.scheme not in ("rerun", "rerun+http", "rerun+https") or not address.hostname:
+                raise ConfigError(f"--connect {self.connect} is no address such as rerun+http://127.0.0.1:9876/proxy.")
+            if not _listening(address.hostname, address.port or 9876):
+                raise ConfigError(f"No viewer listens at {self.connect}; start one with `rerun`, or use --save.")
+
+    def check_space(self) -> None:
+        """Raise `ConfigError` when the disk is about to be full."""
+        if self.file is not None and shutil.disk_usage(self.file.parent).free < RESERVE_BYTES:
+            raise ConfigError(
+                f"The disk of {self.file} is full: less than {RESERVE_BYTES >> 20} MB are free; "
+                "free some space or choose another --save."
+            )
+
+    def open(self) -> Sequence[Any]:
+        """Create the file, start what has to be started, and return Rerun's sinks, the file first."""
+        sinks: list[Any] = []
+        if self.file is not None:
+            try:
+                sinks.append(rr.FileSink(self.file))
+            except RuntimeError as error:
+                raise ConfigError(f"{self.file} cannot be written: {error}.") from None
+        if self.viewer:
+            sinks += self._open_viewer()
+        if self.serve:
+            sinks.append(rr.GrpcSink(self._serve()))
+        if self.connect is not None:
+            sinks.append(rr.GrpcSink(self.connect))
+        return sinks
+
+    def wait_while_serving(self) -> None:
+        """Return at Ctrl-C, SIGTERM or the web server's end; at once when there is none."""
+        with StopRequest() as stop:
+            while self._server is not None and self._server.poll() is None and not stop.requested:
+                time.sleep(0.1)
+
+    def close(self) -> None:
+        """Stop the web server; an opened viewer stays."""
+        if self._server is not None:
+            self._server.terminate()
+            self._server.wait()
+
+    def _open_viewer(self) -> list[Any]:
+        port = free_port()
+        try:
+            start_program([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
+        except ConfigError:
+            if self.file is None:
+                raise
+            self.viewer = False  # a screen was promised and is not there: the file is what remains
+            return []
+        return [rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy")]
+
+    def _serve(self) -> str:
+        port, web_port = free_port(), free_port()
+        ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
+        self._server = start_program([rerun_binary(), "--serve-web", "--bind", self.bind, *ports], port)
+        host = LOCALHOST if self.bind in ("0.0.0.0", LOCALHOST) else self.bind
+        url = f"rerun+http://{host}:{port}/proxy"
+        self.page = f"http://{host}:{web_port}/?url={quote(url, safe='')}"
+        return url
+
+
+def check_writable(file: Path) -> None:
+    """Raise `ConfigError` unless a recording can be written to ``file``; create its folder."""
+    if file.exists() and not file.is_file():
+        raise ConfigError(f"{file} is not a file; give --save a path such as {file.name or 'run'}.rrd in a folder.")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        existed = file.exists()
+        with file.open("ab"):
+            pass
+        if not existed:
+            file.unlink()
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise ConfigError(f"{file} cannot be written ({reason}); choose another --save.") from None
+
+
+def has_display() -> bool:
+    """Whether a window could open."""
+    if platform.system() != "Linux" or os.environ.get("WAYLAND_DISPLAY"):
+        return True
+    display = os.environ.get("DISPLAY", "")
+    local = re.fullmatch(r":(\d+)(\.\d+)?", display)
+    return bool(display) and (local is None or Path(f"/tmp/.X11-unix/X{local[1]}").exists())
+
+
+def rerun_binary() -> str:
+    """The viewer's own binary: the `rerun` on PATH is a script that would outlive its signals."""
+    package = importlib.util.find_spec("rerun_cli")
+    binary = Path(package.origin if package and package.origin else "").with_name(
+        "rerun.exe" if os.name == "nt" else "rerun"
+    )
+    if not binary.is_file():
+        raise ConfigError("The Rerun viewer is not installed; reinstall rerun-sdk, or use --save and --headless.")
+    return str(binary)
+
+
+def open_command(file: Path) -> str:
+    """What to type to look at a recording."""
+    program = "rerun"
+    if shutil.which(program) is None:
+        beside = Path(sys.executable).with_name(program)
+        program = os.path.relpath(beside) if Path.cwd() in beside.parents else str(beside)
+    return f"{program} {file}"
+
+
+def start_program(command: list[str], port: int) -> subprocess.Popen[bytes]:
+    """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + START_TIMEOUT_S
+    listening_since = None
+    # A viewer that finds no screen or graphics driver opens its port first and ends a moment later.
+    while listening_since is None or time.monotonic() < listening_since + SETTLE_S:
+        if process.poll() is not None or time.monotonic() > deadline:
+            process.kill()
+            raise ConfigError("The Rerun viewer did not start; use --headless and look at the file later.")
+        if listening_since is None and _listening(LOCALHOST, port):
+            listening_since = time.monotonic()
+        time.sleep(0.05)
+    return process
+
+
+def _listening(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host, port), timeout=2.0):
+            return True
+    except OSError:
+        return False
+
+
+def free_port() -> int:
+    """A port of this machine that nothing listens on."""
+    with socket.socket() as probe:
+        probe.bind((LOCALHOST, 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,96 @@
+"""Where a stage's cells start and truly belong, and the one cell whose search window is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.projection import Projection, nearest_per_cell
+from calibnet.trace import StageDetail, StageTrace
+from inspector.record.observation import Observation
+
+
+@dataclass(frozen=True, eq=False)
+class StartingPoints:
+    """The scan in the network's image before a stage.
+
+    Attributes:
+        camera: the network's.
+        projection: of the scan with the extrinsic that the stage starts from, rows far to near.
+        displacement: ``[M, 2]`` float32 pixels ``(dx, dy)`` to where the reference puts each point; None without one.
+    """
+
+    camera: PinholeCamera
+    projection: Projection = field(repr=False)
+    displacement: NDArray[np.float32] | None = field(repr=False)
+
+    @classmethod
+    def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
+        """The scan as the stage found it; the network's image is the frame's, resized."""
+        camera, reference, frame = stage.camera, observation.reference, observation.frame
+        projection = observation.projected(stage.before)
+        scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
+        pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers
+        projection = replace(projection, pixels=pixels)
+        if reference is None:
+            return cls(camera, projection, None)
+        to_image = (camera.matrix @ reference[:3]).astype(np.float32)
+        true = frame.points[projection.index, :3] @ to_image[:, :3].T + to_image[:, 3]
+        ahead = np.maximum(true[:, 2:], 1e-3)  # what is behind the true camera is off by a lot, whatever the figure
+        return cls(camera, projection, true[:, :2] / ahead - pixels)
+
+    def nearest(self, stride: int) -> NDArray[np.int64]:
+        """``[h, w]``: row of the nearest point of each cell, -1 where there is none."""
+        return nearest_per_cell(self.projection, self.camera, stride, np.arange(len(self.projection.depth)))
+
+    def true_field(self, stride: int) -> NDArray[np.float32] | None:
+        """``[h, w, 2]`` pixels: the true displacement of each cell's nearest point, 0 in empty cells."""
+        if self.displacement is None:
+            return None
+        winner = self.nearest(stride)
+        return np.where((winner >= 0)[..., None], self.displacement[winner], np.float32(0.0))
+
+
+@dataclass(frozen=True)
+class Match:
+    """A LiDAR point in the network's image.
+
+    Attributes:
+        pixel: ``(u, v)`` where the stage's starting extrinsic puts it.
+        true_displacement: ``(dx, dy)`` in pixels to where the reference puts it; None without one.
+    """
+
+    pixel: tuple[float, float]
+    true_displacement: tuple[float, float] | None
+
+    def cell(self, stride: int) -> tuple[int, int]:
+        """Column and row of the cell that holds the pixel."""
+        return int((self.pixel[0] + 0.5) // stride), int((self.pixel[1] + 0.5) // stride)
+
+
+def chosen_match(points: StartingPoints, results: StageDetail) -> Match | None:
+    """The nearest point of the cell the stage is surest of; None if no cell holds a point.
+
+    Cells whose search window reaches over the image's border are passed over where others exist.
+    """
+    finest = results.scales[0]
+    winner = points.nearest(finest.stride)
+    candidates = (winner >= 0) & finest.occupied
+    inner = np.zeros_like(candidates)
+    margin_y, margin_x = finest.volume.shape[0] // 2, finest.volume.shape[1] // 2
+    inner[margin_y:-margin_y, margin_x:-margin_x] = True
+    if (candidates & inner).any():
+        candidates &= inner
+    if not candidates.any():
+        return None
+    surest = int(np.argmax(np.where(candidates, results.confidence, -1.0)))
+    point = winner.reshape(-1)[surest]
+    true = None if points.displacement is None else _pair(points.displacement[point])
+    return Match(_pair(points.projection.pixels[point]), true)
+
+
+def _pair(values: NDArray[np.float32]) -> tuple[float, float]:
+    return float(values[0]), float(values[1])

@@ -1,0 +1,127 @@
+"""A Rerun recording of a calibration run: opened with its first frame, closed with a footer.
+
+The same input and seed give the same data (``rerun rrd compare --unordered``): no wall-clock
+timeline, chunks cut by frames alone, an id made from the run's options. Frames are flushed as they
+come, so that memory stays bounded and a killed run leaves what it had recorded.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import rerun as rr
+
+from calibnet.geometry.types import Extrinsic
+from calibnet.trace import DriveEstimate
+from inspector import entities
+from inspector.record.contents import Part
+from inspector.record.observation import Layout, Observation
+from inspector.record.pictures.legends import log_legends
+from inspector.record.stream import Stream
+from inspector.record.tabs.blueprint import make_blueprint
+from inspector.record.tabs.drive import log_drive
+from inspector.record.tabs.frame import log_curve_styles, log_frame
+from inspector.record.tabs.scene import log_scene, log_scene_frame
+from inspector.record.tabs.stage import log_stages
+
+FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
+"""Fewest and most frames between two flushes; a kill loses at most these.
+
+A flush writes one chunk an entity. Each costs 3 kB of file, much beside a small frame, and some of
+the memory that collects the footer: 0.5 MB a flush. So the longer a run, the rarer the flushes.
+"""
+FLUSH_SHARE = 25
+"""Frames recorded for each frame that a kill may lose."""
+
+
+@dataclass(frozen=True)
+class RunDescription:
+    """What identifies a run.
+
+    Attributes:
+        title: for the viewer's list of recordings, for instance ``"kitti-odometry/04"``.
+        options: everything that changes the data, such as seed, range and preset.
+        provenance: what else a reader may ask for, such as versions; does not change the identity.
+    """
+
+    title: str
+    options: dict[str, Any]
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def recording_id(self) -> str:
+        """The same for the same title and options, another otherwise."""
+        text = repr((self.title, sorted(self.options.items())))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+class Recording:
+    """Logs observations to files and viewers; a context manager that closes properly."""
+
+    def __init__(self, sinks: Sequence[Any], description: RunDescription, layout: Layout) -> None:
+        """Open the sinks and log what is said once: names, blueprint, legends, curve styles.
+
+        Args:
+            sinks: Rerun sinks, see `inspector.sinks`.
+            description: identifies the run.
+            layout: what the recording will contain.
+        """
+        self._contents = layout.contents
+        self._frames = self._unflushed = 0
+        self._seconds: dict[int, float] = {}
+        self._stream = Stream(
+            entities.APPLICATION_ID, description.recording_id, description.title, sinks, make_blueprint(layout)
+        )
+        self._rec = self._stream.rec
+        self._rec.send_property(entities.RUN, rr.AnyValues(**description.options))
+        self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_described(layout)))
+        if Part.SCENE in layout.contents.parts:
+            log_scene_frame(self._rec)
+        log_legends(self._rec, layout)
+        log_curve_styles(self._rec, layout)
+        self._stream.flush()  # a recording that is cut off anywhere later can still be read
+
+    def log(self, observation: Observation) -> None:
+        """Log everything about one frame and hand it to the sinks."""
+        frame = observation.frame
+        self._rec.set_time(entities.FRAME, sequence=frame.index)
+        self._rec.set_time(entities.TIME, duration=frame.timestamp)
+        self._seconds[frame.index] = frame.timestamp
+        log_frame(self._rec, observation, self._contents)
+        log_stages(self._rec, observation, self._contents)
+        log_scene(self._rec, observation, self._contents)
+        self._frames += 1
+        self._unflushed += 1
+        fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
+        if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
+            self._unflushed = 0
+            self._stream.flush()
+
+    def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
+        """Log what all frames together make of the extrinsic."""
+        log_drive(self._rec, estimate, reference, self._seconds)
+
+    def close(self) -> None:
+        """Flush and write the footer; nothing, where nothing can be written any more."""
+        self._stream.close()
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _described(layout: Layout) -> dict[str, Any]:
+    """What the recording contains, for readers that have no layout.
+
+    Names are not those of any option: Rerun keeps one type a name in a process.
+    """
+    return {
+        "stage_numbers": [stage.number for stage in layout.stages],
+        "stage_ranges": [stage.range for stage in layout.stages],
+        "has_reference": layout.has_reference,
+    }

@@ -1,0 +1,131 @@
+"""The text panel: what every stage did to this frame, as Markdown.
+
+Timings are left out on purpose: they differ from run to run, and two recordings of one seed must be
+equal. The command line prints them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from calibnet.geometry import RANGES, PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
+from inspector import entities
+from inspector.record.observation import Observation
+
+NOTHING = "–"
+READING_AID = (
+    "Where the calibration is right, jumps in the points' colours lie on the edges of the picture. "
+    "Play the timeline `step` with *Cascade / Step by step* in front to watch each frame being corrected."
+)
+
+
+def stage_table(observation: Observation, linked: bool = True) -> str:
+    """The table of one frame, with the stages that did not run and why.
+
+    Args:
+        observation: the frame and what was done to it.
+        linked: whether the overlays are there that the stages' names link to.
+    """
+    lines = [
+        f"### {_headline(observation)}",
+        "",
+        *_confirmation(observation),
+        *_stages(observation, linked),
+        "",
+        *_axes(observation),
+        "",
+    ]
+    lines += [f"{stage.reason}\n" for stage in observation.skipped]
+    if observation.reference is None:
+        lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
+    return "\n".join([*lines, *_extrinsic(observation.trace.corrected), "", READING_AID, ""])
+
+
+def _headline(observation: Observation) -> str:
+    """The result in a line."""
+    frame, trace = observation.frame, observation.trace
+    if not trace.confirmed:
+        return f"Frame {frame.index}: not corrected, picture and scan do not fit together"
+    before, after = observation.error(trace.initial), observation.error(trace.corrected)
+    if before is None or after is None:
+        change = pose_error(trace.corrected, trace.initial)
+        return f"Frame {frame.index}: corrected by {change.rotation_deg:.2f}° and {change.translation_cm:.1f} cm"
+    return (
+        f"Frame {frame.index}: {before.rotation_deg:.2f}° → {after.rotation_deg:.2f}°, "
+        f"{before.translation_cm:.1f} → {after.translation_cm:.1f} cm"
+    )
+
+
+def _confirmation(observation: Observation) -> list[str]:
+    """Whether the picture confirms the result: all that can be said where no reference is known."""
+    trace = observation.trace
+    if not trace.stages or math.isinf(trace.match_error_limit_px):
+        return []
+    last = trace.stages[-1]
+    found = f"its matches are expected to be {observation.image_px(last, last.match_error_px):.1f} px off"
+    limit = f"{observation.image_px(last, trace.match_error_limit_px):.1f} px"
+    if trace.confirmed:
+        return [f"The picture confirms it: after stage {last.number} {found} (of at most {limit}).", ""]
+    return [
+        f"**Left as it was**: after stage {last.number} {found}, more than {limit}. "
+        "Do picture and scan belong together, and is the start within the range of the first stage?",
+        "",
+    ]
+
+
+def _stages(observation: Observation, linked: bool) -> list[str]:
+    trace = observation.trace
+    with_errors = observation.reference is not None
+    skipped = {stage.number for stage in observation.skipped}
+    ran = {stage.number: stage for stage in trace.stages}
+    header = ["after", "trained for", *(["rotation error", "translation error"] if with_errors else []), "moved by"]
+    rows = [
+        ["miscalibrated" if with_errors else "as given", NOTHING, *_error(observation.error(trace.initial)), NOTHING]
+    ]
+    for number, range_ in enumerate(RANGES, start=1):
+        trained_for = f"±{range_.rotation_deg:g}° / {range_.translation_m:g} m"
+        if number in ran:
+            stage = ran[number]
+            motion = pose_error(stage.after, stage.before)
+            change = f"{motion.rotation_deg:.2f}° / {motion.translation_cm:.1f} cm"
+            name = f"[stage {number}](recording://{entities.overlay_stage(number)})" if linked else f"stage {number}"
+            rows.append([name, trained_for, *_error(observation.error(stage.after)), change])
+        elif number in skipped:
+            empty = [NOTHING, NOTHING] if with_errors else []
+            rows.append([f"stage {number}", trained_for, *empty, "skipped"])
+    return markdown(header, rows)
+
+
+def _axes(observation: Observation) -> list[str]:
+    """What is left on each axis or, without a reference, what was changed on it."""
+    trace = observation.trace
+    known = observation.reference is not None
+    rows = {
+        "miscalibrated by": observation.error(trace.initial),
+        "left over": observation.error(trace.corrected),
+        "corrected by": None if known else pose_error(trace.corrected, trace.initial),
+    }
+    header = ["", "roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)"]
+    return markdown(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
+
+
+def _per_axis(error: PoseError) -> list[str]:
+    angles = (error.roll_deg, error.pitch_deg, error.yaw_deg)
+    offsets = (error.x_cm, error.y_cm, error.z_cm)
+    return [f"{angle:+.2f}°" for angle in angles] + [f"{offset:+.1f} cm" for offset in offsets]
+
+
+def _extrinsic(camera_from_lidar: Extrinsic) -> list[str]:
+    rows = (" ".join(f"{value:9.5f}" for value in row) for row in camera_from_lidar[:3])
+    return ["Corrected `camera_from_lidar` (metres)", "```", *rows, "```"]
+
+
+def _error(error: PoseError | None) -> list[str]:
+    return [] if error is None else [f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"]
+
+
+def markdown(header: list[str], rows: list[list[str]]) -> list[str]:
+    """The lines of a Markdown table."""
+    ruler = ["---"] * len(header)
+    return ["| " + " | ".join(cells) + " |" for cells in (header, ruler, *rows)]

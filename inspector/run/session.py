@@ -1,0 +1,156 @@
+"""The main loop: frames in, cascade, recording out, with progress and an orderly end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from collections.abc import Sequence as Positions
+from dataclasses import dataclass
+from typing import Protocol
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.selection import PickedFrames
+from calibnet.errors import CalibnetError
+from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.interruption import StopRequest
+from calibnet.trace import CascadeTrace, DriveEstimate
+from inspector.record.contents import Contents
+from inspector.record.observation import Layout, Observation, Skipped
+from inspector.record.outputs import Outputs
+from inspector.record.recording import Recording, RunDescription
+from inspector.record.tabs.drive import drive_sentence
+from inspector.run.start import Start
+from inspector.run.summary import Summary
+
+STOPPING = "Stopping after this frame; once more stops at once."
+
+
+class Calibrator(Protocol):
+    """What the loop needs of a cascade."""
+
+    @property
+    def skipped(self) -> Positions[Skipped]:
+        """Stages that were asked for and have no weights."""
+        ...
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """Run the stages on one frame."""
+        ...
+
+    def calibrate_drive(
+        self, frames: PickedFrames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        """Estimate one extrinsic from all frames."""
+        ...
+
+
+@dataclass(frozen=True)
+class Session:
+    """Everything a run needs; `run` does it.
+
+    Attributes:
+        sequence: where frames come from.
+        positions: which of them, in order.
+        cascade: what calibrates them.
+        start: where each calibration starts.
+        outputs: where the recording goes.
+        description: what the recording says about itself.
+        contents: what is logged of each frame.
+        console: where progress is shown.
+        as_one: after the frames, also solve all of them as one drive.
+    """
+
+    sequence: Sequence
+    positions: Positions[int]
+    cascade: Calibrator
+    start: Start
+    outputs: Outputs
+    description: RunDescription
+    contents: Contents
+    console: Console
+    as_one: bool = False
+
+    def run(self) -> Summary:
+        """Calibrate and record every frame; stop at the first that cannot be read.
+
+        Returns:
+            The summary; `Summary.interrupted` after Ctrl-C or SIGTERM.
+
+        Raises:
+            CalibnetError: a frame cannot be read or calibrated, or the disk is full. What was
+                recorded before is closed properly, and the message says so.
+        """
+        summary = Summary()
+        recording: Recording | None = None
+        try:
+            with StopRequest(STOPPING) as stop, _progress(self.console) as progress:
+                for position in progress.track(self.positions, description=self.sequence.name):
+                    if stop.requested:
+                        summary.interrupted = True
+                        break
+                    observation = self._observe(position)
+                    if recording is None:
+                        layout = Layout.of(observation, self.contents, self.as_one)
+                        recording = Recording(self.outputs.open(), self.description, layout)
+                    self.outputs.check_space()
+                    recording.log(observation)
+                    summary.add(observation)
+                if self.as_one and recording is not None and not summary.interrupted:
+                    summary.drive = self._solve_as_one(recording, progress, stop)
+        except KeyboardInterrupt:
+            summary.interrupted = True
+        except CalibnetError as error:
+            raise type(error)(f"{error}{self._what_is_kept(summary)}") from error
+        finally:
+            if recording is not None:
+                recording.close()
+        return summary
+
+    def _observe(self, position: int) -> Observation:
+        frame = self.sequence[position]
+        trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
+        return Observation(frame, trace, self.start.reference(frame), tuple(self.cascade.skipped))
+
+    def _solve_as_one(self, recording: Recording, progress: Progress, stop: StopRequest) -> str:
+        """Estimate one extrinsic from all frames and log how it converges; returns the result in words."""
+        frames = PickedFrames(self.sequence, self.positions)
+        first = frames[0]
+        initial, reference = self.start.initial(first), self.start.reference(first)
+        task = progress.add_task("whole drive as one", total=None)
+
+        def advance(read: int, total: int) -> None:
+            progress.update(task, completed=read, total=total)
+            if stop.requested:
+                raise KeyboardInterrupt
+
+        estimate = self.cascade.calibrate_drive(frames, initial, advance)
+        recording.log_drive(estimate, reference)
+        return drive_sentence(estimate, reference, initial)
+
+    def _what_is_kept(self, summary: Summary) -> str:
+        if summary.frames == 0 or self.outputs.file is None:
+            return ""
+        return (
+            f" What was recorded before ({summary.frames} of {len(self.positions)} frames) is in {self.outputs.file}."
+        )
+
+
+class _FramesPerSecond(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text("" if task.speed is None else f"{task.speed:.1f} frames/s")
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _FramesPerSecond())
+    return Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, speed_estimate_period=10.0)

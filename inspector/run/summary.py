@@ -1,0 +1,71 @@
+"""What a run leaves behind on the terminal: errors before and after, times, where it was saved."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+from statistics import median
+
+from calibnet.geometry import PoseError, pose_error
+from inspector.record.observation import Observation
+
+
+@dataclass
+class Summary:
+    """Collects a few numbers a frame; constant memory is not needed for these."""
+
+    frames: int = 0
+    unconfirmed: int = 0
+    interrupted: bool = False
+    drive: str = ""
+    started: float = field(default_factory=time.monotonic)
+    _initial: list[PoseError] = field(default_factory=list, repr=False)
+    _corrected: list[PoseError] = field(default_factory=list, repr=False)
+    _change: list[PoseError] = field(default_factory=list, repr=False)
+    _milliseconds: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list), repr=False)
+
+    def add(self, observation: Observation) -> None:
+        """Take in one frame."""
+        trace = observation.trace
+        self.frames += 1
+        self.unconfirmed += not trace.confirmed
+        self._change.append(pose_error(trace.corrected, trace.initial))
+        for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
+            error = observation.error(extrinsic)
+            if error is not None:
+                errors.append(error)
+        self._milliseconds["shared"].append(sum(trace.milliseconds.values()))
+        for stage in trace.stages:
+            self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
+
+    def lines(self) -> list[str]:
+        """Sentences for the end of a run."""
+        if self.frames == 0:
+            return ["No frame was recorded."]
+        seconds = time.monotonic() - self.started
+        lines = [f"{_frames(self.frames)} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
+        if self._initial:
+            lines.append(
+                f"Error, median over frames: {_middle(self._initial)} initially, {_middle(self._corrected)} corrected."
+            )
+        else:
+            lines.append(f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with.")
+        if self.unconfirmed:
+            lines.append(
+                f"{_frames(self.unconfirmed)} left as given: picture and scan do not fit together after the last stage."
+            )
+        if self.drive:
+            lines.append(self.drive)
+        times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
+        lines.append(f"Cascade, median milliseconds: {times}.")
+        return lines
+
+
+def _middle(errors: list[PoseError]) -> str:
+    rotation = median(error.rotation_deg for error in errors)
+    return f"{rotation:.2f}° / {median(error.translation_cm for error in errors):.1f} cm"
+
+
+def _frames(count: int) -> str:
+    return "1 frame" if count == 1 else f"{count} frames"

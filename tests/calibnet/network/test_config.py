@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from typing import Any
+
+import pytest
+
+from calibnet.errors import ConfigError
+from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.network.config import load_preset, parse_config, preset_names
+from tests.support.tiny import TINY
+
+
+def test_presets_are_named_in_the_error() -> None:
+    assert preset_names() == ["compact", "paper"]
+    with pytest.raises(ConfigError, match="no preset 'big'; choose one of compact, paper"):
+        load_preset("big")
+
+
+@pytest.mark.parametrize("name", ["compact", "paper"])
+def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
+    config = load_preset(name)
+    assert parse_config(json.loads(json.dumps(asdict(config))), "header") == config
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"colour": 3}, "unknown keys: colour"),
+        ({"radius": 3}, "radius must be even"),
+        ({"radius": 0}, "radius must be even"),
+        ({"blocks": [1, 2]}, "widths and blocks"),
+        ({"scales": [8, 32]}, "twice the one before"),
+        ({"scales": [6, 12]}, "powers of two"),
+        ({"scales": [32, 64]}, "powers of two"),
+        ({"scales": []}, "must be a scale"),
+        ({"groups": 3}, "groups must divide"),
+        ({"hourglasses": 0}, "switch `aggregation` off"),
+        ({"volume_channels": [8, 8]}, "volume_channels"),
+        ({"hourglass_blocks": [1, 1, 1]}, "hourglass_blocks"),
+        ({"head": "transformer"}, "geometric, regression"),
+        ({"normalization": "layer"}, "group, batch"),
+        ({"zooms": [1.0, 1.0]}, "one positive number a stage, 5 in all"),
+        ({"zooms": [0.0, 1.0, 1.0, 1.0, 1.0]}, "one positive number a stage"),
+        ({"looks": [1, 1, 1, 0, 1]}, "one number of at least 1 a stage, 5 in all"),
+        ({"widths": 8}, "mine.toml"),
+    ],
+)
+def test_wrong_values_are_named(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigError, match=said) as raised:
+        parse_config(asdict(TINY) | change, "mine.toml")
+    assert str(raised.value).endswith(".") and "\n" not in str(raised.value)
+
+
+def test_missing_keys_are_named() -> None:
+    values = asdict(TINY)
+    del values["radius"], values["head"]
+    with pytest.raises(ConfigError, match=r"mine.toml is not a complete network.*radius.*head"):
+        parse_config(values, "mine.toml")
+
+
+def test_each_range_has_its_zoom_and_rounds_and_others_have_none() -> None:
+    config = replace(TINY, zooms=(0.5, 0.6, 1.0, 1.5, 2.0), looks=(3, 2, 1, 1, 2))
+    assert [config.looks_of(range_) for range_ in RANGES] == [3, 2, 1, 1, 2]
+    assert config.looks_of(MiscalibrationRange(7, 0.7)) == 1
+    assert [config.zoom(range_) for range_ in RANGES] == [0.5, 0.6, 1.0, 1.5, 2.0]
+    assert config.zoom(MiscalibrationRange(7, 0.7)) == 1.0

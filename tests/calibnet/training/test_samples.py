@@ -1,0 +1,207 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import DatasetError
+from calibnet.geometry import RANGES, invert, miscalibration, project, range_of
+from calibnet.network.batch import lidar_input
+from calibnet.network.displacement import DisplacementField
+from calibnet.network.pose import GeometricHead
+from calibnet.training.losses import true_displacement
+from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, plain, visible_cells
+from tests.support.scene import REFERENCE, Scenes, make_frame
+from tests.support.tiny import TINY
+
+SCALES = (8, 16, 32)
+DELTA = miscalibration([1.0, -2.0, 3.0], [0.2, -0.1, 0.3])
+
+
+def stream(seed: int = 0, batch: int = 4, area: int = 96 * 256) -> TrainingSamples:
+    return TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, area, batch, seed)
+
+
+def same(one: Sample, other: Sample) -> bool:
+    return np.array_equal(one.image, other.image) and all(
+        np.array_equal(a, b)
+        for a, b in zip(
+            (one.lidar.image, *one.lidar.cells, one.intrinsics, one.correction, one.shift, *one.visible),
+            (other.lidar.image, *other.lidar.cells, other.intrinsics, other.correction, other.shift, *other.visible),
+            strict=True,
+        )
+    )
+
+
+def lowered(frame: Frame, row: int) -> Frame:
+    """The frame with only those points that, miscalibrated by DELTA, fall below a row of its image."""
+    projection = project(frame.points, DELTA @ frame.camera_from_lidar, frame.camera)
+    return replace(frame, points=frame.points[projection.index[projection.pixels[:, 1] > row]])
+
+
+def test_a_sample_is_a_function_of_seed_and_number() -> None:
+    first, second = stream(), stream()
+    forwards = [first[number] for number in range(6)]
+    backwards = [second[number] for number in reversed(range(6))][::-1]
+    assert all(same(one, other) for one, other in zip(forwards, backwards, strict=True))
+    assert not any(same(forwards[0], sample) for sample in (*forwards[1:], stream(seed=1)[0]))
+
+
+def test_a_batch_has_one_size_and_batches_differ() -> None:
+    samples = stream(batch=2)
+    sizes = [[samples[2 * batch + number].image.shape for number in range(2)] for batch in range(12)]
+    assert all(one == other for one, other in sizes)
+    assert len({size for size, _ in sizes}) > 1
+    assert all(side % 32 == 0 for size, _ in sizes for side in size[:2])
+
+
+def test_miscalibrations_fill_the_range_and_stay_in_it() -> None:
+    samples, generator = stream(), np.random.default_rng(0)
+    drawn = [range_of(samples.draw(generator)) for _ in range(400)]
+    assert max(range_.rotation_deg for range_ in drawn) == pytest.approx(5.0, abs=0.05)
+    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.5, abs=0.005)
+    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.5001 for range_ in drawn)
+    assert sum(range_.rotation_deg < 2.0 for range_ in drawn) > 20, "a stage must also know when to stop"
+
+
+def test_sources_are_drawn_by_their_weight() -> None:
+    often, seldom = Scenes(1), Scenes(1)
+    samples = TrainingSamples([Source(often, 3.0), Source(seldom, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
+    for number in range(60):
+        samples[number]
+    assert 1.7 < often.reads / seldom.reads < 6.0
+
+
+def test_frames_are_read_once_unless_the_sequence_keeps_them() -> None:
+    scenes = Scenes(2)
+    scenes.caches = False
+    samples = TrainingSamples([Source(scenes, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
+    for number in range(12):
+        samples[number]
+    assert scenes.reads == 2
+
+
+def test_the_correction_undoes_the_miscalibration() -> None:
+    frame = make_frame()
+    sample = make_sample(frame, DELTA, SCALES)
+    np.testing.assert_allclose(sample.correction @ DELTA @ REFERENCE, REFERENCE, atol=1e-6)
+    expected = lidar_input(frame.points, DELTA @ REFERENCE, frame.camera, SCALES)
+    assert np.array_equal(sample.lidar.image, expected.image)
+
+
+def test_a_field_that_tells_the_truth_solves_to_the_correction() -> None:
+    """Cells, displacements and the solver must mean the same pixels and the same point."""
+    inputs, target = collate([make_sample(make_frame(), DELTA, SCALES)])
+    truth = true_displacement(inputs.cells[0], target.correction, inputs.intrinsics)
+    field = DisplacementField(truth, torch.full_like(truth, -2.0), torch.empty(0))
+    estimate = GeometricHead(TINY, RANGES[2])(field, inputs.cells[0], inputs.intrinsics).correction[0]
+    np.testing.assert_allclose(estimate.numpy(), target.correction[0].numpy(), atol=2e-3)
+
+
+def test_the_warm_up_displaces_the_lidar_image() -> None:
+    frame, shift = make_frame(), (9.0, -17.0)
+    still, displaced = make_sample(frame, DELTA, SCALES), make_sample(frame, DELTA, SCALES, shift)
+    moved = np.zeros_like(still.lidar.image)
+    moved[:, :-17, 9:] = still.lidar.image[:, 17:, :-9]
+    common = (slice(None), slice(0, -17), slice(9, None))
+    np.testing.assert_allclose(displaced.lidar.image[common], moved[common], atol=1e-4)
+    assert np.array_equal(displaced.shift, np.float32(shift)) and not still.shift.any()
+    assert np.array_equal(displaced.intrinsics, still.intrinsics)
+
+
+def test_only_the_warm_up_is_displaced() -> None:
+    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 4, 0, warm_up=5)
+    displaced = [bool(samples[number].shift.any()) for number in range(8)]
+    assert displaced == [True] * 5 + [False] * 3
+    assert np.abs([samples[number].shift for number in range(5)]).max() <= TrainingSamples.LARGEST_SHIFT
+
+
+def test_collated_samples_keep_their_order_and_types() -> None:
+    frames = [make_frame(seed, 128, 64) for seed in range(2)]
+    samples = [make_sample(frame, DELTA, SCALES) for frame in frames]
+    inputs, target = collate(samples)
+    assert inputs.image.shape == (2, 3, 64, 128) and inputs.lidar.shape == (2, 2, 64, 128)
+    assert [tuple(cells.shape) for cells in inputs.cells] == [(2, 3, 8, 16), (2, 3, 4, 8), (2, 3, 2, 4)]
+    assert [tuple(mask.shape) for mask in target.visible] == [(2, 8, 16), (2, 4, 8), (2, 2, 4)]
+    assert np.array_equal(inputs.image[1].permute(1, 2, 0).numpy(), frames[1].image)
+    assert np.array_equal(inputs.cells[0][1].numpy(), samples[1].lidar.cells[0])
+
+
+def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
+    frames = [make_frame(seed, 128, 128) for seed in range(2)]
+    samples = [make_sample(lowered(frame, row), DELTA, SCALES) for frame, row in zip(frames, (100, 70), strict=True)]
+    assert [sample.lidar.empty_rows for sample in samples] == [3, 2]
+    inputs, target = collate(samples)
+    assert inputs.image.shape == (2, 3, 128, 128) and inputs.lidar.shape == (2, 2, 64, 128)
+    for scale, cells, mask, position in zip(SCALES, inputs.cells, target.visible, range(3), strict=True):
+        assert cells.shape[2:] == mask.shape[1:] == (64 // scale, 128 // scale)
+        for number, sample in enumerate(samples):
+            assert np.array_equal(cells[number].numpy(), sample.lidar.cells[position][:, 64 // scale :])
+            assert np.array_equal(mask[number].numpy(), sample.visible[position][64 // scale :])
+
+
+def test_plain_frames_have_the_size_of_inference() -> None:
+    large = make_frame(0, 621, 188)
+    frame = plain(large, large.camera.fitted(160, 512, 32))
+    assert frame.image.shape == (frame.camera.height, frame.camera.width, 3)
+    assert frame.image.shape[0] % 32 == frame.image.shape[1] % 32 == 0
+    assert np.array_equal(frame.camera_from_lidar, REFERENCE)
+
+
+def test_everything_is_visible_from_the_scanner_s_own_place() -> None:
+    frame = make_frame()
+    for delta in (np.eye(4), DELTA):
+        sample = make_sample(frame, delta, SCALES)
+        for cells, visible in zip(sample.lidar.cells, sample.visible, strict=True):
+            occupied = cells[2] > 0
+            assert not (visible & ~occupied).any()
+            assert visible.sum() > 0.6 * occupied.sum()
+
+
+def lidar_point(u: float, v: float, depth: float) -> np.ndarray:
+    """The scan's point that the true camera sees at a pixel of `make_frame`."""
+    in_camera = depth * (np.linalg.inv(make_frame().camera.matrix) @ [u, v, 1.0])
+    return np.append(invert(REFERENCE)[:3] @ np.append(in_camera, 1.0), 0.5).astype(np.float32)
+
+
+def test_points_behind_others_are_not_visible() -> None:
+    camera = make_frame().camera
+    hidden, free = lidar_point(120, 40, 30.0), lidar_point(200, 40, 30.0)
+    points = np.array([*(lidar_point(u, v, 6.0) for u in range(100, 150, 2) for v in range(20, 70, 2)), hidden, free])
+    # from a place further left, parallax takes the hidden point out of the near ones' cells
+    delta = miscalibration([0, 0, 6.0], [1.5, 0, 0])
+    lidar = lidar_input(points, delta @ REFERENCE, camera, (8,))
+    (visible,) = visible_cells(lidar, points, REFERENCE, camera, invert(delta))
+    far = lidar.cells[0][2] > 15
+    u, v, _ = camera.matrix @ (delta @ REFERENCE @ np.append(free[:3], 1.0))[:3]
+    w = (delta @ REFERENCE @ np.append(free[:3], 1.0))[2]
+    assert far.sum() == 2
+    assert [tuple(cell) for cell in np.argwhere(far & visible)] == [(int((v / w + 0.5) // 8), int((u / w + 0.5) // 8))]
+
+
+def test_points_outside_the_image_are_not_visible() -> None:
+    camera, turned = make_frame().camera, miscalibration([0, 0, 15.0], [0, 0, 0])
+    points = lidar_point(20, 40, 30.0)[None]
+    lidar = lidar_input(points, REFERENCE, camera, (8,))
+    assert (lidar.cells[0][2] > 0).sum() == 1
+    assert visible_cells(lidar, points, REFERENCE, camera, np.eye(4))[0].sum() == 1
+    assert not visible_cells(lidar, points, invert(turned) @ REFERENCE, camera, invert(turned))[0].any()
+
+
+def test_nothing_is_visible_where_the_camera_sees_no_point() -> None:
+    frame = make_frame()
+    behind = replace(frame, camera_from_lidar=miscalibration([0, 0, 180.0], [0, 0, 0]) @ REFERENCE)
+    sample = make_sample(behind, miscalibration([0, 0, 180.0], [0, 0, 0]), SCALES)
+    assert sample.lidar.cells[0].any(), "under the miscalibration it does"
+    assert not any(mask.any() for mask in sample.visible)
+
+
+def test_frames_that_never_give_a_sample_are_named() -> None:
+    scenes = Scenes(2)
+    scenes.frames = [replace(frame, points=frame.points[:5]) for frame in scenes.frames]
+    samples = TrainingSamples([Source(scenes, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
+    with pytest.raises(DatasetError, match="scene"):
+        samples[0]

@@ -1,0 +1,192 @@
+"""The commands ``seq raw object folder demo``: what they run, where they save, what they refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from rerun.chunk import RrdReader
+
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+
+Invoke = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def invoke(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str], fakes: ModuleType
+) -> Invoke:
+    """``invoke("seq", "04", ...)`` in an empty folder without a display, with the fake cascade."""
+    from calibnet.cascade.cascade import Cascade
+
+    def load(preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Any = None) -> Any:
+        return fakes.FakeCascade(stages or (1, 2, 3, 4, 5))
+
+    monkeypatch.setattr(Cascade, "load", staticmethod(load))
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "KITTI_ROOT"):
+        monkeypatch.delenv(name, raising=False)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        code = run(cli, list(arguments))
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return call
+
+
+@pytest.fixture
+def own_folder(tmp_path: Path, fakes: ModuleType) -> Path:
+    """Two frames of the fake car as a plain folder."""
+    folder = tmp_path / "own"
+    for name in ("images", "clouds"):
+        (folder / name).mkdir(parents=True)
+    for index in range(2):
+        frame = fakes.make_frame(index)
+        cv2.imwrite(str(folder / "images" / f"{index:04d}.png"), frame.image[:, :, ::-1])
+        frame.points.tofile(folder / "clouds" / f"{index:04d}.bin")
+    calibration = {
+        "width": frame.camera.width,
+        "height": frame.camera.height,
+        "camera_matrix": frame.camera.matrix.tolist(),
+        "distortion": [0.0] * 5,
+        "camera_from_lidar": frame.camera_from_lidar.tolist(),
+    }
+    (folder / "calibration.yaml").write_text(yaml.safe_dump(calibration))
+    return folder
+
+
+def entities_of(file: Path) -> set[str]:
+    return {str(column.entity_path) for column in RrdReader(file).store().schema().component_columns()}
+
+
+def test_a_folder_starts_from_its_calibration_and_has_no_errors(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--save", "own.rrd")
+    assert code == 0
+    assert "no reference" in out
+    assert "/error/rotation/initial" not in entities_of(Path("own.rrd"))
+
+
+def test_a_folder_with_a_range_takes_its_calibration_for_the_reference(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--range", "2/0.2", "--seed", "1", "--save", "own.rrd")
+    assert code == 0
+    assert "corrected." in out
+    paths = entities_of(Path("own.rrd"))
+    assert "/error/rotation/initial" in paths
+    assert "/overlay/stage_4" in paths
+    assert "/overlay/stage_3" not in paths
+
+
+def test_without_display_and_save_the_recording_goes_to_recordings(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--frames", "1")
+    file = Path("recordings/folder-own.rrd")
+    assert code == 0
+    assert f"Saved {file}" in out
+    assert f"rerun {file}" in out.splitlines()[-1]
+    assert file.is_file()
+
+
+def test_demo_needs_nothing_and_is_kept_in_recordings(invoke: Invoke, read: Any, fakes: ModuleType) -> None:
+    code, out, _ = invoke("demo", "--length", "2", "--detail", "overview")
+    assert code == 0
+    assert "2 frames in" in out
+    frames = [frame for frame, _ in read(Path("recordings/demo.rrd"), "image", "EncodedImage:blob")]
+    assert frames == [0, 1]
+
+
+def test_kitti_of_the_real_layout(invoke: Invoke, kitti_folder: Path, read: Any) -> None:
+    root = str(kitti_folder / "odometry")
+    code, out, _ = invoke("seq", "04", "--root", root, "--frames", "0:2", "--stages", "4-5", "--save", "04.rrd")
+    assert code == 0, out
+    paths = entities_of(Path("04.rrd"))
+    assert {"/overlay/stage_4", "/overlay/stage_5"} <= paths
+    assert "/overlay/stage_3" not in paths
+
+
+@pytest.mark.parametrize("command", [("seq", "04"), ("raw", "2011_09_26", "0005"), ("object",)])
+def test_without_a_root_it_says_how_to_get_one(invoke: Invoke, command: tuple[str, ...]) -> None:
+    code, _, err = invoke(*command)
+    assert code != 0
+    assert err.count("\n") == 1
+    assert all(text in err for text in ("--root", "KITTI_ROOT", "calib-inspect demo"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--range", "5/0.5", "--miscalibrate", "1,1,1,0,0,0"), "not both"),
+        (("--miscalibrate", "1,1,1,0,0,0", "--per-frame"), "--per-frame"),
+        (("--save", "."), "not a file"),
+        (("--connect", "rerun+http://127.0.0.1:1/proxy"), "No viewer listens"),
+        (("--frames", "7:9"), "select nothing"),
+    ],
+)
+def test_options_that_cannot_be_met(invoke: Invoke, own_folder: Path, options: tuple[str, ...], message: str) -> None:
+    code, _, err = invoke("folder", str(own_folder), *options)
+    assert code != 0
+    assert message in err
+    assert "Traceback" not in err
+
+
+def test_a_broken_second_scan_keeps_the_first_frame(invoke: Invoke, own_folder: Path, read: Any) -> None:
+    scan = own_folder / "clouds" / "0001.bin"
+    scan.write_bytes(scan.read_bytes()[:-7])
+    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd")
+    assert code == 3
+    assert "0001.bin" in err
+    assert "1 of 2 frames" in err
+    assert [frame for frame, _ in read(Path("own.rrd"), "image", "EncodedImage:blob")] == [0]
+
+
+def test_given_miscalibration_arrives_as_given(invoke: Invoke, own_folder: Path, read: Any) -> None:
+    invoke("folder", str(own_folder), "--miscalibrate", "0,0,3,0,0,0", "--save", "own.rrd")
+    errors = [value.as_py()[0] for _, value in read(Path("own.rrd"), "error/rotation/initial", "Scalars:scalars")]
+    np.testing.assert_allclose(errors, [3.0, 3.0], atol=1e-6)
+
+
+def test_report_keeps_the_recording_where_no_other_place_is_named(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--range", "2/0.2", "--report", "report")
+    assert code == 0, out
+    assert "Report: report/index.html" in out
+    assert not Path("recordings").exists()
+    assert {path.name for path in Path("report").iterdir()} == {
+        "index.html",
+        "metrics.json",
+        "pictures",
+        "recording.rrd",
+    }
+    invoke("folder", str(own_folder), "--range", "2/0.2", "--save", "own.rrd", "--report", "other")
+    assert Path("own.rrd").read_bytes() == Path("other/recording.rrd").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--color", "error"), "has none: give --range or --miscalibrate"),
+        (("--log", "curves,pictures"), "'pictures' is no part of a frame; choose from curves,"),
+        (("--log", "curves", "--detail", "full"), "belong together"),
+        (("--detail", "custom"), "belong together"),
+    ],
+)
+def test_contents_that_make_no_sense_are_wrong_usage(
+    invoke: Invoke, own_folder: Path, options: tuple[str, ...], sentence: str
+) -> None:
+    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd", *options)
+    assert code == 2
+    assert sentence in " ".join(err.split())
+    assert not Path("own.rrd").exists()
+
+
+def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke, own_folder: Path) -> None:
+    code, out, _ = invoke("folder", str(own_folder), "--frames", "0", "--save", "own.rrd", "--log", "overlays,scene")
+    assert code == 0
+    assert "Kilobytes a frame: " in out
+    assert "3D scene" in out
+    assert "hourglass" not in out

@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import version
+from pathlib import Path
+
+import click
+import pytest
+
+from calibnet import __version__
+from calibnet.errors import CalibnetError, DatasetError
+from inspector.cli import errors
+from inspector.cli.main import COMMANDS, cli
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def failing(error: BaseException) -> click.Command:
+    """A command that raises."""
+
+    @click.command()
+    def command() -> None:
+        raise error
+
+    return command
+
+
+def start(code: str, **streams: int) -> subprocess.Popen[str]:
+    """Run a command of its own in a fresh interpreter."""
+    preamble = "import sys, click\nfrom inspector.cli.errors import run\n"
+    return subprocess.Popen([sys.executable, "-c", preamble + code], cwd=ROOT, text=True, **streams)
+
+
+def test_help_lists_every_command_with_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert errors.run(cli, ["--help"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    listed = {line.split()[0]: line for line in lines if line.startswith("  ") and line.split()[0] in COMMANDS}
+    assert listed.keys() == COMMANDS.keys()
+    assert all(len(line.split()) > 3 for line in listed.values())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_exists_and_explains_itself(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert errors.run(cli, [name, "--help"]) == 0
+    assert f"Usage: calib-inspect {name}" in capsys.readouterr().out
+
+
+def test_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
+    assert errors.run(cli, ["--version"]) == 0
+    out = capsys.readouterr().out
+    assert __version__ in out
+    assert f"rerun-sdk {version('rerun-sdk')}, torch {version('torch')}" in out
+
+
+def test_the_console_script_is_the_root_group() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["scripts"]["calib-inspect"] == "inspector.cli.main:main"
+
+
+@pytest.mark.parametrize("arguments", [["no-such-command"], ["evaluate"], ["--no-such-option"]])
+def test_wrong_usage_exits_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert errors.run(cli, arguments) == 2
+    assert "Usage: calib-inspect" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "sentence"),
+    [
+        (DatasetError("Folder x is missing."), 3, "Folder x is missing."),
+        (CalibnetError("Anything."), 3, "Anything."),
+        (OSError(errno.ENOSPC, "no", "out.rrd"), 3, "out.rrd: No space left on device; free some space"),
+        (PermissionError(errno.EACCES, "no", "/x/y"), 3, "/x/y: Permission denied; check the permissions"),
+        (FileNotFoundError(errno.ENOENT, "no", "a.json"), 3, "a.json: No such file or directory; check the path."),
+        (
+            OSError("libusb-1.0.so.0: cannot open shared object file: No such file"),
+            3,
+            "apt-get install -y libusb-1.0-0",
+        ),
+        (ImportError("libfoo.so.2: cannot open shared object file"), 3, "libfoo.so.2 is missing, install it with"),
+        (KeyboardInterrupt(), 130, "Interrupted."),
+        (click.Abort(), 130, "Interrupted."),
+    ],
+)
+def test_errors_become_one_sentence(
+    error: BaseException, code: int, sentence: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert errors.run(failing(error), []) == code
+    printed = capfd.readouterr()
+    assert printed.out == ""
+    assert sentence in printed.err
+    assert len(printed.err.strip().splitlines()) == 1
+    assert "Traceback" not in printed.err
+
+
+@pytest.mark.parametrize("error", [ValueError("a bug"), ImportError("No module named 'x'"), OSError("no number")])
+def test_bugs_keep_their_traceback(error: Exception) -> None:
+    with pytest.raises(type(error), match=str(error)):
+        errors.run(failing(error), [])
+
+
+def test_a_failed_check_exits_1() -> None:
+    assert errors.run(failing(click.exceptions.Exit(1)), []) == errors.ExitCode.CHECK_FAILED
+
+
+def test_a_full_disk_behind_stdout_is_a_sentence() -> None:
+    with Path("/dev/full").open("w") as full:
+        process = start(
+            "sys.exit(run(click.Command('c', callback=lambda: print('x'))))", stdout=full.fileno(), stderr=-1
+        )
+        stderr = process.communicate(timeout=60)[1]
+    assert process.returncode == 3
+    assert stderr == "calib-inspect: No space left on device; free some space or write elsewhere.\n"
+
+
+def test_a_closed_pipe_ends_quietly() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    process = start("sys.exit(run(click.Command('c', callback=lambda: print('x'))))", stdout=write, stderr=-1)
+    os.close(write)
+    assert process.communicate(timeout=60)[1] == ""
+    assert process.returncode == errors.ExitCode.BROKEN_PIPE
+
+
+def test_ctrl_c_exits_130_without_traceback() -> None:
+    # a shell starts what it runs in the background with this signal ignored, and children inherit that
+    wait = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    wait += "def wait():\n    print('ready', flush=True)\n    import time\n    time.sleep(60)\n"
+    process = start(wait + "sys.exit(run(click.Command('c', callback=wait)))", stdout=-1, stderr=-1)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    stderr = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert stderr.strip() == "calib-inspect: Interrupted."
+
+
+@pytest.mark.parametrize(
+    ("words", "completions"),
+    [
+        ("calib-inspect se", ["seq"]),
+        ("calib-inspect seq --col", ["--color"]),
+        ("calib-inspect seq --color e", ["edge", "error"]),
+    ],
+)
+def test_shell_completion_knows_commands_options_and_values(
+    words: str, completions: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("_CALIB_INSPECT_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
+    errors.run(cli, [])
+    assert [line.partition(",")[2] for line in capsys.readouterr().out.splitlines()] == completions

@@ -1,0 +1,75 @@
+"""The layout: its tabs, and that no view is without data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import rerun.blueprint as rrb
+
+from inspector.record.contents import Coloring, Contents, Detail, Part
+from inspector.record.observation import Grid, Layout, StageLayout
+from inspector.record.tabs.blueprint import make_blueprint
+from inspector.record.tabs.views import COLORED_BY
+
+GRIDS = (Grid(8, 20, 64), Grid(16, 10, 32))
+
+
+def layout(has_reference: bool = True, contents: Contents | None = None) -> Layout:
+    stages = (StageLayout(3, "5/0.5", GRIDS), StageLayout(5, "1/0.1", GRIDS))
+    return Layout(stages, has_reference, contents or Contents.of(Detail.FULL))
+
+
+def walk(part: Any) -> Iterator[Any]:
+    yield part
+    for child in getattr(part, "contents", []) if isinstance(part, rrb.Container) else []:
+        yield from walk(child)
+
+
+def tabs(blueprint: rrb.Blueprint) -> Any:
+    return blueprint.root_container
+
+
+def names(blueprint: rrb.Blueprint) -> list[str]:
+    return [str(part.name) for part in walk(tabs(blueprint)) if isinstance(part, rrb.View)]
+
+
+def test_tabs_are_those_of_the_design() -> None:
+    parts = tabs(make_blueprint(layout())).contents
+    assert [str(part.name) for part in parts] == ["Overview", "Cascade", "Cost volumes", "Hourglass", "3D"]
+
+
+def test_every_stage_and_scale_has_its_views() -> None:
+    views = names(make_blueprint(layout()))
+    for stage in ("stage 3 (±5°/0.5 m)", "stage 5 (±1°/0.1 m)"):
+        assert f"After {stage}" in views
+    for part in ("displacement that won", "true displacement", "how surely", "raw scores", "before the hourglass"):
+        assert sum(part in name for name in views) == 4, part
+
+
+@pytest.mark.parametrize(
+    ("has_reference", "contents", "absent"),
+    [
+        (False, Contents.of(Detail.FULL), ("eference", "error", "true", "iscalibrated")),
+        (True, Contents.of(Detail.OVERVIEW), ("raw scores", "sliders", "a tile for every")),
+        (True, Contents.of(Detail.CUSTOM, frozenset({Part.SCENE})), ("After", "error", "hourglass", "displacement")),
+        (True, Contents.of(Detail.CUSTOM, frozenset({Part.CURVES})), ("oloured through", "After", "sliders")),
+    ],
+)
+def test_no_view_without_data(has_reference: bool, contents: Contents, absent: tuple[str, ...]) -> None:
+    views = names(make_blueprint(layout(has_reference, contents)))
+    assert views
+    assert not [name for name in views if any(text in name for text in absent)]
+
+
+def test_a_run_without_details_has_no_empty_tabs() -> None:
+    bare = Layout((StageLayout(3, "5/0.5", ()),), True, Contents.of(Detail.FULL))
+    assert [str(part.name) for part in tabs(make_blueprint(bare)).contents] == ["Overview", "Cascade", "3D"]
+
+
+@pytest.mark.parametrize("coloring", Coloring)
+def test_the_legend_is_that_of_the_colours(coloring: Coloring) -> None:
+    views = names(make_blueprint(layout(contents=Contents.of(Detail.FULL, color=coloring))))
+    assert COLORED_BY[coloring] in views
+    assert not [COLORED_BY[other] for other in Coloring if other is not coloring and COLORED_BY[other] in views]

@@ -1,0 +1,77 @@
+"""The estimate from a whole drive, in words and in the recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from calibnet.geometry import miscalibration, transform
+from calibnet.geometry.types import Transform
+from calibnet.trace import DriveEstimate, Estimate
+from inspector import entities
+from inspector.read.run import read_run
+from inspector.record.tabs.drive import deviation, drive_sentence, log_drive
+
+REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.0, -0.1, -0.2])
+SIGMA = np.array([0.02, 0.03, 0.06, *np.radians([0.1, 0.2, 0.2])])
+
+
+def found(degrees: float, metres: float) -> Transform:
+    """Off the reference by so much yaw, and to the right."""
+    return miscalibration([0, 0, degrees], [metres, 0, 0]) @ REFERENCE
+
+
+def offset_cm(pose: Transform) -> float:
+    return float(100 * np.linalg.norm(pose[:3, 3] - REFERENCE[:3, 3]))
+
+
+def estimate(aligned: bool) -> DriveEstimate:
+    early, late = (Estimate(found(angle, 0.0), 4 * np.diag(SIGMA**2), count) for angle, count in ((2.0, 1), (0.5, 3)))
+    networks = Estimate(found(1.5, 0.12), np.diag(SIGMA**2) / 100, 3)
+    last = DriveEstimate(late.camera_from_lidar, np.diag(SIGMA**2), 3)
+    history = ((0, early), (2, Estimate(last.camera_from_lidar, last.covariance, 3)))
+    return DriveEstimate(
+        last.camera_from_lidar, last.covariance, 3, history, skipped=1, networks=networks if aligned else None
+    )
+
+
+def test_the_sentence_says_what_alignment_changed() -> None:
+    sentence = drive_sentence(estimate(aligned=True), REFERENCE, found(5, 0.3))
+    assert sentence.startswith("Whole drive as one (3 frames, 1 more could not be used): off by 0.50° / ")
+    assert "sure to 0.30° / 7.0 cm (one standard deviation)" in sentence
+    before = offset_cm(found(1.5, 0.12))
+    assert sentence.endswith(f"Before its edges were aligned: 1.50° / {before:.1f} cm.")
+
+
+def test_networks_alone_are_said_not_to_know_what_they_share() -> None:
+    sentence = drive_sentence(estimate(aligned=False), None, found(5, 0.3))
+    assert "changed the calibration by 4.50° / " in sentence and "aligned" not in sentence
+    assert sentence.endswith("sure to 0.30° / 7.0 cm, not counting what all of them get wrong.")
+
+
+def test_deviations_have_the_units_of_their_curves() -> None:
+    one = estimate(aligned=True)
+    found_units = [deviation(one, name) for name in ("x", "y", "z", "pitch", "yaw", "roll")]
+    assert found_units == pytest.approx([2, 3, 6, 0.1, 0.2, 0.2])
+
+
+def test_curves_and_the_result_are_recorded(tmp_path: Path, full_recording: Path) -> None:
+    rec = rr.RecordingStream("calib-inspect")
+    rec.save(tmp_path / "drive.rrd")
+    rr.send_chunks(RrdReader(full_recording).store().stream(), recording=rec)
+    log_drive(rec, estimate(aligned=True), REFERENCE, {0: 0.0, 2: 0.2})
+    rec.disconnect()
+    np.testing.assert_array_equal(read_run(tmp_path / "drive.rrd").drive, found(0.5, 0.0))
+    curves: dict[str, list[float]] = {}
+    for chunk in RrdReader(tmp_path / "drive.rrd").store().stream():
+        batch = chunk.to_record_batch()
+        for name in ("estimate", "upper", "lower"):
+            if chunk.entity_path == f"/{entities.drive_curve('yaw', name)}" and "Scalars:scalars" in batch.schema.names:
+                curves.setdefault(name, []).extend(v[0] for v in batch.column("Scalars:scalars").to_pylist() if v)
+    assert sorted(curves["estimate"]) == pytest.approx([0.5, 2.0])
+    assert sorted(curves["upper"]) == pytest.approx([0.5 + 0.4, 2.0 + 0.8])
+    assert sorted(curves["lower"]) == pytest.approx([0.5 - 0.4, 2.0 - 0.8])
