@@ -19,8 +19,8 @@ def write_kitti_odometry(
 ) -> Path:
     """Write ``sequences/NN/{calib.txt,times.txt,image_2,velodyne}`` and ``poses/NN.txt`` below ``root``.
 
-    All four projection matrices are those of the one camera, and ``Tr`` is the exact extrinsic, so
-    that ``inv(K) P2[:, 3] + Tr`` reproduces it to the last digit.
+    All four projection matrices are that of the one camera, without an offset, and ``Tr`` is the exact
+    extrinsic: a reader gets it back to the last digit.
 
     Args:
         sequence: the drive; rendered here, one frame at a time.

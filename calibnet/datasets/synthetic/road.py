@@ -9,11 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from calibnet.datasets.synthetic.mesh import Material, Mesh, quads
+from calibnet.datasets.synthetic.mesh import Material, Mesh, patches, quads
 
 Vector = NDArray[np.float64]
-
-
 _FIRST = -300.0
 """First tabulated station, metres."""
 
@@ -34,15 +32,11 @@ class CentreLine:
 
     def heading(self, station: ArrayLike) -> Vector:
         """Direction of travel at a station, radians from x."""
-        amplitude, wave, phase = self.bends.T
-        s = np.asarray(station, dtype=np.float64)[..., None]
-        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+        return _waves(self.bends, station)
 
     def height(self, station: ArrayLike) -> Vector:
         """Height of the centre line, metres."""
-        amplitude, wave, phase = self.hills.T
-        s = np.asarray(station, dtype=np.float64)[..., None]
-        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+        return _waves(self.hills, station)
 
     @cached_property
     def _table(self) -> Vector:
@@ -77,11 +71,21 @@ class CentreLine:
         return float(np.argmin((gap**2).sum(axis=1))) + _FIRST
 
 
+def _waves(table: Vector, station: ArrayLike) -> Vector:
+    """Sum of the sines in the rows of a table: amplitude, wavelength, phase."""
+    amplitude, wave, phase = table.T
+    s = np.asarray(station, dtype=np.float64)[..., None]
+    return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+
+
 @dataclass(frozen=True)
 class Strip:
-    """One strip of the ground's cross-section, from ``inner`` to ``outer`` (metres from the centre).
+    """One strip of the ground's cross-section.
 
-    ``inner_lift`` and ``outer_lift`` are heights above the centre line.
+    Attributes:
+        inner, outer: its edges, metres left of the centre line.
+        inner_lift, outer_lift: their heights above the centre line, metres.
+        material: of its surface.
     """
 
     inner: float
@@ -128,13 +132,8 @@ def sweep(line: CentreLine, strips: list[Strip], relief: Relief, start: float, s
             grid[..., 2] += relief.height(grid, lateral)
         side = np.hypot(lateral - lateral[0], lift - lift[0])
         uv = np.stack(np.broadcast_arrays(stations[:, None], side[None] + strip.inner), axis=-1)
-        meshes.append(quads(_patches(grid), _patches(uv), strip.material))
+        meshes.append(quads(patches(grid), patches(uv), strip.material))
     return meshes
-
-
-def _patches(grid: Vector) -> Vector:
-    cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
-    return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
 
 
 def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float, camber: float) -> Mesh:
