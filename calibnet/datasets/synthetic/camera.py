@@ -13,7 +13,7 @@ from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.shading import cast, radiance
 from calibnet.datasets.synthetic.weather import Weather
 from calibnet.geometry import PinholeCamera
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def photograph(
     mesh: Mesh,
     weather: Weather,
     camera: PinholeCamera,
-    world_from_camera: Matrix,
+    world_from_camera: Transform,
     exposure: Exposure,
     generator: Generator,
 ) -> NDArray[np.uint8]:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic import road
 from calibnet.datasets.synthetic.mesh import Material, Mesh
 from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.style import Style
+from calibnet.geometry.types import Floats
 
 CAMBER = 0.04
 """Metres by which the edge of the carriageway lies below its centre."""
@@ -63,8 +63,8 @@ def markings(scene: Scene, generator: Generator, start: float, stop: float) -> l
     return parts
 
 
-def _lane_lines(scene: Scene, start: float, stop: float) -> list[NDArray[np.float64]]:
-    """Areas of the lines along the road."""
+def _lane_lines(scene: Scene, start: float, stop: float) -> list[Floats]:
+    """Areas, each ``[N, 4]``, of the lines along the road."""
     style = scene.style
     areas = []
     for side in (-1.0, 1.0):
@@ -81,8 +81,8 @@ def _lane_lines(scene: Scene, start: float, stop: float) -> list[NDArray[np.floa
     return areas
 
 
-def _junction(scene: Scene, generator: Generator, start: float, stop: float) -> list[NDArray[np.float64]]:
-    """Areas of a zebra crossing, and of a stop line with an arrow, each now and then."""
+def _junction(scene: Scene, generator: Generator, start: float, stop: float) -> list[Floats]:
+    """Areas, each ``[N, 4]``, of a zebra crossing, and of a stop line with an arrow, each now and then."""
     style = scene.style
     areas = []
     if generator.random() < 0.10:

@@ -7,11 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic import barriers, lorries, street, vegetation, vehicles
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.textures import Atlas, atlas
+from calibnet.geometry.types import Floats
 
 _FAR = 0.2
 """Share of the leaves that plants keep where they are seen from afar."""
@@ -90,7 +90,7 @@ def pick(name: str, generator: Generator, near: bool = True) -> Mesh:
     return variants[int(generator.integers(len(variants)))][0 if near else 1]
 
 
-def pick_vehicle(kind: str, generator: Generator) -> tuple[Mesh, NDArray[np.float64]]:
+def pick_vehicle(kind: str, generator: Generator) -> tuple[Mesh, Floats]:
     """A random prototype of a kind of vehicle, and the linear RGB ``[3]`` of its paint."""
     mesh = pick(kind, generator)
     colour = np.array(_CAR_COLOURS[int(generator.integers(len(_CAR_COLOURS)))])

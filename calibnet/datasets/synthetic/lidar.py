@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.rig import Lidar
 from calibnet.datasets.synthetic.shading import cast, texels
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 
 def ray_directions(lidar: Lidar, facing: float, sector: float) -> NDArray[np.float32]:
@@ -26,7 +26,13 @@ def ray_directions(lidar: Lidar, facing: float, sector: float) -> NDArray[np.flo
 
 
 def scan(
-    caster: Any, mesh: Mesh, lidar: Lidar, world_from_lidar: Matrix, facing: float, sector: float, generator: Generator
+    caster: Any,
+    mesh: Mesh,
+    lidar: Lidar,
+    world_from_lidar: Transform,
+    facing: float,
+    sector: float,
+    generator: Generator,
 ) -> NDArray[np.float32]:
     """Points ``[N, 4]``: x, y, z in the LiDAR frame, metres, and intensity 0..1.
 

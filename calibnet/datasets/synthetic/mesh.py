@@ -9,6 +9,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
+from calibnet.geometry.types import Floats
+
 Array = NDArray[np.float32]
 
 
@@ -107,7 +109,7 @@ def quads(corners: ArrayLike, uv: ArrayLike, material: Material) -> Mesh:
     return triangles(points, np.asarray(uv, dtype=np.float32)[:, split].reshape(-1, 3, 2), material)
 
 
-def patches(grid: NDArray[np.float64]) -> NDArray[np.float64]:
+def patches(grid: Floats) -> Floats:
     """The cells ``[(H - 1) * (W - 1), 4, C]`` between the points of a grid ``[H, W, C]``, as quadrilaterals."""
     cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
     return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])

@@ -13,7 +13,7 @@ from calibnet.datasets.synthetic.scene import sample_scene
 from calibnet.datasets.synthetic.shading import caster
 from calibnet.datasets.synthetic.world import World
 from calibnet.geometry import invert
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 TRAINING_SECTOR = float(np.radians(65.0))
 """Half the azimuth around the camera's axis that training frames scan."""
@@ -22,7 +22,7 @@ TRAINING_SECTOR = float(np.radians(65.0))
 def render_frame(
     world: World,
     rig: Rig,
-    world_from_vehicle: Matrix,
+    world_from_vehicle: Transform,
     generator: Generator,
     index: int = 0,
     timestamp: float = 0.0,

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
+from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector3
 
-Matrix = NDArray[np.float64]
 CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Rotation from a LiDAR's axes (x forward, y left, z up) to a camera's (x right, y down, z forward)."""
 
@@ -32,8 +31,8 @@ class Lidar:
     """
 
     name: str
-    elevation: Matrix = field(repr=False)
-    azimuth_shift: Matrix = field(repr=False)
+    elevation: Floats = field(repr=False)
+    azimuth_shift: Floats = field(repr=False)
     azimuth_step: float
     minimum_range: float = 1.5
     maximum_range: float = 100.0
@@ -58,21 +57,21 @@ class Rig:
 
     name: str
     camera: PinholeCamera
-    camera_from_lidar: Matrix = field(repr=False)
-    vehicle_from_lidar: Matrix = field(repr=False)
+    camera_from_lidar: Extrinsic = field(repr=False)
+    vehicle_from_lidar: Transform = field(repr=False)
     lidar: Lidar
 
 
-def _hdl64() -> Matrix:
+def _hdl64() -> Floats:
     return np.concatenate([np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.33, 32)])
 
 
-def _pandar40() -> Matrix:
+def _pandar40() -> Floats:
     dense = np.arange(2.0, -6.1, -0.333)
     return np.concatenate([[15.0, 11.0, 8.0, 5.0, 3.0], dense, np.arange(-7.0, -17.0, -1.0)])[:40]
 
 
-def _dense128() -> Matrix:
+def _dense128() -> Floats:
     share = np.linspace(-1.0, 1.0, 128)
     return np.asarray(-5.0 + 20.0 * (0.45 * share + 0.55 * share**3))
 
@@ -123,7 +122,7 @@ def sample_lidar(generator: Generator) -> Lidar:
     )
 
 
-def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Matrix) -> Matrix:
+def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Vector3) -> Extrinsic:
     """``camera_from_lidar`` of a camera at ``position`` (LiDAR frame) that looks ``forward_yaw`` left.
 
     Angles in radians; positive pitch looks down, positive roll tilts the camera clockwise.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from calibnet.datasets.synthetic import library
 from calibnet.datasets.synthetic.mesh import Material, Mesh
@@ -15,7 +15,7 @@ from calibnet.datasets.synthetic.style import Style, sample_style
 from calibnet.datasets.synthetic.textures import atlas
 from calibnet.datasets.synthetic.weather import Weather, sample_weather
 from calibnet.geometry import rotation_from_euler_xyz, transform
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Floats, Transform
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Scene:
     center_line: str
     edge_lines: bool
     banks: tuple[float, float]
-    leaf_colour: NDArray[np.float64]
+    leaf_colour: Floats
     fence_kind: str
     fences: tuple[Mesh, Mesh]
     rail: Mesh
@@ -78,7 +78,7 @@ class Scene:
         """The fence of one side of the road (right is negative)."""
         return self.fences[0 if side < 0 else 1]
 
-    def pose(self, station: float, lateral: float | None = None, yaw: float = 0.0) -> Matrix:
+    def pose(self, station: float, lateral: float | None = None, yaw: float = 0.0) -> Transform:
         """``world_from_vehicle`` of a vehicle that drives at a station, in the own lane by default."""
         lateral = self.style.lane_center(0, own=True) if lateral is None else lateral
         slope = float(self.line.height(station + 1.0) - self.line.height(station - 1.0)) / 2.0

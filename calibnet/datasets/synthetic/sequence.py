@@ -14,7 +14,7 @@ from calibnet.datasets.synthetic.scene import sample_scene
 from calibnet.datasets.synthetic.surroundings import EGO_SPEED
 from calibnet.datasets.synthetic.world import World
 from calibnet.errors import ConfigError
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 FRAME_INTERVAL = 0.1
 """Seconds between frames, as KITTI's scanner turns."""
@@ -57,7 +57,7 @@ class SyntheticSequence:
         """Render the frames in order."""
         return (self[position] for position in range(self.length))
 
-    def world_from_vehicle(self, position: int) -> Matrix:
+    def world_from_vehicle(self, position: int) -> Transform:
         """Where the car is at a frame, 4x4: x forward, y left, z up on the road below the LiDAR."""
         return self.world.scene.pose(position * EGO_SPEED * FRAME_INTERVAL)
 

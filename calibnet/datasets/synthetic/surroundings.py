@@ -8,13 +8,13 @@ from calibnet.datasets.synthetic.library import pick_vehicle
 from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate, quads
 from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.textures import atlas
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Vector3
 
 EGO_SPEED = 10.0
 """Speed of the own vehicle, metres a second: one metre a frame at 10 Hz."""
 
 
-def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Matrix) -> list[Mesh]:
+def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Vector3) -> list[Mesh]:
     """Moving vehicles: every lane is an endless queue on a jittered grid that moves at one speed.
 
     Args:
@@ -53,7 +53,7 @@ def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahe
     return parts
 
 
-def horizon(scene: Scene, ego: Matrix) -> Mesh:
+def horizon(scene: Scene, ego: Vector3) -> Mesh:
     """Distant land and a skyline around the vehicle, beyond any LiDAR's reach."""
     generator = np.random.default_rng([scene.seed, 3])
     groups = ("leaves", "facade", "soil") if scene.style.kind in ("street", "industrial") else ("leaves", "grass")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, blob, box, concatenate, cylinder, triangles
 from calibnet.datasets.synthetic.textures import Atlas
+from calibnet.geometry.types import Floats, Vector3
 
 
 def _foliage(atlas: Atlas, generator: Generator) -> Material:
@@ -15,8 +15,8 @@ def _foliage(atlas: Atlas, generator: Generator) -> Material:
 
 
 def _lumps(
-    centers: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    centers: Floats,
+    radii: Floats,
     material: Material,
     generator: Generator,
     detail: float,
@@ -29,8 +29,8 @@ def _lumps(
 
 
 def leaf_cloud(
-    centers: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    centers: Floats,
+    radii: Floats,
     count: int,
     size: float,
     material: Material,
@@ -109,9 +109,7 @@ def bare_tree(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     height = generator.uniform(5.0, 9.0)
     parts: list[Mesh] = []
 
-    def grow(
-        start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int
-    ) -> None:
+    def grow(start: Vector3, direction: Vector3, length: float, radius: float, depth: int) -> None:
         end = start + length * direction
         parts.append(cylinder(start, end, (radius, 0.6 * radius), bark, 5 if depth < 2 else 3))
         if depth == (3 if detail == 1.0 else 2):

@@ -8,7 +8,7 @@ from calibnet.datasets.synthetic.mesh import Mesh, concatenate
 from calibnet.datasets.synthetic.population import CHUNK, populate
 from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.surroundings import horizon, moving_traffic
-from calibnet.geometry.se3 import Matrix
+from calibnet.geometry.types import Transform
 
 _KEPT = 24
 """Chunks in memory at most, so that a drive of any length fits."""
@@ -22,7 +22,7 @@ class World:
         self.scene = scene
         self._chunks: OrderedDict[tuple[int, bool], Mesh] = OrderedDict()
 
-    def mesh(self, world_from_vehicle: Matrix, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
+    def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
         """Everything around a vehicle, as triangles in the world.
 
         Args:
