@@ -3,8 +3,9 @@
 from calibnet.datasets.synthetic.kitti_export import write_kitti_odometry
 from calibnet.datasets.synthetic.render import render_frame, sample_frame
 from calibnet.datasets.synthetic.rig import KITTI_LIKE, Lidar, Rig, sample_rig
+from calibnet.datasets.synthetic.scene import Scene, sample_scene
 from calibnet.datasets.synthetic.sequence import SyntheticSequence
-from calibnet.datasets.synthetic.world import Scene, build_scene
+from calibnet.datasets.synthetic.world import World
 
 __all__ = [
     "KITTI_LIKE",
@@ -12,9 +13,10 @@ __all__ = [
     "Rig",
     "Scene",
     "SyntheticSequence",
-    "build_scene",
+    "World",
     "render_frame",
     "sample_frame",
     "sample_rig",
+    "sample_scene",
     "write_kitti_odometry",
 ]

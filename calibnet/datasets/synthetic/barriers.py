@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, rectangle
 from calibnet.datasets.synthetic.street import metalwork
 from calibnet.datasets.synthetic.textures import Atlas
-
-Generator = np.random.Generator
 
 
 def fence(atlas: Atlas, generator: Generator) -> Mesh:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, quads, rectangle, triangles
 from calibnet.datasets.synthetic.textures import Atlas
-
-Generator = np.random.Generator
 
 
 def _tint(generator: Generator, spread: float = 0.2) -> tuple[float, float, float]:

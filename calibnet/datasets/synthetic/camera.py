@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic.mesh import Mesh
@@ -14,22 +15,20 @@ from calibnet.datasets.synthetic.weather import Weather
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Transform
 
-Generator = np.random.Generator
-
 
 @dataclass(frozen=True)
 class Exposure:
     """How the camera turns radiance into bytes.
 
     Attributes:
-        level: mean brightness it aims at, 0..1 linear.
+        level: mean brightness of the lower half that it aims at, linear, 0..1.
         white: RGB factors of the white balance.
-        gamma: of the tone curve.
-        contrast: 1 keeps.
-        saturation: 1 keeps, 0 is grey.
-        vignetting: loss in the corners.
-        noise: deviation in 0..1.
-        blur: deviation of the lens blur in pixels.
+        gamma: exponent ``1 / gamma`` of the tone curve.
+        contrast: factor about mid-grey; 1 leaves it.
+        saturation: factor about grey; 1 leaves it, 0 removes all colour.
+        vignetting: share of the light lost in the corners.
+        noise: standard deviation on a scale of 0..1.
+        blur: standard deviation of the lens blur, pixels.
         quality: JPEG quality, 0 for none.
     """
 
@@ -45,7 +44,7 @@ class Exposure:
 
 
 def sample_exposure(generator: Generator) -> Exposure:
-    """Draw a camera's habits."""
+    """Draw how a camera exposes and develops."""
     red, blue = np.exp(generator.normal(0.0, 0.06, 2))
     return Exposure(
         level=float(np.exp(generator.uniform(np.log(0.08), np.log(0.30)))),
@@ -80,7 +79,17 @@ def photograph(
     exposure: Exposure,
     generator: Generator,
 ) -> NDArray[np.uint8]:
-    """The image ``[H, W, 3]`` uint8 that a camera takes of a mesh."""
+    """The image ``[H, W, 3]`` uint8 that a camera takes of a mesh.
+
+    Args:
+        caster: the ``RaycastingScene`` of ``mesh``.
+        mesh: the world.
+        weather: its light.
+        camera: the intrinsics.
+        world_from_camera: its pose, 4x4.
+        exposure: how it develops.
+        generator: draws the noise.
+    """
     rays = pixel_rays(camera) @ world_from_camera[:3, :3].T.astype(np.float32)
     origin = world_from_camera[:3, 3].astype(np.float32)
     hits = cast(caster, origin, rays)
@@ -93,7 +102,7 @@ def photograph(
 
 
 def develop(linear: NDArray[np.float32], exposure: Exposure, generator: Generator) -> NDArray[np.uint8]:
-    """Radiance ``[H, W, 3]`` to an 8-bit image."""
+    """An 8-bit image ``[H, W, 3]`` of linear radiance ``[H, W, 3]``."""
     import cv2
 
     height, width = linear.shape[:2]

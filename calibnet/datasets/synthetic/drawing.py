@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-SIZE = 256
+TILE = 256
+"""Pixels a side of a tile."""
 Image = NDArray[np.float32]
 Colour = tuple[float, float, float]
-Generator = np.random.Generator
 
 
 def noise(generator: Generator, cells: int = 4, octaves: int = 5, gain: float = 0.6) -> Image:
     """Tileable fractal noise ``[256, 256]``, zero mean, unit deviation."""
     import cv2
 
-    total = np.zeros((SIZE, SIZE), dtype=np.float32)
+    total = np.zeros((TILE, TILE), dtype=np.float32)
     for octave in range(octaves):
-        side = min(cells << octave, SIZE)
+        side = min(cells << octave, TILE)
         grid = np.pad(generator.normal(size=(side, side)).astype(np.float32), 2, mode="wrap")
-        scale = SIZE // side
+        scale = TILE // side
         large = cv2.resize(grid, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
-        total += gain**octave * large[2 * scale : 2 * scale + SIZE, 2 * scale : 2 * scale + SIZE]
+        total += gain**octave * large[2 * scale : 2 * scale + TILE, 2 * scale : 2 * scale + TILE]
     total -= total.mean()
     total /= total.std()
     return total
@@ -39,7 +40,7 @@ def colour(generator: Generator, low: float = 0.2, high: float = 0.8, saturation
 
 def flat(rgb: Colour, reflectance: float) -> Image:
     """A tile of one colour."""
-    return np.broadcast_to(np.array([*rgb, reflectance], dtype=np.float32), (SIZE, SIZE, 4)).copy()
+    return np.broadcast_to(np.array([*rgb, reflectance], dtype=np.float32), (TILE, TILE, 4)).copy()
 
 
 def speckled(generator: Generator, rgb: Colour, reflectance: float, amount: float, cells: int = 4) -> Image:
@@ -51,7 +52,7 @@ def speckled(generator: Generator, rgb: Colour, reflectance: float, amount: floa
 
 def rectangle(image: Image, x0: float, y0: float, x1: float, y1: float, rgb: Colour, reflectance: float) -> None:
     """Fill a rectangle given in fractions of the tile."""
-    a, b, c, d = (round(value * SIZE) for value in (x0, y0, x1, y1))
+    a, b, c, d = (round(value * TILE) for value in (x0, y0, x1, y1))
     image[max(b, 0) : d, max(a, 0) : c] = (*rgb, reflectance)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from calibnet.datasets.synthetic.drawing import Colour, Generator, Image, colour, rectangle, scribble, speckled
+from numpy.random import Generator
+
+from calibnet.datasets.synthetic.drawing import Colour, Image, colour, rectangle, scribble, speckled
 from calibnet.datasets.synthetic.surface_tiles import bricks
 
 

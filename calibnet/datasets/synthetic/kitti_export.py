@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic.sequence import SyntheticSequence
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert
+from calibnet.geometry.types import Floats, Transform
 
 
 def write_kitti_odometry(
@@ -19,8 +19,8 @@ def write_kitti_odometry(
 ) -> Path:
     """Write ``sequences/NN/{calib.txt,times.txt,image_2,velodyne}`` and ``poses/NN.txt`` below ``root``.
 
-    All four projection matrices are those of the one camera, and ``Tr`` is the exact extrinsic, so
-    that ``inv(K) P2[:, 3] + Tr`` reproduces it to the last digit.
+    All four projection matrices are that of the one camera, without an offset, and ``Tr`` is the exact
+    extrinsic: a reader gets it back to the last digit.
 
     Args:
         sequence: the drive; rendered here, one frame at a time.
@@ -66,12 +66,12 @@ def _write_frame(frame: Frame, folder: Path) -> None:
     (folder / "velodyne" / f"{stem}.bin").write_bytes(frame.points.astype("<f4").tobytes())
 
 
-def _camera_poses(sequence: SyntheticSequence) -> list[NDArray[np.float64]]:
+def _camera_poses(sequence: SyntheticSequence) -> list[Transform]:
     """Every ``camera0_from_camera``, as KITTI's ground truth: relative to the first frame."""
     vehicle_from_camera = sequence.mount.vehicle_from_lidar @ invert(sequence.mount.camera_from_lidar)
     world = [sequence.world_from_vehicle(position) @ vehicle_from_camera for position in range(len(sequence))]
     return [invert(world[0]) @ pose for pose in world]
 
 
-def _numbers(matrix: NDArray[np.float64]) -> str:
+def _numbers(matrix: Floats) -> str:
     return " ".join(f"{value:.17g}" for value in np.ravel(matrix))

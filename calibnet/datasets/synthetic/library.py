@@ -6,12 +6,13 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic import barriers, lorries, street, vegetation, vehicles
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.textures import Atlas, atlas
+from calibnet.geometry.types import Floats
 
-Generator = np.random.Generator
 _FAR = 0.2
 """Share of the leaves that plants keep where they are seen from afar."""
 _PLANTS: dict[str, tuple[int, Callable[[Atlas, Generator, float], Mesh]]] = {
@@ -45,6 +46,25 @@ _THINGS: dict[str, tuple[int, Callable[[Atlas, Generator], Mesh]]] = {
     "rock": (6, street.rock),
 }
 
+_CAR_COLOURS = (
+    (0.75, 0.75, 0.76),
+    (0.62, 0.62, 0.62),
+    (0.38, 0.40, 0.42),
+    (0.20, 0.21, 0.23),
+    (0.10, 0.105, 0.11),
+    (0.02, 0.02, 0.025),
+    (0.02, 0.02, 0.022),
+    (0.90, 0.90, 0.90),
+    (0.02, 0.04, 0.14),
+    (0.06, 0.14, 0.35),
+    (0.35, 0.02, 0.02),
+    (0.14, 0.01, 0.02),
+    (0.04, 0.10, 0.06),
+    (0.30, 0.25, 0.18),
+    (0.65, 0.48, 0.03),
+)
+"""Linear RGB of car paints; greys, black and white are as frequent as on the road."""
+
 
 @lru_cache(maxsize=1)
 def library() -> dict[str, tuple[tuple[Mesh, Mesh], ...]]:
@@ -68,3 +88,10 @@ def pick(name: str, generator: Generator, near: bool = True) -> Mesh:
     """A random prototype of a kind."""
     variants = library()[name]
     return variants[int(generator.integers(len(variants)))][0 if near else 1]
+
+
+def pick_vehicle(kind: str, generator: Generator) -> tuple[Mesh, Floats]:
+    """A random prototype of a kind of vehicle, and the linear RGB ``[3]`` of its paint."""
+    mesh = pick(kind, generator)
+    colour = np.array(_CAR_COLOURS[int(generator.integers(len(_CAR_COLOURS)))])
+    return mesh, colour * generator.uniform(0.7, 1.2)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic.mesh import Mesh
 from calibnet.datasets.synthetic.rig import Lidar
 from calibnet.datasets.synthetic.shading import cast, texels
 from calibnet.geometry.types import Transform
-
-Generator = np.random.Generator
 
 
 def ray_directions(lidar: Lidar, facing: float, sector: float) -> NDArray[np.float32]:
@@ -35,16 +34,16 @@ def scan(
     sector: float,
     generator: Generator,
 ) -> NDArray[np.float32]:
-    """Points ``[N, 4]`` in the LiDAR frame with intensity 0..1.
+    """Points ``[N, 4]``: x, y, z in the LiDAR frame, metres, and intensity 0..1.
 
     Args:
         caster: the ``RaycastingScene`` of ``mesh``.
         mesh: the world.
         lidar: the scanner.
         world_from_lidar: its pose, 4x4.
-        generator: noise and drop-outs.
         facing: azimuth of the sector's middle, radians.
         sector: half its width, radians; pi for a whole revolution.
+        generator: draws the noise and the lost returns.
     """
     directions = ray_directions(lidar, facing, sector)
     rotation = world_from_lidar[:3, :3].astype(np.float32)

@@ -6,7 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
+
+from calibnet.geometry.types import Floats
 
 Array = NDArray[np.float32]
 
@@ -106,6 +109,12 @@ def quads(corners: ArrayLike, uv: ArrayLike, material: Material) -> Mesh:
     return triangles(points, np.asarray(uv, dtype=np.float32)[:, split].reshape(-1, 3, 2), material)
 
 
+def patches(grid: Floats) -> Floats:
+    """The cells ``[(H - 1) * (W - 1), 4, C]`` between the points of a grid ``[H, W, C]``, as quadrilaterals."""
+    cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
+    return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
+
+
 def rectangle(origin: ArrayLike, along: ArrayLike, up: ArrayLike, material: Material, unit_uv: bool = False) -> Mesh:
     """One rectangle from a corner and two edge vectors; ``unit_uv`` stretches one tile over it."""
     corner, a, b = (np.asarray(vector, dtype=np.float64) for vector in (origin, along, up))
@@ -142,10 +151,6 @@ def loft(rings: ArrayLike, material: Material, closed: bool = True, caps: bool =
     v = np.broadcast_to(np.concatenate([[0.0], step])[:, None], u.shape)
     uv = np.stack([u, -v], axis=-1)
 
-    def patches(grid: NDArray[np.float64]) -> NDArray[np.float64]:
-        cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
-        return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
-
     parts = [quads(patches(ring), patches(uv), material)]
     if closed and caps:
         for end in (ring[0, :-1], ring[-1, :-1]):
@@ -173,7 +178,7 @@ def blob(
     center: ArrayLike,
     radii: ArrayLike,
     material: Material,
-    generator: np.random.Generator,
+    generator: Generator,
     rough: float = 0.15,
     rows: int = 6,
     columns: int = 9,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
 from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector3
 
-Generator = np.random.Generator
 CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""Rotation from x forward, y left, z up to x right, y down, z forward."""
+"""Rotation from a LiDAR's axes (x forward, y left, z up) to a camera's (x right, y down, z forward)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,14 +20,14 @@ class Lidar:
 
     Attributes:
         name: the pattern it resembles.
-        elevation: ``[B]`` radians above the horizontal, one a beam.
-        azimuth_shift: ``[B]`` radians by which a beam leads the others.
-        azimuth_step: radians between firings.
-        minimum_range, maximum_range: metres; the latter for a bright surface seen head-on.
-        range_noise: metres, standard deviation.
+        elevation: ``[B]`` angle of each beam above the horizontal, radians.
+        azimuth_shift: ``[B]`` angle by which each beam is turned about the vertical, radians.
+        azimuth_step: angle between firings, radians.
+        minimum_range, maximum_range: metres; the latter holds for a bright surface seen head-on.
+        range_noise: standard deviation, metres.
         dropout: share of returns lost at random.
-        gain, gamma: response of the intensity channel.
-        falloff: how much distance dims the intensity (0 compensated, 1 not at all).
+        gain, gamma: factor and exponent of the intensity.
+        falloff: share of the intensity that is lost at ``maximum_range``; less in proportion nearer.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Rig:
     """A camera and a LiDAR on one vehicle.
 
     Attributes:
-        name: for titles.
+        name: what titles show.
         camera: intrinsics of the rectified image.
         camera_from_lidar: the exact extrinsic, 4x4.
         vehicle_from_lidar: the LiDAR above the vehicle's origin on the ground (x forward, z up), 4x4.
@@ -122,7 +122,7 @@ def sample_lidar(generator: Generator) -> Lidar:
     )
 
 
-def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Vector3) -> Transform:
+def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Vector3) -> Extrinsic:
     """``camera_from_lidar`` of a camera at ``position`` (LiDAR frame) that looks ``forward_yaw`` left.
 
     Angles in radians; positive pitch looks down, positive roll tilts the camera clockwise.

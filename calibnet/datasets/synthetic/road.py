@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from calibnet.datasets.synthetic.mesh import Material, Mesh, quads
-
-Vector = NDArray[np.float64]
-
+from calibnet.datasets.synthetic.mesh import Material, Mesh, patches, quads
+from calibnet.geometry.types import Floats, Vector3
 
 _FIRST = -300.0
 """First tabulated station, metres."""
@@ -28,24 +26,20 @@ class CentreLine:
         length: metres that are tabulated.
     """
 
-    bends: Vector
-    hills: Vector
+    bends: Floats
+    hills: Floats
     length: float
 
-    def heading(self, station: ArrayLike) -> Vector:
-        """Direction of travel at a station, radians from x."""
-        amplitude, wave, phase = self.bends.T
-        s = np.asarray(station, dtype=np.float64)[..., None]
-        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+    def heading(self, station: ArrayLike) -> Floats:
+        """Direction of travel at stations ``[...]``, radians from x."""
+        return _waves(self.bends, station)
 
-    def height(self, station: ArrayLike) -> Vector:
-        """Height of the centre line, metres."""
-        amplitude, wave, phase = self.hills.T
-        s = np.asarray(station, dtype=np.float64)[..., None]
-        return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+    def height(self, station: ArrayLike) -> Floats:
+        """Height of the centre line at stations ``[...]``, metres."""
+        return _waves(self.hills, station)
 
     @cached_property
-    def _table(self) -> Vector:
+    def _table(self) -> Floats:
         """Rows x, y, height, cos and sin of the heading, one a metre from ``_FIRST``."""
         stations = np.arange(_FIRST, self.length + 600.0, 1.0)
         between = self.heading(stations + 0.5)
@@ -54,7 +48,7 @@ class CentreLine:
         heading = self.heading(stations)
         return np.column_stack([position, self.height(stations), np.cos(heading), np.sin(heading)])
 
-    def place(self, station: ArrayLike, lateral: ArrayLike, lift: ArrayLike = 0.0) -> Vector:
+    def place(self, station: ArrayLike, lateral: ArrayLike, lift: ArrayLike = 0.0) -> Floats:
         """World positions ``[..., 3]`` of points ``lateral`` metres left of the centre line."""
         row = np.asarray(station, dtype=np.float64) - _FIRST
         floor = np.floor(row).astype(np.int64)
@@ -63,7 +57,7 @@ class CentreLine:
         parts = np.broadcast_arrays(x - sin * lateral, y + cos * lateral, z + lift)
         return np.stack(parts, axis=-1)
 
-    def stand(self, station: float, lateral: float, lift: float) -> tuple[Vector, float]:
+    def stand(self, station: float, lateral: float, lift: float) -> tuple[Vector3, float]:
         """One world position ``[3]`` and the heading there: ``place`` for single objects, much quicker."""
         row = station - _FIRST
         index = int(row)
@@ -77,11 +71,21 @@ class CentreLine:
         return float(np.argmin((gap**2).sum(axis=1))) + _FIRST
 
 
+def _waves(table: Floats, station: ArrayLike) -> Floats:
+    """Sum at stations ``[...]`` of the sines in a table ``[W, 3]``: amplitude, wavelength, phase."""
+    amplitude, wave, phase = table.T
+    s = np.asarray(station, dtype=np.float64)[..., None]
+    return np.asarray((amplitude * np.sin(2.0 * np.pi * s / wave + phase)).sum(axis=-1))
+
+
 @dataclass(frozen=True)
 class Strip:
-    """One strip of the ground's cross-section, from ``inner`` to ``outer`` (metres from the centre).
+    """One strip of the ground's cross-section.
 
-    ``inner_lift`` and ``outer_lift`` are heights above the centre line.
+    Attributes:
+        inner, outer: its edges, metres left of the centre line.
+        inner_lift, outer_lift: their heights above the centre line, metres.
+        material: of its surface.
     """
 
     inner: float
@@ -103,7 +107,7 @@ class Relief:
     amplitude: float
     start: float
 
-    def height(self, position: Vector, lateral: Vector | float) -> Vector:
+    def height(self, position: Floats, lateral: Floats | float) -> Floats:
         """Metres to add at world positions ``[..., 3]``, ``lateral`` metres from the centre line."""
         x, y = position[..., 0], position[..., 1]
         wide = np.sin(0.31 * x + 0.7 * np.sin(0.23 * y)) * np.cos(0.27 * y + 0.5 * np.sin(0.19 * x))
@@ -128,13 +132,8 @@ def sweep(line: CentreLine, strips: list[Strip], relief: Relief, start: float, s
             grid[..., 2] += relief.height(grid, lateral)
         side = np.hypot(lateral - lateral[0], lift - lift[0])
         uv = np.stack(np.broadcast_arrays(stations[:, None], side[None] + strip.inner), axis=-1)
-        meshes.append(quads(_patches(grid), _patches(uv), strip.material))
+        meshes.append(quads(patches(grid), patches(uv), strip.material))
     return meshes
-
-
-def _patches(grid: Vector) -> Vector:
-    cells = [grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]]
-    return np.stack(cells, axis=2).reshape(-1, 4, grid.shape[-1])
 
 
 def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float, camber: float) -> Mesh:
@@ -149,16 +148,16 @@ def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float, 
     return quads(corners, np.stack([station, lateral], axis=-1), material)
 
 
-def dashes(start: float, stop: float, lateral: float, width: float, length: float, gap: float) -> Vector:
-    """Areas of a dashed line, on a grid fixed to the station so that neighbouring chunks agree."""
+def dashes(start: float, stop: float, lateral: float, width: float, length: float, gap: float) -> Floats:
+    """Areas ``[N, 4]`` of a dashed line, on a grid fixed to the station so that neighbouring chunks agree."""
     period = length + gap
     first = np.arange(np.ceil(start / period) * period, stop, period)
     half = np.full(len(first), 0.5 * width)
     return np.stack([first, first + length, lateral - half, lateral + half], axis=1)
 
 
-def solid(start: float, stop: float, lateral: float, width: float, step: float = 2.5) -> Vector:
-    """Areas of a solid line, in pieces short enough to follow bends."""
+def solid(start: float, stop: float, lateral: float, width: float, step: float = 2.5) -> Floats:
+    """Areas ``[N, 4]`` of a solid line, in pieces short enough to follow bends."""
     edges = np.linspace(start, stop, max(round((stop - start) / step), 1) + 1)
     half = np.full(len(edges) - 1, 0.5 * width)
     return np.stack([edges[:-1], edges[1:], lateral - half, lateral + half], axis=1)

@@ -10,8 +10,9 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic.camera import sample_exposure
 from calibnet.datasets.synthetic.render import render_frame
 from calibnet.datasets.synthetic.rig import Rig, sample_rig
+from calibnet.datasets.synthetic.scene import sample_scene
 from calibnet.datasets.synthetic.surroundings import EGO_SPEED
-from calibnet.datasets.synthetic.world import build_scene
+from calibnet.datasets.synthetic.world import World
 from calibnet.errors import ConfigError
 from calibnet.geometry.types import Transform
 
@@ -42,7 +43,7 @@ class SyntheticSequence:
         generator = np.random.default_rng([seed, 1])
         travel = length * EGO_SPEED * FRAME_INTERVAL
         self.seed, self.length = seed, length
-        self.scene = build_scene(generator, travel)
+        self.world = World(sample_scene(generator, travel))
         self.exposure = sample_exposure(generator)
         self.mount = rig or sample_rig(generator, _NATIVE_PIXELS, _NATIVE_WIDTH)
         self.name = f"synthetic/{seed}"
@@ -58,7 +59,7 @@ class SyntheticSequence:
 
     def world_from_vehicle(self, position: int) -> Transform:
         """Where the car is at a frame, 4x4: x forward, y left, z up on the road below the LiDAR."""
-        return self.scene.pose(position * EGO_SPEED * FRAME_INTERVAL)
+        return self.world.scene.pose(position * EGO_SPEED * FRAME_INTERVAL)
 
     def __getitem__(self, position: int) -> Frame:
         """Render one frame.
@@ -70,7 +71,7 @@ class SyntheticSequence:
         if not 0 <= index < self.length:
             raise IndexError(f"{self.name} has {self.length} frames, not one at {position}.")
         return render_frame(
-            self.scene,
+            self.world,
             self.mount,
             self.world_from_vehicle(index),
             np.random.default_rng([self.seed, 2, index]),

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from calibnet.datasets.synthetic.drawing import TILE
 from calibnet.datasets.synthetic.mesh import Mesh
-from calibnet.datasets.synthetic.textures import TILE, atlas, turbulence
+from calibnet.datasets.synthetic.textures import atlas, turbulence
 from calibnet.datasets.synthetic.weather import Weather
 
 Array = NDArray[np.float32]
@@ -22,11 +23,11 @@ class Hits:
     """Rays that met the scene.
 
     Attributes:
-        rays: ``[N]`` int64, which rays.
-        distance: ``[N]`` metres in units of the ray's direction.
-        triangle: ``[N]`` int64.
-        barycentric: ``[N, 2]``.
-        normal: ``[N, 3]`` unit normals of the triangles, of either side.
+        rays: ``[N]`` int64, indices of the rays.
+        distance: ``[N]`` in lengths of the ray's direction: metres if that is a unit vector.
+        triangle: ``[N]`` int64, indices of the triangles hit.
+        barycentric: ``[N, 2]`` weights of a triangle's second and third corner.
+        normal: ``[N, 3]`` unit normals, towards the ray's origin or away from it.
     """
 
     rays: NDArray[np.int64]
@@ -63,7 +64,7 @@ def _rays(origin: ArrayLike, directions: Array) -> Any:
 
 
 def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
-    """First hits of rays ``[N, 3]`` from one origin (or one each)."""
+    """First hits of rays in directions ``[N, 3]`` from one origin ``[3]``, or from one each ``[N, 3]``."""
     answer = scene.cast_rays(_rays(origin, directions), nthreads=_THREADS)
     distance = answer["t_hit"].numpy()
     rays = np.flatnonzero(np.isfinite(distance))
@@ -73,7 +74,7 @@ def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
 
 
 def occluded(scene: Any, origins: Array, direction: Array) -> NDArray[np.bool_]:
-    """Whether points ``[N, 3]`` see something in one direction."""
+    """Whether something stands before points ``[N, 3]`` in a direction ``[3]``."""
     rays = _rays(origins, np.broadcast_to(direction, origins.shape))
     return np.asarray(scene.test_occlusions(rays, nthreads=_THREADS).numpy())
 
@@ -91,7 +92,14 @@ def radiance(
 ) -> Array:
     """Linear colours ``[N, 3]`` of camera hits: texture, sun with shadows, sky, reflections, haze.
 
-    ``rays`` are the unit directions ``[N, 3]`` of the hits, ``pixel_angle`` radians a pixel.
+    Args:
+        scene: the ``RaycastingScene`` of ``mesh``.
+        mesh: the world.
+        weather: its light.
+        hits: what the camera's rays met.
+        origin: ``[3]`` the camera's position.
+        rays: ``[N, 3]`` unit directions of the hits.
+        pixel_angle: angle that a pixel spans, radians.
     """
     point = origin + rays * hits.distance[:, None]
     facing = np.einsum("ij,ij->i", hits.normal, rays)

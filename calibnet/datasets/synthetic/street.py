@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, blob, box, concatenate, cylinder, quads, rectangle
 from calibnet.datasets.synthetic.textures import Atlas
 from calibnet.datasets.synthetic.vehicles import bicycle
-
-Generator = np.random.Generator
 
 
 def metalwork(atlas: Atlas, generator: Generator) -> Material:

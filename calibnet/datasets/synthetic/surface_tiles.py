@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic.drawing import (
-    SIZE,
-    Generator,
+    TILE,
     Image,
     colour,
     flat,
@@ -21,7 +21,7 @@ def bricks(generator: Generator) -> Image:
     """A brick wall, 16 or 24 courses."""
     rows, columns = (16, 8) if generator.random() < 0.5 else (24, 10)
     base = np.array(colour(generator, 0.25, 0.6, 0.15)) * generator.choice([[1.25, 0.85, 0.7], [1.1, 1.0, 0.85]])
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
+    y, x = np.mgrid[0:TILE, 0:TILE] / TILE
     row = np.floor(y * rows).astype(int)
     shifted = (x * columns + 0.5 * (row % 2)) % columns
     tone = generator.uniform(0.75, 1.2, (rows, columns))[row, shifted.astype(int)]
@@ -34,7 +34,7 @@ def bricks(generator: Generator) -> Image:
 def paving(generator: Generator) -> Image:
     """Slabs or setts with joints."""
     count = int(generator.choice([4, 6, 8, 16]))
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE * count
+    y, x = np.mgrid[0:TILE, 0:TILE] / TILE * count
     row = y.astype(int)
     x = (x + generator.choice([0.0, 0.5]) * (row % 2)) % count
     tone = generator.uniform(0.85, 1.12, (count, count))[row, x.astype(int)]
@@ -49,9 +49,9 @@ def asphalt(generator: Generator) -> Image:
     import cv2
 
     image = speckled(generator, colour(generator, 0.28, 0.5, 0.05), 0.15, 0.05, 4)
-    image *= (1.0 + 0.10 * generator.normal(size=(SIZE, SIZE, 1))).astype(np.float32)
+    image *= (1.0 + 0.10 * generator.normal(size=(TILE, TILE, 1))).astype(np.float32)
     for _ in range(int(generator.integers(0, 4))):  # cracks and sealed joints
-        points = np.cumsum(generator.normal(0.0, 14.0, (20, 2)), axis=0) + generator.uniform(0, SIZE, 2)
+        points = np.cumsum(generator.normal(0.0, 14.0, (20, 2)), axis=0) + generator.uniform(0, TILE, 2)
         tone = float(generator.uniform(0.1, 0.25))
         cv2.polylines(image, [points.astype(np.int32)], False, (tone, tone, tone, 0.08), 1, cv2.LINE_AA)
     return image
@@ -89,7 +89,7 @@ def leaves(generator: Generator) -> Image:
 def bark(generator: Generator) -> Image:
     """Bark, streaked upwards."""
     image = flat(colour(generator, 0.2, 0.45, 0.15), 0.4)
-    stripes = np.repeat(noise(generator, 16, 4, 0.8)[:32], SIZE // 32, axis=0)
+    stripes = np.repeat(noise(generator, 16, 4, 0.8)[:32], TILE // 32, axis=0)
     return image * (1.0 + 0.25 * stripes)[..., None]
 
 
@@ -97,7 +97,7 @@ def roof_tiles(generator: Generator) -> Image:
     """Courses of roof tiles."""
     rows = 16
     rgb = np.array(colour(generator, 0.25, 0.5, 0.1)) * generator.choice([[1.4, 0.85, 0.65], [1.0, 1.0, 1.05]])
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE * rows
+    y, x = np.mgrid[0:TILE, 0:TILE] / TILE * rows
     image = flat(tuple(rgb), 0.35)
     image[..., :3] *= (0.75 + 0.35 * (y % 1.0) + 0.1 * np.cos(2 * np.pi * x))[..., None]
     return image * (1.0 + 0.1 * noise(generator, 8))[..., None]
@@ -106,7 +106,7 @@ def roof_tiles(generator: Generator) -> Image:
 def planks(generator: Generator) -> Image:
     """Upright boards."""
     count = int(generator.choice([8, 12, 16]))
-    x = np.arange(SIZE) / SIZE * count
+    x = np.arange(TILE) / TILE * count
     tone = generator.uniform(0.8, 1.2, count)[x.astype(int)] * np.where(x % 1.0 < 0.12, 0.4, 1.0)
     image = flat(colour(generator, 0.3, 0.8, 0.2), 0.4)
     image *= (tone * (1.0 + 0.06 * noise(generator, 8)))[..., None].astype(np.float32)
@@ -137,7 +137,7 @@ def sign_face(generator: Generator) -> Image:
     ground = [(0.9, 0.9, 0.9), (0.1, 0.25, 0.7), (0.1, 0.45, 0.25), (0.9, 0.75, 0.1), (0.75, 0.1, 0.1)]
     image = flat(ground[int(generator.integers(len(ground)))], 0.95)
     rim = [(0.8, 0.1, 0.1, 0.9), (0.95, 0.95, 0.95, 0.95), (0.1, 0.1, 0.1, 0.3)][int(generator.integers(3))]
-    cv2.rectangle(image, (6, 6), (SIZE - 7, SIZE - 7), rim, 14)
+    cv2.rectangle(image, (6, 6), (TILE - 7, TILE - 7), rim, 14)
     for _ in range(int(generator.integers(1, 4))):
         y = generator.uniform(0.15, 0.7)
         scribble(image, generator, 0.15, y, 0.85, y + 0.18)
@@ -150,7 +150,7 @@ def wheel(generator: Generator) -> Image:
 
     image = flat((0.1, 0.1, 0.1), 0.06)
     tone = float(generator.uniform(0.35, 0.75))
-    cv2.circle(image, (SIZE // 2, SIZE // 2), 84, (tone, tone, tone, 0.5), -1, cv2.LINE_AA)
+    cv2.circle(image, (TILE // 2, TILE // 2), 84, (tone, tone, tone, 0.5), -1, cv2.LINE_AA)
     for angle in np.arange(5) * 2 * np.pi / 5:
         tip = (int(128 + 55 * np.cos(angle)), int(128 + 55 * np.sin(angle)))
         cv2.circle(image, tip, 17, (0.12, 0.12, 0.12, 0.1), -1, cv2.LINE_AA)
@@ -161,7 +161,7 @@ def cloth(generator: Generator) -> Image:
     """Cloth, plain or striped, to be tinted."""
     image = speckled(generator, (0.8, 0.8, 0.8), 0.4, 0.12, 4)
     if generator.random() < 0.4:
-        stripe = (np.arange(SIZE) // int(generator.choice([8, 16, 32]))) % 2
+        stripe = (np.arange(TILE) // int(generator.choice([8, 16, 32]))) % 2
         image[..., :3] *= (0.55 + 0.45 * stripe)[:, None, None]
     return image
 
@@ -169,7 +169,7 @@ def cloth(generator: Generator) -> Image:
 def mesh_fence(generator: Generator) -> Image:
     """Wire or bars before a darker ground."""
     count = int(generator.choice([16, 32]))
-    y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE * count
+    y, x = np.mgrid[0:TILE, 0:TILE] / TILE * count
     lines = (x % 1.0 < 0.25) | (y % 1.0 < 0.12)
     image = flat(colour(generator, 0.2, 0.4, 0.2), 0.25)
     image[lines] = (*colour(generator, 0.3, 0.8, 0.2), 0.4)

@@ -2,46 +2,50 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from calibnet.datasets.synthetic.library import pick_vehicle
 from calibnet.datasets.synthetic.mesh import Material, Mesh, concatenate, quads
-from calibnet.datasets.synthetic.population import vehicle
+from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.textures import atlas
-from calibnet.geometry.types import Transform
-
-if TYPE_CHECKING:
-    from calibnet.datasets.synthetic.world import Scene
+from calibnet.geometry.types import Vector3
 
 EGO_SPEED = 10.0
-"""Metres a second: a metre a frame at 10 Hz."""
+"""Speed of the own vehicle, metres a second: one metre a frame at 10 Hz."""
 
 
-def moving_traffic(
-    scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Transform
-) -> list[Mesh]:
-    """Moving vehicles: every lane is an endless queue on a jittered grid that moves at one speed."""
+def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Vector3) -> list[Mesh]:
+    """Moving vehicles: every lane is an endless queue on a jittered grid that moves at one speed.
+
+    Args:
+        scene: the place.
+        station: of the own vehicle, metres.
+        time: seconds.
+        behind: metres of road behind it that are looked at.
+        ahead: metres of road ahead of it.
+        ego: ``[3]`` position of the own vehicle, around which no other stands.
+    """
     style = scene.style
     parts: list[Mesh] = []
     if not style.traffic:
         return parts
     for own in (True, False):
         for lane in range(style.lanes):
-            speed = EGO_SPEED if own and lane == 0 else scene.style.speed * (1.0 + 0.15 * lane)
+            our_lane = own and lane == 0
+            speed = EGO_SPEED if our_lane else style.speed * (1.0 + 0.15 * lane)
             travelled = (speed if own else -speed) * time
-            gap = style.traffic * (1.5 if own and lane == 0 else 1.0)
+            gap = style.traffic * (1.5 if our_lane else 1.0)
             first = int((station - behind - travelled) // gap)
             for number in range(first, int((station + ahead - travelled) // gap) + 1):
                 generator = np.random.default_rng([scene.seed, 7, int(own), lane, number + 1_000_000])
                 place = travelled + gap * (number + generator.uniform(0.15, 0.85))
                 heavy = generator.random() < style.heavy
                 kind = "lorry" if heavy and generator.random() < 0.5 else "van" if heavy else "car"
-                mesh, colour = vehicle(kind, generator)
+                mesh, colour = pick_vehicle(kind, generator)
                 lateral = style.lane_center(lane, own) + generator.normal(0.0, 0.15)
                 position, heading = scene.line.stand(place, lateral, 0.0)
                 distance = float(np.linalg.norm(position - ego))
-                clear = 9.0 if own and lane == 0 else 4.5
+                clear = 9.0 if our_lane else 4.5
                 if distance < clear + (6.0 if kind == "lorry" else 0.0):
                     continue
                 turn = heading + (0.0 if own else np.pi)
@@ -49,7 +53,7 @@ def moving_traffic(
     return parts
 
 
-def horizon(scene: Scene, ego: Transform) -> Mesh:
+def horizon(scene: Scene, ego: Vector3) -> Mesh:
     """Distant land and a skyline around the vehicle, beyond any LiDAR's reach."""
     generator = np.random.default_rng([scene.seed, 3])
     groups = ("leaves", "facade", "soil") if scene.style.kind in ("street", "industrial") else ("leaves", "grass")

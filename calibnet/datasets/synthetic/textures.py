@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-TILE = 256
-"""Pixels a side of every tile at its finest level."""
+from calibnet.datasets.synthetic import tiles
+from calibnet.datasets.synthetic.drawing import TILE, noise
+
 LEVELS = 9
 """Mip levels: 256, 128, … 1 pixels a side."""
 
@@ -22,7 +24,7 @@ class Atlas:
         texels: ``[N, 4]`` uint8: sRGB-like colour and LiDAR reflectance, all levels and tiles.
         level_offset: ``[LEVELS]`` int32, where each level starts.
         tile_metres: ``[M]`` float32, metres that a tile covers.
-        groups: layers by kind of surface, for instance ``groups["brick"]``.
+        groups: numbers of the tiles of a kind of surface, for instance ``groups["brick"]``.
     """
 
     texels: NDArray[np.uint8]
@@ -30,8 +32,8 @@ class Atlas:
     tile_metres: NDArray[np.float32]
     groups: dict[str, tuple[int, ...]]
 
-    def pick(self, group: str, generator: np.random.Generator) -> int:
-        """A random layer of a group."""
+    def pick(self, group: str, generator: Generator) -> int:
+        """The number of a random tile of a group."""
         layers = self.groups[group]
         return layers[int(generator.integers(len(layers)))]
 
@@ -54,8 +56,6 @@ class Atlas:
 @lru_cache(maxsize=1)
 def atlas() -> Atlas:
     """The one atlas of this process (the same in every process)."""
-    from calibnet.datasets.synthetic import tiles
-
     drawn = tiles.draw_all(np.random.default_rng(20_250_101))
     stack = np.stack([tile.image for tile in drawn])
     levels, offsets, start = [], [], 0
@@ -81,6 +81,4 @@ def atlas() -> Atlas:
 @lru_cache(maxsize=1)
 def turbulence() -> NDArray[np.float32]:
     """Tileable noise ``[TILE, TILE]`` of mean 0.5, for clouds and stains."""
-    from calibnet.datasets.synthetic.drawing import noise
-
     return 0.5 + 0.35 * noise(np.random.default_rng(3), 4, 6, 0.6)

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibnet.datasets.synthetic import facade_tiles, surface_tiles
-from calibnet.datasets.synthetic.drawing import Generator, Image, colour, speckled
+from calibnet.datasets.synthetic.drawing import Image, colour, speckled
 
 
 @dataclass(frozen=True, eq=False)

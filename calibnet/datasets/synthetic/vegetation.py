@@ -3,35 +3,43 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from calibnet.datasets.synthetic.mesh import Material, Mesh, blob, box, concatenate, cylinder, triangles
 from calibnet.datasets.synthetic.textures import Atlas
-
-Generator = np.random.Generator
+from calibnet.geometry.types import Floats, Vector3
 
 
 def _foliage(atlas: Atlas, generator: Generator) -> Material:
     return Material(atlas.pick("leaves", generator), gloss=-1.0, paint=True)
 
 
-def _mesh_of(detail: float) -> tuple[int, int]:
-    """Rows and columns of a hull's lumps."""
-    return (4, 7) if detail == 1.0 else (3, 5)
+def _lumps(
+    centers: Floats,
+    radii: Floats,
+    material: Material,
+    generator: Generator,
+    detail: float,
+    shrink: float = 0.85,
+) -> list[Mesh]:
+    """The solid inside of a crown: ellipsoids ``[E, 3]``, shrunk to lie within their shells of leaves."""
+    rows, columns = (4, 7) if detail == 1.0 else (3, 5)
+    pairs = zip(centers, radii, strict=True)
+    return [blob(center, shrink * radius, material, generator, 0.25, rows, columns) for center, radius in pairs]
 
 
 def leaf_cloud(
-    centers: NDArray[np.float64],
-    radii: NDArray[np.float64],
+    centers: Floats,
+    radii: Floats,
     count: int,
     size: float,
     material: Material,
     generator: Generator,
     detail: float = 1.0,
 ) -> Mesh:
-    """``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``.
+    """Leaves: ``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``.
 
-    A ``detail`` below 1 takes fewer and larger leaves, for trees that are seen from afar.
+    A ``detail`` below 1 takes that share of them and makes them larger, for plants that are seen from afar.
     """
     count, size = int(count * detail), size * min(detail**-0.4, 1.7)
     which = generator.integers(len(centers), size=count)
@@ -70,10 +78,7 @@ def broadleaf(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     )
     parts = [cylinder((0, 0, -0.2), fork, (thick, 0.7 * thick), bark, 7)]
     parts += [cylinder(fork, center, (0.55 * thick, 0.02), bark, 4) for center in centers]
-    parts += [
-        blob(center, 0.85 * radius, leaves, generator, 0.25, *_mesh_of(detail))
-        for center, radius in zip(centers, radii, strict=True)
-    ]
+    parts += _lumps(centers, radii, leaves, generator, detail)
     parts.append(leaf_cloud(centers, radii, 640, generator.uniform(0.14, 0.24), leaves, generator, detail))
     return concatenate(parts)
 
@@ -104,9 +109,7 @@ def bare_tree(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     height = generator.uniform(5.0, 9.0)
     parts: list[Mesh] = []
 
-    def grow(
-        start: NDArray[np.float64], direction: NDArray[np.float64], length: float, radius: float, depth: int
-    ) -> None:
+    def grow(start: Vector3, direction: Vector3, length: float, radius: float, depth: int) -> None:
         end = start + length * direction
         parts.append(cylinder(start, end, (radius, 0.6 * radius), bark, 5 if depth < 2 else 3))
         if depth == (3 if detail == 1.0 else 2):
@@ -125,8 +128,8 @@ def bush(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     count = int(generator.integers(2, 5))
     centers = np.column_stack([generator.normal(0.0, 0.5, (count, 2)), generator.uniform(0.3, 0.6, count)])
     radii = generator.uniform(0.4, 0.8, (count, 3))
-    hulls = [blob(c, 0.85 * r, leaves, generator, 0.25, *_mesh_of(detail)) for c, r in zip(centers, radii, strict=True)]
-    return concatenate([*hulls, leaf_cloud(centers, radii, 170, 0.10, leaves, generator, detail)])
+    lumps = _lumps(centers, radii, leaves, generator, detail)
+    return concatenate([*lumps, leaf_cloud(centers, radii, 170, 0.10, leaves, generator, detail)])
 
 
 def grass_tuft(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
@@ -151,9 +154,9 @@ def thicket(atlas: Atlas, generator: Generator, detail: float) -> Mesh:
     radii = np.column_stack(
         [generator.uniform(0.8, 1.5, (count, 2)), np.maximum(centers[:, 2] * generator.uniform(0.9, 1.2, count), 0.4)]
     )
-    hulls = [blob(c, 0.88 * r, leaves, generator, 0.25, *_mesh_of(detail)) for c, r in zip(centers, radii, strict=True)]
+    lumps = _lumps(centers, radii, leaves, generator, detail, shrink=0.88)
     return concatenate(
-        [*hulls, leaf_cloud(centers, radii, 800, generator.uniform(0.16, 0.26), leaves, generator, detail)]
+        [*lumps, leaf_cloud(centers, radii, 800, generator.uniform(0.16, 0.26), leaves, generator, detail)]
     )
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibnet.datasets.synthetic.textures import TILE, turbulence
+from calibnet.datasets.synthetic.drawing import TILE
+from calibnet.datasets.synthetic.textures import turbulence
 
 Array = NDArray[np.float32]
-Generator = np.random.Generator
 
 
 @dataclass(frozen=True, eq=False)

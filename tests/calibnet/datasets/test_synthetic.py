@@ -14,10 +14,11 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.synthetic import (
     KITTI_LIKE,
     SyntheticSequence,
-    build_scene,
+    World,
     render_frame,
     sample_frame,
     sample_rig,
+    sample_scene,
 )
 from calibnet.datasets.synthetic.style import KINDS
 from calibnet.errors import ConfigError
@@ -69,9 +70,9 @@ def test_points_lie_on_what_the_camera_sees(seed):
     package's ray or projection code.
     """
     generator = np.random.default_rng(seed)
-    scene, rig = build_scene(generator), sample_rig(generator)
-    pose = scene.pose(60.0)
-    frame = render_frame(scene, rig, pose, generator)
+    scene, rig = sample_scene(generator), sample_rig(generator)
+    world, pose = World(scene), scene.pose(60.0)
+    frame = render_frame(world, rig, pose, generator)
     homogeneous = np.column_stack([frame.points[:, :3].astype(np.float64), np.ones(len(frame.points))])
     in_camera = (homogeneous @ frame.camera_from_lidar.T)[:, :3]
     in_camera = in_camera[in_camera[:, 2] > 1.0]
@@ -81,7 +82,7 @@ def test_points_lie_on_what_the_camera_sees(seed):
     depth, pixel = in_camera[seen, 2], pixel[seen]
 
     camera_from_world = frame.camera_from_lidar @ np.linalg.inv(pose @ rig.vehicle_from_lidar)
-    mesh = scene.mesh(pose, 0.0)
+    mesh = world.mesh(pose, 0.0)
     caster = o3d.t.geometry.RaycastingScene()
     vertices = mesh.corners.reshape(-1, 3)
     caster.add_triangles(
@@ -151,7 +152,7 @@ def test_rigs_and_places_vary():
     aspects = [rig.camera.width / rig.camera.height for rig in rigs]
     assert min(aspects) < 1.5
     assert max(aspects) > 3.0
-    kinds = {build_scene(np.random.default_rng(seed)).style.kind for seed in range(80)}
+    kinds = {sample_scene(np.random.default_rng(seed)).style.kind for seed in range(80)}
     assert kinds == set(KINDS)
 
 
@@ -172,7 +173,7 @@ def test_ground_has_no_holes(kind):
 
     scene = next(
         scene
-        for scene in (build_scene(np.random.default_rng(seed)) for seed in range(300))
+        for scene in (sample_scene(np.random.default_rng(seed)) for seed in range(300))
         if scene.style.kind == kind and scene.style.rough > 0.02
     )
     vertices = np.concatenate(
@@ -245,8 +246,8 @@ def test_sequence_drives_about_a_metre_a_frame_on_gentle_curves():
 def test_memory_of_a_long_drive_stays_bounded():
     sequence = SyntheticSequence(2, 3000, SMALL)
     for position in range(0, 3000, 150):
-        sequence.scene.mesh(sequence.world_from_vehicle(position), 0.1 * position)
-    assert len(sequence.scene._chunks) <= 24
+        sequence.world.mesh(sequence.world_from_vehicle(position), 0.1 * position)
+    assert 0 < len(sequence.world._chunks) <= 24
 
 
 def test_importing_the_package_loads_no_heavy_library():
@@ -261,13 +262,13 @@ def test_own_camera_sees_what_a_resized_one_sees():
     import cv2
 
     exposure = dataclasses.replace(SyntheticSequence(1, 1, SMALL).exposure, noise=0.0, quality=0, blur=0.3)
-    scene = build_scene(np.random.default_rng(1))
+    world = World(sample_scene(np.random.default_rng(1)))
     large = dataclasses.replace(
         SMALL, camera=PinholeCamera(640, 200, np.array([[400.0, 0, 315], [0, 400, 95], [0, 0, 1]]))
     )
     small = dataclasses.replace(large, camera=large.camera.resized(320, 100))
     a, b = (
-        render_frame(scene, rig, scene.pose(80.0), np.random.default_rng(0), exposure=exposure).image
+        render_frame(world, rig, world.scene.pose(80.0), np.random.default_rng(0), exposure=exposure).image
         for rig in (large, small)
     )
     halved = cv2.resize(a, (320, 100), interpolation=cv2.INTER_AREA).astype(np.float32)
