@@ -97,7 +97,7 @@ class Cascade:
                 loaded.append(Stage(number, range_, network))
             else:
                 reason = (
-                    f"Stage {number} (±{range_.rotation_deg:g}°/{range_.translation_m:g} m) of preset {preset} has no "
+                    f"Stage {number} ({range_.label}) of preset {preset} has no "
                     f"weights: train it with `calib-inspect train --preset {preset} --range {range_}`."
                 )
                 skipped.append(SkippedStage(number, range_, reason))

@@ -6,15 +6,12 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-import numpy as np
-
 from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame
 from calibnet.drive.consensus import Consensus
 from calibnet.errors import CalibrationError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.types import Extrinsic
-from calibnet.network.pose import prior_information
 from calibnet.trace import CascadeTrace, DriveEstimate, Estimate
 
 FRAMES_UNTIL_LAST_LOOK = 24
@@ -149,7 +146,7 @@ def agree(
 ) -> Consensus:
     """What one stage makes of some frames of a drive; ``note`` is told after each that it could calibrate."""
     failure = None
-    consensus = Consensus(extrinsic, np.diag(prior_information(range_).double().numpy()))
+    consensus = Consensus(extrinsic, range_.information)
     for position in positions:
         frame = read(position)
         try:

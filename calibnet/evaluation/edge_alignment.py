@@ -12,7 +12,6 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic
-from calibnet.network.pose import prior_information
 from calibnet.trace import CascadeTrace, StageTrace
 
 
@@ -22,7 +21,7 @@ class EdgeAlignment:
     def __init__(self, range_: MiscalibrationRange) -> None:
         """Expect errors of ``range_``."""
         self.range = range_
-        self.covariance = np.diag(1 / prior_information(range_).double().numpy())
+        self.covariance = np.diag(1 / np.diag(range_.information))
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""

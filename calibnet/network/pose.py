@@ -36,9 +36,8 @@ class Pose(NamedTuple):
 
 
 def prior_information(range_: MiscalibrationRange) -> Tensor:
-    """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration."""
-    sigma = [range_.translation_m / 3**0.5] * 3 + [math.radians(range_.rotation_deg) / 3**0.5] * 3
-    return torch.tensor(sigma).clamp(min=1e-4) ** -2
+    """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration, float32."""
+    return torch.from_numpy(range_.information).diagonal().float()
 
 
 def skew(vector: Tensor) -> Tensor:

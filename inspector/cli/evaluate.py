@@ -219,7 +219,7 @@ def report(evaluation: Evaluation, console: Console) -> None:
     runs = len(evaluation.runs)
     console.print(
         f"{', '.join(evaluation.sequences)} ({evaluation.rig}): {evaluation.frames} frames x {evaluation.repeats} = "
-        f"{runs} runs from ±{evaluation.range.rotation_deg:g}° / ±{evaluation.range.translation_m:g} m, "
+        f"{runs} runs from {evaluation.range.label}, "
         f"seed {evaluation.seed}"
     )
     rows = [("initial", evaluation.initial)]
