@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.runtime.whole_file import write_whole
 from inspector.cli.options import FOLDER
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run, write_file
+from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
 if TYPE_CHECKING:
     from inspector.export.exported import Exported
@@ -75,7 +76,7 @@ def export(
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_file(output, text.encode())
+        write_whole(output, text.encode())
         click.echo(f"Saved {output}: {exported.origin}.", err=True)
 
 
