@@ -12,10 +12,7 @@ from calibnet.geometry import PinholeCamera
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
 from inspector.read.file import RecordingError
-from inspector.read.run import RecordedFrame, RecordedRun
-
-SAME_MOUNT = 1e-6
-"""References that differ by less, in metres and in entries of the rotation, are of one mount."""
+from inspector.read.run import RecordedRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +56,8 @@ def exported_median(run: RecordedRun) -> Exported:
     Raises:
         RecordingError: the frames are not all of one camera on one mount.
     """
-    first = run.frames[0]
-    if not all(_same_mount(first, frame) for frame in run.frames[1:]):
+    camera = run.frames[0].camera
+    if not (run.one_mount and all(_same_camera(camera, frame.camera) for frame in run.frames)):
         raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
     count = sum(frame.confirmed for frame in run.frames)
     if not count:
@@ -69,7 +66,7 @@ def exported_median(run: RecordedRun) -> Exported:
             "they belong together, and record again from a wider --range."
         )
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
-    return Exported(median_pose(run.results), first.camera, np.zeros(5), origin)
+    return Exported(median_pose(run.results), camera, np.zeros(5), origin)
 
 
 def exported_drive(run: RecordedRun) -> Exported:
@@ -97,10 +94,5 @@ def exported_folder(folder: Path) -> Exported:
     return Exported(content.calibration.camera_from_lidar, camera, content.distortion, f"{folder.name}/{path.name}")
 
 
-def _same_mount(one: RecordedFrame, other: RecordedFrame) -> bool:
-    same_camera = (one.camera.width, one.camera.height) == (other.camera.width, other.camera.height)
-    if not (same_camera and np.array_equal(one.camera.matrix, other.camera.matrix)):
-        return False
-    if one.reference is None or other.reference is None:
-        return True
-    return float(np.abs(one.reference - other.reference).max()) < SAME_MOUNT
+def _same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
+    return (one.width, one.height) == (other.width, other.height) and np.array_equal(one.matrix, other.matrix)
