@@ -14,8 +14,8 @@ from torch import Tensor
 
 from calibnet.cascade.image_views import View, image_branches, image_views
 from calibnet.cascade.stage_detail import stage_detail
-from calibnet.datasets.frame import Frame
-from calibnet.drive.solve import Frames, solve_drive
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest
 from calibnet.geometry.types import Extrinsic

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from calibnet.alignment import Evidence, gather
-from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.consensus import Consensus
 from calibnet.errors import CalibrationError
 from calibnet.geometry import MiscalibrationRange, is_finest
@@ -22,18 +22,6 @@ FRAMES_ALIGNED = 24
 """Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
 CURVE_POINTS = 12
 """Of the curve that shows how an estimate converges over a drive."""
-
-
-class Frames(Protocol):
-    """A drive: a `calibnet.datasets.Sequence`, or a list of frames."""
-
-    def __len__(self) -> int:
-        """Number of frames."""
-        ...
-
-    def __getitem__(self, position: int, /) -> Frame:
-        """Read one frame."""
-        ...
 
 
 class OneStage(Protocol):

@@ -16,10 +16,10 @@ from calibnet.trace import CascadeTrace, StageTrace
 
 
 class EdgeAlignment:
-    """A `calibnet.evaluation.runner.Calibrator` without weights."""
+    """A `Calibrator` without weights."""
 
     def __init__(self, range_: MiscalibrationRange) -> None:
-        """Expect errors of ``range_``."""
+        """Expect miscalibrations within ``range_``; farther ones are held back by it."""
         self.range = range_
         self.covariance = np.diag(1 / np.diag(range_.information))
 
