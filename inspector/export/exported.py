@@ -77,7 +77,7 @@ def exported_drive(run: RecordedRun) -> Exported:
     """
     if run.drive is None:
         raise RecordingError(
-            f"{run.path} has no estimate from the whole drive; record it with --sequence-estimate, or use --median."
+            f"{run.path} has no estimate from the whole drive; record it with --drive, or use --median."
         )
     return Exported(run.drive, run.frames[0].camera, np.zeros(5), f"{run.title}, all frames solved together")
 
