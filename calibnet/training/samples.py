@@ -18,7 +18,6 @@ from calibnet.geometry import (
     PinholeCamera,
     invert,
     project,
-    sample_miscalibration,
     scaled,
     transform_points,
 )
@@ -27,6 +26,7 @@ from calibnet.geometry.types import Extrinsic, Floats, Transform
 from calibnet.network.batch import LidarInput, below, lidar_input
 from calibnet.network.network import NetworkInputs
 from calibnet.training.augmentation import augment
+from calibnet.training.draws import draws_of
 from calibnet.training.losses import Target
 
 MINIMUM_CELLS = 40
@@ -78,7 +78,7 @@ def make_sample(
 ) -> Sample:
     """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
 
-    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: for the features' warm-up only,
+    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: only where features train alone,
     since no pose explains it.
     """
     displaced = frame.camera.matrix.copy()
@@ -142,10 +142,11 @@ class TrainingSamples(Dataset[Sample]):
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
-    RESIDUAL_SHARE = 0.7  # of the miscalibrations, when the errors of the stages before are known
     OWN_SHARE = 0.4  # where there are none before: only what a stage's own first look leaves
     RESIDUAL_STRETCH = (0.7, 1.8)  # times as large as measured: frames never trained on leave more behind
-    LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
+    WARM_UP_SHIFT = 40.0  # pixels in x and y by which the warm-up displaces the LiDAR image at most
+    SHIFT = 24.0  # the same later on, in every batch that trains features alone
+    FEATURES_EVERY = 3  # of so many batches after the warm-up, one trains features alone; 0: none does
 
     def __init__(
         self,
@@ -160,9 +161,10 @@ class TrainingSamples(Dataset[Sample]):
     ) -> None:
         """A stream whose first ``warm_up`` samples are for the features alone.
 
-        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random.
-        Miscalibrations scatter around none, so "the match is where the cell is" is a good guess that
-        features pick up from the image's borders, and then stay with; the displacement makes it a bad one.
+        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random; so are
+        those of every third batch after them. Miscalibrations scatter around none, so "the match is where the cell is"
+        is a good guess that features pick up, from the image's borders and on the ground near the car, and then stay
+        with; the displacement makes it a bad one.
 
         A stage whose image is larger than ``area`` by the square of ``magnification`` is trained on cuttings of it.
         """
@@ -173,7 +175,9 @@ class TrainingSamples(Dataset[Sample]):
         factor = (area / (160 * 512)) ** 0.5
         self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
         self.residuals: list[Transform] = []
-        self.residual_share = self.RESIDUAL_SHARE
+        self.features_every = self.FEATURES_EVERY
+        self.draws = draws_of(range_)
+        self.residual_share = self.draws.residual_share
         self.cache: dict[tuple[int, int], Frame] = {}
 
     def read(self, source: int, position: int) -> Frame:
@@ -200,7 +204,8 @@ class TrainingSamples(Dataset[Sample]):
         generator = np.random.default_rng([self.seed, 2, number])
         for _ in range(self.ATTEMPTS):
             frame = self.draw_frame(number, generator, strength)
-            shift = generator.uniform(-self.LARGEST_SHIFT, self.LARGEST_SHIFT, 2) * (number < self.warm_up)
+            largest = self.largest_shift(number)
+            shift = generator.uniform(-largest, largest, 2)
             sample = make_sample(frame, self.draw(generator), self.scales, shift)
             if sample.visible[0].sum() >= MINIMUM_CELLS:
                 return sample
@@ -208,6 +213,13 @@ class TrainingSamples(Dataset[Sample]):
             f"None of {self.ATTEMPTS} draws gave {MINIMUM_CELLS} cells with a visible LiDAR point, the last one from "
             f"{frame.source}; check that the training data's calibration fits its scans."
         )
+
+    def largest_shift(self, number: int) -> float:
+        """Pixels by which the LiDAR image of a sample is displaced at most: 0 but where features train alone."""
+        if number < self.warm_up:
+            return self.WARM_UP_SHIFT
+        every = self.features_every
+        return self.SHIFT if every and number // self.batch % every == every - 1 else 0.0
 
     def draw_frame(self, number: int, generator: np.random.Generator, strength: float, whole: bool = False) -> Frame:
         """An augmented frame at the size of sample ``number``; ``whole`` keeps the magnification out of it."""
@@ -225,13 +237,8 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> Transform:
-        """A miscalibration anywhere in the range, or, mostly, as the looks before leave behind.
-
-        Sometimes a small one, as a stage must also know when to stop.
-        """
+        """A miscalibration as `Draws` has them, or as the looks before leave behind."""
         if self.residuals and generator.random() < self.residual_share:
             residual = self.residuals[generator.integers(len(self.residuals))]
             return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
-        share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
-        range_ = MiscalibrationRange(self.range.rotation_deg * share, self.range.translation_m * share)
-        return sample_miscalibration(range_, generator)
+        return self.draws.uniform(generator)

@@ -86,6 +86,8 @@ class Trainer:
         self.data = TrainingSamples(
             sources, self.range, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
         )
+        if not config.hybrid_loss:
+            self.data.features_every = 0
         if options.after:
             self._draw_residuals(Path(options.after), start)
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.995))
@@ -230,7 +232,7 @@ class Trainer:
 
     def _losses(self, inputs: NetworkInputs, target: Target) -> Losses:
         config = self.network.config
-        if self.samples < self.warm_up:
+        if target.of_features:
             return Losses.of_features(feature_loss(self.model.match(inputs), inputs, target, config))
         pose_share = min(1.0, (self.samples - self.warm_up) / self.POSE_RAMP) if self.warm_up else 1.0
         return hybrid_loss(self.model(inputs), inputs, target, config, pose_share)

@@ -20,7 +20,7 @@ def data() -> TrainingSamples:
     return TrainingSamples([Source(Scenes(), 1.0)], RANGES[3], TINY.scales, TINY.input_height * TINY.input_width, 2, 0)
 
 
-def test_residuals_are_what_the_stages_leave_and_most_of_what_is_drawn(data: TrainingSamples) -> None:
+def test_residuals_are_what_the_stages_leave_and_four_of_ten_that_are_drawn(data: TrainingSamples) -> None:
     networks = [tiny_network(seed=1, stage=3)]
     wide = MiscalibrationRange(30, 5)
     data.residuals = residual_errors(networks, data, wide, 6)
@@ -30,7 +30,7 @@ def test_residuals_are_what_the_stages_leave_and_most_of_what_is_drawn(data: Tra
     generator = np.random.default_rng(0)
     drawn = [data.draw(generator) for _ in range(400)]
     stretches = [stretch for delta in drawn for residual in data.residuals if (stretch := stretched(delta, residual))]
-    assert 0.6 < len(stretches) / len(drawn) < 0.8
+    assert 0.3 < len(stretches) / len(drawn) < 0.5
     assert 0.7 <= min(stretches) < 0.8, "frames never trained on leave more behind than those measured"
     assert 1.7 < max(stretches) <= 1.8
 

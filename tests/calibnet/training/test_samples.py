@@ -62,8 +62,8 @@ def test_miscalibrations_fill_the_range_and_stay_in_it() -> None:
     samples, generator = stream(), np.random.default_rng(0)
     drawn = [range_of(samples.draw(generator)) for _ in range(400)]
     assert max(range_.rotation_deg for range_ in drawn) == pytest.approx(5.0, abs=0.05)
-    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.5, abs=0.005)
-    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.5001 for range_ in drawn)
+    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.9, abs=0.009)
+    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.9001 for range_ in drawn)
     assert sum(range_.rotation_deg < 2.0 for range_ in drawn) > 20, "a stage must also know when to stop"
 
 
@@ -112,11 +112,18 @@ def test_the_warm_up_displaces_the_lidar_image() -> None:
     assert np.array_equal(displaced.intrinsics, still.intrinsics)
 
 
-def test_only_the_warm_up_is_displaced() -> None:
-    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 4, 0, warm_up=5)
-    displaced = [bool(samples[number].shift.any()) for number in range(8)]
-    assert displaced == [True] * 5 + [False] * 3
-    assert np.abs([samples[number].shift for number in range(5)]).max() <= TrainingSamples.LARGEST_SHIFT
+def test_the_warm_up_and_every_third_batch_are_displaced() -> None:
+    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 2, 0, warm_up=3)
+    shifts = [np.abs(samples[number].shift).max() for number in range(12)]
+    assert [shift > 0 for shift in shifts] == [True] * 3 + [False, True, True] + [False] * 4 + [True] * 2
+    assert [samples.largest_shift(number) for number in (0, 2, 3, 4, 5, 6, 10, 11)] == [40, 40, 0, 24, 24, 0, 24, 24]
+    assert all(shift <= samples.largest_shift(number) for number, shift in enumerate(shifts))
+
+
+def test_no_batch_is_displaced_where_features_never_train_alone() -> None:
+    samples = stream()
+    samples.features_every = 0
+    assert [samples.largest_shift(number) for number in range(24)] == [0.0] * 24
 
 
 def test_collated_samples_keep_their_order_and_types() -> None:
