@@ -8,9 +8,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import TEMPERATURE
-from calibnet.network.network import NetworkInputs, NetworkOutput
+from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import project_points
 
 

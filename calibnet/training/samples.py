@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
 from calibnet.datasets.frame import Frame, Sequence
-from calibnet.datasets.images import resize_image
 from calibnet.errors import DatasetError
 from calibnet.geometry import (
     MiscalibrationRange,
@@ -23,13 +22,12 @@ from calibnet.geometry import (
 )
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform
-from calibnet.network.batch import LidarInput, below, lidar_input
-from calibnet.network.network import NetworkInputs
+from calibnet.network.batch import Cut, LidarInput, NetworkInputs, lidar_input, make_batch
 from calibnet.training.augmentation import augment
 from calibnet.training.draws import draws_of
 from calibnet.training.losses import Target
 
-MINIMUM_CELLS = 40
+FEWEST_VISIBLE_CELLS = 40
 """Cells with a point below which a sample teaches nothing and another is drawn."""
 
 
@@ -97,30 +95,22 @@ def make_sample(
     )
 
 
-def plain(frame: Frame, camera: PinholeCamera) -> Frame:
-    """The frame as a network sees it whose ``input_camera`` is given, not augmented."""
-    return replace(frame, image=resize_image(frame.image, camera), camera=camera)
-
-
 def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
-    """Stack samples of one input size, without the rows at the top that hold no point in any of them."""
-    top = min(sample.lidar.empty_rows for sample in samples)
-    scans = [sample.lidar.without_top(top) for sample in samples]
-    visible = [[below(mask, top, s.lidar.cells[-1]) for mask in s.visible] for s in samples]
+    """Stack samples of one input size."""
+    scans = [sample.lidar for sample in samples]
+    cut = Cut.of(scans)
 
     def stack(arrays: Many[NDArray[np.generic]]) -> torch.Tensor:
         return torch.from_numpy(np.stack(arrays))
 
-    scales = range(len(samples[0].visible))
-    inputs = NetworkInputs(
-        stack([s.image for s in samples]).permute(0, 3, 1, 2),
-        stack([scan.image for scan in scans]),
-        stack([s.intrinsics for s in samples]),
-        [stack([scan.cells[scale] for scan in scans]) for scale in scales],
+    image = stack([sample.image for sample in samples]).permute(0, 3, 1, 2)
+    inputs = make_batch(image, scans, [sample.intrinsics for sample in samples], cut)
+    visible = zip(*(sample.visible for sample in samples), strict=True)
+    return inputs, Target(
+        stack([sample.correction for sample in samples]),
+        stack([sample.shift for sample in samples]),
+        [stack([cut.apply(mask) for mask in scale]) for scale in visible],
     )
-    truth = stack([s.correction for s in samples])
-    shift = stack([s.shift for s in samples])
-    return inputs, Target(truth, shift, [stack([masks[scale] for masks in visible]) for scale in scales])
 
 
 @dataclass(frozen=True)
@@ -207,11 +197,11 @@ class TrainingSamples(Dataset[Sample]):
             largest = self.largest_shift(number)
             shift = generator.uniform(-largest, largest, 2)
             sample = make_sample(frame, self.draw(generator), self.scales, shift)
-            if sample.visible[0].sum() >= MINIMUM_CELLS:
+            if sample.visible[0].sum() >= FEWEST_VISIBLE_CELLS:
                 return sample
         raise DatasetError(
-            f"None of {self.ATTEMPTS} draws gave {MINIMUM_CELLS} cells with a visible LiDAR point, the last one from "
-            f"{frame.source}; check that the training data's calibration fits its scans."
+            f"None of {self.ATTEMPTS} draws gave {FEWEST_VISIBLE_CELLS} cells with a visible LiDAR point, the last one "
+            f"from {frame.source}; check that the training data's calibration fits its scans."
         )
 
     def largest_shift(self, number: int) -> float:

@@ -8,8 +8,9 @@ import torch
 from torch import Tensor
 
 from calibnet.geometry import rotation_from_euler_xyz
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.displacement import DisplacementField
-from calibnet.network.network import NetworkInputs, NetworkOutput
+from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import Pose
 from calibnet.training.losses import (
     RAREST_BAND,

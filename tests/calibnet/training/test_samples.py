@@ -9,11 +9,11 @@ import torch
 from calibnet.datasets.frame import Frame
 from calibnet.errors import DatasetError
 from calibnet.geometry import RANGES, invert, miscalibration, project, range_of
-from calibnet.network.batch import lidar_input
+from calibnet.network.batch import Cut, lidar_input
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.pose import GeometricHead
 from calibnet.training.losses import true_displacement
-from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, plain, visible_cells
+from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, visible_cells
 from tests.support.scene import REFERENCE, Scenes, make_frame
 from tests.support.tiny import TINY
 
@@ -140,7 +140,7 @@ def test_collated_samples_keep_their_order_and_types() -> None:
 def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
     frames = [make_frame(seed, 128, 128) for seed in range(2)]
     samples = [make_sample(lowered(frame, row), DELTA, SCALES) for frame, row in zip(frames, (100, 70), strict=True)]
-    assert [sample.lidar.empty_rows for sample in samples] == [3, 2]
+    assert [Cut.of([sample.lidar]).rows for sample in samples] == [3, 2]
     inputs, target = collate(samples)
     assert inputs.image.shape == (2, 3, 128, 128) and inputs.lidar.shape == (2, 2, 64, 128)
     for scale, cells, mask, position in zip(SCALES, inputs.cells, target.visible, range(3), strict=True):
@@ -148,14 +148,6 @@ def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
         for number, sample in enumerate(samples):
             assert np.array_equal(cells[number].numpy(), sample.lidar.cells[position][:, 64 // scale :])
             assert np.array_equal(mask[number].numpy(), sample.visible[position][64 // scale :])
-
-
-def test_plain_frames_have_the_size_of_inference() -> None:
-    large = make_frame(0, 621, 188)
-    frame = plain(large, large.camera.fitted(160, 512, 32))
-    assert frame.image.shape == (frame.camera.height, frame.camera.width, 3)
-    assert frame.image.shape[0] % 32 == frame.image.shape[1] % 32 == 0
-    assert np.array_equal(frame.camera_from_lidar, REFERENCE)
 
 
 def test_everything_is_visible_from_the_scanner_s_own_place() -> None:
