@@ -13,7 +13,7 @@ ARCHIVE = ROOT / "docs" / "archive"
 """Logs as they were written, with the names of their time."""
 DOCUMENTS = [
     path
-    for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("*/README.md")])
+    for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("[!.]*/README.md")])
     if not path.is_relative_to(ARCHIVE)
 ]
 ALL_DOCUMENTS = [*DOCUMENTS, *sorted(ARCHIVE.glob("*.md"))]
