@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from calibnet.geometry import RANGES
+from calibnet.weights import read_record, weights_path
+
 ROOT = Path(__file__).resolve().parents[1]
 ARCHIVE = ROOT / "docs" / "archive"
 """Logs as they were written, with the names of their time."""
@@ -107,6 +110,19 @@ def test_pictures_are_used_and_small() -> None:
     pictures = set((ROOT / "docs" / "pictures").iterdir())
     assert pictures <= used
     assert max(picture.stat().st_size for picture in pictures) < 1_500_000
+
+
+@pytest.mark.parametrize("number", range(1, len(RANGES) + 1))
+def test_the_row_of_a_stage_says_what_its_weights_say(number: int) -> None:
+    text = (ROOT / "docs" / "weights.md").read_text(encoding="utf-8")
+    (row,) = re.findall(rf"^\| {number} \|.*$", text, flags=re.MULTILINE)
+    record = read_record(weights_path("compact", RANGES[number - 1]))
+    found = record["validation"]
+    assert f"| {record['samples']:,} |" in row
+    assert (
+        f"| {found['initial_rotation_deg']:.2f}° → {found['rotation_deg']:.2f}° ({found['rotation_p95_deg']:.2f}°), "
+        f"{found['initial_translation_cm']:.0f} → {found['translation_cm']:.0f} cm |"
+    ) in row
 
 
 def test_the_checks_see_what_is_wrong(tmp_path: Path) -> None:

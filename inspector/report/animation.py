@@ -18,7 +18,7 @@ from inspector import entities
 from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.report.pictures import draw_overlay
 
-FORMATS: Final[dict[str, dict[str, Any]]] = {".webp": {"quality": 60, "method": 6}, ".gif": {"optimize": True}}
+FORMATS: Final[dict[str, dict[str, Any]]] = {".webp": {"quality": 60, "method": 4}, ".gif": {"optimize": True}}
 """Endings of the file's name, and the options with which Pillow writes each."""
 WIDTH: Final = 800
 CAPTION_HEIGHT: Final = 30
