@@ -11,10 +11,10 @@ from calibnet.geometry.se3 import pose_from_vector, rotation_jacobian
 from calibnet.geometry.types import Matrix6, Vector6
 
 FIRMNESS = 15.0
-"""Of a frame's evidence, beside half the squared standard deviations of what is known already: with it errors are about
-as large as the covariance says (docs/training.md)."""
+"""Factor of a frame's evidence in the cost, where what is known already counts half its squared standard deviations:
+with it, errors are about as large as the covariance says (docs/decisions.md, "The firmness of the evidence")."""
 MOST_FRAMES = 8
-"""That add up; more of them count as firmly as so many, since frames of one drive, and one camera, err alike."""
+"""Frames whose evidence adds up. More frames count as firmly as so many, since those of one drive err alike."""
 MOST_ITERATIONS = 40
 STEP = 0.5
 """Standard deviations to either side over which the curvature is measured: edges are rough at closer range."""

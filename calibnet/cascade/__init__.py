@@ -1,1 +1,6 @@
-"""The five-stage cascade (paper section 3.5) on one frame."""
+"""The five-stage cascade (paper section 3.5): `cascade` runs the stages, `stage` looks at a frame with one of them."""
+
+from calibnet.cascade.cascade import Cascade, SkippedStage
+from calibnet.cascade.stage import Stage
+
+__all__ = ["Cascade", "SkippedStage", "Stage"]

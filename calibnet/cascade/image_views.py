@@ -3,48 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import torch
-from torch import Tensor
 
+from calibnet.cascade.stage import Stage, View
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
 from calibnet.network.network import CalibrationNetwork
 
 
-class View(NamedTuple):
-    """A frame's image at the size some stages want: ``[1, 3, H, W]``, and what their image branch makes of it."""
-
-    image: Tensor
-    features: list[Tensor]
-
-
 def image_views(
-    networks: Sequence[CalibrationNetwork], branches: Sequence[int], frame: Frame, clock: Callable[[str], None]
-) -> dict[tuple[int, int, int], View]:
-    """A frame's image at every size that a stage wants, and its features: once for all stages that share them.
+    stages: Sequence[Stage], branches: Sequence[int], frame: Frame, clock: Callable[[str], None]
+) -> list[View]:
+    """Each stage's view of a frame; those that share image size and image branch have the same one.
 
     Args:
-        networks: of the stages, all on one device.
+        stages: all on one device.
         branches: of each, see `image_branches`.
         frame: whose image.
         clock: called with ``"resize"`` and ``"image_features"`` when each is done.
-
-    Returns:
-        The views by image branch, width and height.
     """
     views: dict[tuple[int, int, int], View] = {}
-    for network, branch in zip(networks, branches, strict=True):
-        camera = network.input_camera(frame.camera)
-        if (branch, camera.width, camera.height) in views:
-            continue
-        device = next(network.parameters()).device
-        image = torch.from_numpy(resize_image(frame.image, camera)).permute(2, 0, 1)[None].to(device)
-        clock("resize")
-        views[branch, camera.width, camera.height] = View(image, network.features.image(image))
-        clock("image_features")
-    return views
+    keys = []
+    for stage, branch in zip(stages, branches, strict=True):
+        camera = stage.camera(frame)
+        keys.append((branch, camera.width, camera.height))
+        if keys[-1] not in views:
+            views[keys[-1]] = stage.view(frame, clock)
+    return [views[key] for key in keys]
 
 
 def image_branches(networks: Sequence[CalibrationNetwork]) -> list[int]:

@@ -1,9 +1,10 @@
-"""One extrinsic from a drive: the mount is the same in every frame, so the frames are solved together.
+"""What the frames of a drive agree on: the mount is the same in all of them, so they are solved together.
 
 Every frame says with its normal equations where it believes the extrinsic to be and how firmly. Their
 sum, each frame weighted by how well it agrees with the others, is the estimate of all; how far they
 scatter around it is its uncertainty. A frame leaves 42 numbers behind, so memory does not grow with
-images or scans. What all of them get wrong alike, the edges of some frames tell (`calibnet.alignment`).
+images or scans. What the networks get wrong in all frames alike, the edges of some frames tell
+(`calibnet.alignment`).
 """
 
 from __future__ import annotations
@@ -19,13 +20,11 @@ from calibnet.trace import Estimate
 
 OUTLIER = 3.0
 """A frame so many times farther off than the median one counts half as much (Cauchy weights)."""
-UNSTATED = 1000.0
-"""How much firmer than the prior a head is taken to be that does not say: its answer is not drawn to the start."""
-COMMON_TRANSLATION_M, COMMON_ROTATION_DEG = 0.08, 0.12
-"""Standard deviations, per axis, of what the shipped networks get wrong in all frames of a drive alike: 14 cm, 0.2° in
-all, somewhat more than on validation (10 cm; 0.1° and 0.3°)."""
+FIRM = 1000.0
+"""Information of a frame whose network states none, relative to the prior's: the estimate is the frames' mean then,
+and the prior, which would draw it to the start, does not count."""
 FARTHEST_TRANSLATION_M, FARTHEST_ROTATION_DEG = 0.3, 0.6
-"""Standard deviations of what frames agree on, in all, beyond which edges would pull onto whatever is near."""
+"""Standard deviations of what the frames agree on, over all axes, beyond which edges would pull onto a neighbour."""
 REWEIGHTINGS = 10
 """Times that frames are weighted anew; weights settle after three or four."""
 
@@ -34,11 +33,11 @@ class Consensus:
     """Frames' corrections of one common extrinsic, and what they agree on."""
 
     def __init__(self, before: Extrinsic, prior: Matrix6) -> None:
-        """Start with none.
+        """Start with no frame.
 
         Args:
             before: ``camera_from_lidar`` that all corrections are relative to.
-            prior: ``[6, 6]`` information of the range the stage was trained for. Every frame's information
+            prior: information of the range the stage was trained for. Every frame's information
                 contains it; the estimate counts it once.
         """
         self.before, self.prior = before, prior
@@ -49,9 +48,9 @@ class Consensus:
         return len(self._vectors)
 
     def add(self, correction: Transform, information: Matrix6 | None) -> None:
-        """Take in one frame: its 4x4 correction and information ``[6, 6]``; without one, all frames count alike."""
+        """Take in one frame: its correction, and its information; None where the network states none."""
         self._vectors.append(pose_vector(correction))
-        self._informations.append(UNSTATED * self.prior if information is None else information)
+        self._informations.append(FIRM * self.prior if information is None else information)
 
     def estimate(self) -> Estimate:
         """What the frames so far agree on.
@@ -74,27 +73,27 @@ class Consensus:
             covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(vectors))
 
-    def aligned(self, evidence: Sequence[Evidence], starts: Sequence[Estimate] = ()) -> Estimate:
-        """What they and the evidence of frames, gathered under ``before``, agree on.
+    def aligned(self, evidence: Sequence[Evidence], common: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
+        """What the frames and the evidence of some of them agree on.
 
-        The covariance counts what the networks get wrong in all frames alike, too: without evidence that stays.
-        Frames that scatter farther than edges pull are not aligned.
+        The covariance counts what the networks get wrong in all frames alike, too, as far as the evidence leaves it
+        open. Frames that scatter farther than edges pull are not aligned.
 
         Args:
-            evidence: of any of the frames.
-            starts: where to start; what the frames agree on by default.
+            evidence: of any of the frames, gathered under ``before``.
+            common: covariance of what the networks get wrong in all frames alike.
+            starts: where the alignment starts, of which the best result is taken; at what the frames agree on by
+                default.
         """
         agreed = self.estimate()
-        sigma = [COMMON_TRANSLATION_M] * 3 + [np.radians(COMMON_ROTATION_DEG)] * 3
         known, *others = (pose_vector(one.camera_from_lidar @ invert(self.before)) for one in (agreed, *starts))
-        covariance = agreed.covariance + np.diag(np.square(sigma))
         if agreed.rotation_deg > FARTHEST_ROTATION_DEG or agreed.translation_cm > 100 * FARTHEST_TRANSLATION_M:
             evidence = ()
-        correction, covariance = align(evidence, known, covariance, others)
+        correction, covariance = align(evidence, known, agreed.covariance + common, others)
         return Estimate(pose_from_vector(correction) @ self.before, covariance, agreed.frames)
 
     def _solve(self, vectors: Floats, informations: Floats, weights: Floats) -> tuple[Matrix6, Vector6]:
-        """Summed normal equations: matrix ``[6, 6]`` and solution ``[6]``."""
+        """Summed normal equations of vectors ``[N, 6]`` and informations ``[N, 6, 6]``: matrix and solution."""
         weighted = weights[:, None, None] * informations
         normal = weighted.sum(0) - weights.sum() * self.prior + self.prior
         return normal, np.linalg.solve(normal, np.einsum("nij,nj->i", weighted, vectors))

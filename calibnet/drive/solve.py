@@ -4,47 +4,71 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.consensus import Consensus
+from calibnet.drive.convergence import Convergence, Due, spread
 from calibnet.errors import CalibrationError
 from calibnet.geometry import MiscalibrationRange, is_finest
-from calibnet.geometry.types import Extrinsic
-from calibnet.trace import CascadeTrace, DriveEstimate, Estimate
+from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.trace import DriveEstimate, Estimate, StageTrace
 
 FRAMES_UNTIL_LAST_LOOK = 24
-"""Frames, spread over the drive, that all passes but the last look at."""
+"""Frames, spread over the drive, that all looks but the last one see."""
 LOOKS = 2
-"""Times that each stage corrects a sequence, on scans projected anew; the last one does so once more in the end."""
+"""Times that each stage corrects a drive, on scans projected anew; the last one does so once more in the end."""
 FRAMES_ALIGNED = 24
 """Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
-CURVE_POINTS = 12
-"""Of the curve that shows how an estimate converges over a drive."""
 
 
-class OneStage(Protocol):
-    """A cascade of one stage that looks once."""
+class Looking(Protocol):
+    """What a drive needs of a `calibnet.cascade.Stage`."""
 
-    def calibrate(self, frame: Frame, initial: Extrinsic) -> CascadeTrace:
-        """Correct the extrinsic of one frame."""
+    @property
+    def range(self) -> MiscalibrationRange:
+        """What its network was trained for."""
+        ...
+
+    @property
+    def match_error_limit_px(self) -> float:
+        """What error it may expect of its matches to be believed."""
+        ...
+
+    def view(self, frame: Frame) -> Any:
+        """The frame's image as the stage sees it."""
+        ...
+
+    def look(self, frame: Frame, view: Any, before: Extrinsic) -> StageTrace:
+        """Correct an extrinsic once."""
         ...
 
 
 def solve_drive(
-    stages: Sequence[tuple[MiscalibrationRange, OneStage]],
+    stages: Sequence[Looking],
     frames: Frames,
     initial: Extrinsic,
+    common: Matrix6,
     observer: Callable[[int, int], None] | None = None,
 ) -> DriveEstimate:
     """Correct the extrinsic that all frames share.
 
+    Each stage corrects what all frames together make of it, and again on the scans projected anew. Until the end some
+    frames from all over the drive are enough; the last look sees them all. What the finest stage leaves is aligned
+    without training (`calibnet.alignment`) on some frames from all over the drive; edges pull no farther than that.
+    One frame is in memory at a time, and 4 MB of each that is aligned.
+
     Args:
-        stages: coarse to fine, each with its range.
-        frames: see `calibnet.cascade.Cascade.calibrate_drive`, as for the other arguments and errors.
-        initial: ``camera_from_lidar``, 4x4.
-        observer: called before each frame with the number of frames read and to be read.
+        stages: coarse to fine.
+        frames: of one camera and LiDAR on one mount; each is read in the last look, and some before.
+        initial: ``camera_from_lidar`` to start from.
+        common: covariance of what the networks get wrong in all frames alike.
+        observer: called before each frame is read, with the number of frames read so far and to be read in all.
+
+    Raises:
+        CalibrationError: no frame could be calibrated.
+        ValueError: there are no frames.
     """
     if not len(frames):
         raise ValueError("There are no frames to calibrate.")
@@ -57,116 +81,82 @@ def solve_drive(
         return frames[position]
 
     extrinsic = initial
-    for range_, stage in stages:
+    for stage in stages:
         for _ in range(LOOKS):
-            extrinsic = agree(range_, stage, read, some, extrinsic).estimate().camera_from_lidar
+            extrinsic = agree(stage, read, some, extrinsic).estimate().camera_from_lidar
 
-    range_, last = stages[-1]
-    curve = Curve(len(everything), is_finest(range_))
-    consensus = agree(range_, last, read, everything, extrinsic, curve.note)
-    estimate = curve.end(consensus)
+    aligns = is_finest(stages[-1].range)
+    evidence = list[Evidence]()
+    to_align, convergence = Due(spread(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
+
+    def estimate(consensus: Consensus, *starts: Estimate) -> Estimate:
+        return consensus.aligned(evidence, common, starts) if aligns else consensus.estimate()
+
+    def taken_in(position: int, frame: Frame, consensus: Consensus) -> None:
+        if aligns and to_align.reached(position):
+            evidence.append(gather(frame, consensus.before))
+        convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
+
+    consensus = agree(stages[-1], read, everything, extrinsic, taken_in)
+    of_networks = consensus.estimate()
+    final = estimate(consensus, of_networks, *convergence.latest)
+    convergence.end(final)
     return DriveEstimate(
-        estimate.camera_from_lidar,
-        estimate.covariance,
-        estimate.frames,
-        tuple(curve.points),
+        final.camera_from_lidar,
+        final.covariance,
+        final.frames,
+        tuple(convergence.points),
         skipped=len(everything) - len(consensus),
-        networks=consensus.estimate() if curve.aligns else None,
+        networks=of_networks if aligns else None,
     )
 
 
-class Curve:
-    """The estimate after more and more frames of the last pass.
-
-    Attributes:
-        aligns: whether edges are aligned; they pull no farther than what the finest stage leaves.
-        points: index of a frame, and the estimate up to it.
-    """
-
-    def __init__(self, frames: int, aligns: bool) -> None:
-        self.aligns, self.points = aligns, list[tuple[int, Estimate]]()
-        self._evidence = list[Evidence]()
-        self._to_align, self._to_note = spread(frames, FRAMES_ALIGNED), spread(frames, CURVE_POINTS)[:-1]
-        self._latest = 0
-
-    def note(self, position: int, frame: Frame, consensus: Consensus) -> None:
-        """Take in one more frame, the last one of ``consensus``."""
-        self._latest = frame.index
-        if self.aligns and due(self._to_align, position):
-            self._evidence.append(gather(frame, consensus.before))
-        if due(self._to_note, position):
-            self.points.append((frame.index, self._estimate(consensus, self._earlier)))
-
-    def end(self, consensus: Consensus) -> Estimate:
-        """The estimate of all frames; it is the last point of the curve."""
-        final = self._estimate(consensus, [consensus.estimate(), *self._earlier])
-        if self.points and self.points[-1][0] == self._latest:  # no frame after it could be calibrated
-            self.points.pop()
-        self.points.append((self._latest, final))
-        return final
-
-    @property
-    def _earlier(self) -> list[Estimate]:
-        return [estimate for _, estimate in self.points[-1:]]
-
-    def _estimate(self, consensus: Consensus, starts: list[Estimate]) -> Estimate:
-        return consensus.aligned(self._evidence, starts) if self.aligns else consensus.estimate()
-
-
-def due(positions: list[int], position: int) -> bool:
-    """Whether one of the sorted ``positions`` is reached; if so, those up to it are done.
-
-    A frame that fails is made up for by the next one that does not.
-    """
-    reached = bool(positions) and positions[0] <= position
-    while positions and positions[0] <= position:
-        positions.pop(0)
-    return reached
-
-
 def agree(
-    range_: MiscalibrationRange,
-    stage: OneStage,
+    stage: Looking,
     read: Callable[[int], Frame],
     positions: list[int],
     extrinsic: Extrinsic,
-    note: Callable[[int, Frame, Consensus], None] | None = None,
+    taken_in: Callable[[int, Frame, Consensus], None] | None = None,
 ) -> Consensus:
-    """What one stage makes of some frames of a drive; ``note`` is told after each that it could calibrate."""
+    """What one look of a stage at each of some frames of a drive comes to.
+
+    Args:
+        stage: that looks.
+        read: gives the frame at a position.
+        positions: of the frames.
+        extrinsic: under which it looks.
+        taken_in: called after each frame that could be calibrated, with its position and the consensus so far.
+
+    Raises:
+        CalibrationError: none of the frames could be calibrated.
+    """
     failure = None
-    consensus = Consensus(extrinsic, range_.information)
+    consensus = Consensus(extrinsic, stage.range.information)
     for position in positions:
         frame = read(position)
         try:
-            trace = confirmed(stage.calibrate(frame, extrinsic), frame).stages[0]
+            look = believed(stage.look(frame, stage.view(frame), extrinsic), stage.match_error_limit_px, frame)
         except CalibrationError as error:
             failure = error
             continue
-        consensus.add(trace.correction, trace.information)
-        if note is not None:
-            note(position, frame, consensus)
+        consensus.add(look.correction, look.information)
+        if taken_in is not None:
+            taken_in(position, frame, consensus)
     if failure is not None and not len(consensus):
         raise failure
     return consensus
 
 
-def confirmed(trace: CascadeTrace, frame: Frame) -> CascadeTrace:
-    """The trace, if picture and scan fit together.
+def believed(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
+    """The look, if picture and scan fit together.
 
     Raises:
         CalibrationError: they do not.
     """
-    if not trace.confirmed:
-        last, limit = trace.stages[-1], trace.match_error_limit_px
+    if look.match_error_px > limit_px:
         raise CalibrationError(
-            f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {last.number}, "
-            f"which expects its matches to be {last.match_error_px:.1f} px off (at most {limit:g}): "
+            f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {look.number}, "
+            f"which expects its matches to be {look.match_error_px:.1f} px off (at most {limit_px:g}): "
             "check that they belong together and that the start is within the range of the first stage."
         )
-    return trace
-
-
-def spread(count: int, most: int) -> list[int]:
-    """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
-    chosen = min(count, most)
-    return [(number + 1) * count // chosen - 1 for number in range(chosen)]
+    return look

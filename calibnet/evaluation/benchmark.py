@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from calibnet.cascade.cascade import Cascade, Stage
+from calibnet.cascade import Cascade, Stage
 from calibnet.datasets import Frame
+from calibnet.datasets.images import resize_image
 from calibnet.evaluation.runner import draw_miscalibration
+from calibnet.network.batch import lidar_input, make_batch
 from calibnet.runtime.precision import autocast, has_fast_bf16
-from calibnet.training.samples import collate, make_sample, plain
 
 BATCHES = (1, 4)
 """Frames at once of the networks' throughput."""
@@ -131,10 +132,15 @@ def benchmark(
 
 def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -> float:
     """Milliseconds a frame of one stage's network on ``size`` frames at once."""
-    config = stage.network.config
-    small = [plain(frame, stage.network.input_camera(frame.camera)) for frame in frames]
-    samples = [make_sample(small[number % len(small)], np.eye(4), config.volume_scales) for number in range(size)]
-    inputs = collate(samples)[0].to(cascade.device)
+    chosen = [frames[number % len(frames)] for number in range(size)]
+    cameras = [stage.camera(frame) for frame in chosen]
+    scans = [
+        lidar_input(frame.points, frame.camera_from_lidar, camera, stage.network.config.volume_scales)
+        for frame, camera in zip(chosen, cameras, strict=True)
+    ]
+    images = np.stack([resize_image(frame.image, camera) for frame, camera in zip(chosen, cameras, strict=True)])
+    image = torch.from_numpy(images).permute(0, 3, 1, 2).to(cascade.device)
+    inputs = make_batch(image, scans, [camera.matrix for camera in cameras])
     times = []
     with torch.inference_mode(), autocast(cascade.device):
         for run in range(WARM_UP + 5):

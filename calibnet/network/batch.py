@@ -1,11 +1,19 @@
-"""From a frame and an extrinsic to the network's input; one place for training and inference."""
+"""From frames under extrinsics to a batch of network inputs: the one place, for training and inference.
+
+Scanners look down more than cameras do: often a quarter of the picture and more holds no point. Those rows are cut off
+the LiDAR's side of a batch, and put back where results are shown; nothing outside this module counts them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+import torch
+import torch.nn.functional as F
 from numpy.typing import NDArray
+from torch import Tensor
 
 from calibnet.geometry import PinholeCamera, project
 from calibnet.geometry.projection import cells_of_points
@@ -27,24 +35,59 @@ class LidarInput(NamedTuple):
     cells: list[NDArray[np.float32]]
 
     @property
-    def empty_rows(self) -> int:
-        """Rows of the coarsest scale, from the top, that hold no point; all but one if there is none at all.
-
-        Scanners look down more than cameras do: often a quarter of the picture and more.
-        """
-        occupied = (self.cells[-1][2] > 0).any(axis=1)
-        return int(occupied.argmax()) if occupied.any() else len(occupied) - 1
-
-    def without_top(self, rows: int) -> LidarInput:
-        """Without so many rows of the coarsest scale: nothing is lost if they are empty, and work is saved."""
-        return LidarInput(
-            below(self.image, rows, self.cells[-1]), [below(cells, rows, self.cells[-1]) for cells in self.cells]
-        )
+    def occupied(self) -> NDArray[np.bool_]:
+        """Cells of the finest scale, ``[h, w]``, that hold a point."""
+        return self.cells[0][2] > 0
 
 
-def below(array: NDArray[Scalar], rows: int, coarsest: NDArray[np.float32]) -> NDArray[Scalar]:
-    """``[..., H, W]`` of any scale without its top, given in rows of ``coarsest [3, h, w]``."""
-    return array[..., rows * (array.shape[-2] // coarsest.shape[-2]) :, :]
+class NetworkInputs(NamedTuple):
+    """A batch of frames under their initial extrinsics, at the network's input size.
+
+    Attributes:
+        image: ``[B, 3, H, W]`` RGB 0..255, any dtype.
+        lidar: ``[B, 2, H', W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1, of the lowest ``H'``
+            rows of the image, see `Cut`.
+        intrinsics: ``[B, 3, 3]`` float32.
+        cells: per scale, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR point of
+            each cell in the camera frame, zeros where there is none.
+    """
+
+    image: Tensor
+    lidar: Tensor
+    intrinsics: Tensor
+    cells: list[Tensor]
+
+    def to(self, device: torch.device) -> NetworkInputs:
+        """The batch on another device."""
+        cells = [part.to(device) for part in self.cells]
+        return NetworkInputs(self.image.to(device), self.lidar.to(device), self.intrinsics.to(device), cells)
+
+
+class Cut(NamedTuple):
+    """Rows at the top of the picture that hold no point in any scan of a batch, and are left out of its LiDAR's side.
+
+    Attributes:
+        rows: how many, of the coarsest scale; at least one of its rows stays.
+        height: rows of the coarsest scale in all.
+    """
+
+    rows: int
+    height: int
+
+    @classmethod
+    def of(cls, scans: Sequence[LidarInput]) -> Cut:
+        """The cut that loses nothing of any of the scans."""
+        occupied = np.any([(scan.cells[-1][2] > 0).any(axis=1) for scan in scans], axis=0)
+        return cls(int(occupied.argmax()) if occupied.any() else len(occupied) - 1, len(occupied))
+
+    def apply(self, array: NDArray[Scalar]) -> NDArray[Scalar]:
+        """``[..., H, W]`` of any scale without these rows."""
+        return array[..., self.rows * (array.shape[-2] // self.height) :, :]
+
+    def undo(self, tensor: Tensor) -> Tensor:
+        """``[..., H', W]`` of any scale with these rows, which are zero: ``[..., H, W]``."""
+        missing = tensor.shape[-2] * self.rows // (self.height - self.rows)
+        return F.pad(tensor, (0, 0, missing, 0))
 
 
 def lidar_input(
@@ -64,3 +107,27 @@ def lidar_input(
 
     image = nearest(1, projection.depth, points[projection.index, 3])
     return LidarInput(image, [nearest(scale, *projection.points.T) for scale in scales])
+
+
+def make_batch(
+    image: Tensor, scans: Sequence[LidarInput], intrinsics: Sequence[NDArray[np.floating]], cut: Cut | None = None
+) -> NetworkInputs:
+    """Stack frames of one input size.
+
+    Args:
+        image: ``[B, 3, H, W]``; the batch lies on its device.
+        scans: of each frame, under its extrinsic.
+        intrinsics: ``[3, 3]`` of each frame's input camera.
+        cut: what to leave out of the scans; by default all rows above them.
+    """
+    cut = cut or Cut.of(scans)
+
+    def stack(arrays: Sequence[NDArray[np.generic]]) -> Tensor:
+        return torch.from_numpy(np.stack(arrays)).to(image.device)
+
+    return NetworkInputs(
+        image,
+        stack([cut.apply(scan.image) for scan in scans]),
+        stack([matrix.astype(np.float32) for matrix in intrinsics]),
+        [stack([cut.apply(cells) for cells in scale]) for scale in zip(*(scan.cells for scan in scans), strict=True)],
+    )

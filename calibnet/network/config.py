@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import math
 import tomllib
 from dataclasses import dataclass, fields
 from importlib import resources
 from typing import Any, Literal, get_args
 
 from calibnet.errors import ConfigError
-from calibnet.geometry import RANGES, MiscalibrationRange
 
 Head = Literal["geometric", "regression"]
 Normalization = Literal["group", "batch"]
@@ -44,10 +42,6 @@ class NetworkConfig:
     context_channels: int  # of the 2-D network that turns volumes into displacements
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
-    zooms: tuple[float, ...] = (1.0,) * len(RANGES)  # size of each stage's image, relative to the input's
-    largest_match_error: float = math.inf  # pixels that the last stage may expect its matches to be off, to be believed
-    looks: tuple[int, ...] = (1,) * len(RANGES)  # looks of each stage at most, each on the scan projected anew
-    gains: tuple[float, ...] = (1.0,) * len(RANGES)  # by which each stage's corrections are extended
     multi_scale_features: bool = True
     multi_scale_volumes: bool = True
     aggregation: bool = True
@@ -83,18 +77,6 @@ class NetworkConfig:
                 f"normalization must be one of {', '.join(get_args(Normalization))}",
             ),
             (
-                len(self.zooms) != len(RANGES) or min(self.zooms) <= 0,
-                f"zooms has one positive number a stage, {len(RANGES)} in all",
-            ),
-            (
-                len(self.looks) != len(RANGES) or min(self.looks) < 1,
-                f"looks has one number of at least 1 a stage, {len(RANGES)} in all",
-            ),
-            (
-                len(self.gains) != len(RANGES) or min(self.gains) <= 0,
-                f"gains has one positive number a stage, {len(RANGES)} in all",
-            ),
-            (
                 self.image_encoder not in get_args(ImageEncoder),
                 f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
             ),
@@ -109,26 +91,6 @@ class NetworkConfig:
         ):
             if wrong:
                 raise ConfigError(f"Preset {self.name!r}: {message}.")
-
-    def zoom(self, range_: MiscalibrationRange) -> float:
-        """Size of the image of the stage with this range, relative to the input's.
-
-        A wide range is about coarse things, and its search window has to reach far; a narrow one is about fractions
-        of a cell.
-        """
-        return dict(zip(RANGES, self.zooms, strict=True)).get(range_, 1.0)
-
-    def gain_of(self, range_: MiscalibrationRange) -> float:
-        """What the corrections of the stage with this range are multiplied by.
-
-        Trained to be least wrong on average, a network falls short where it is unsure; most of what is left then
-        lies in the direction in which it has gone.
-        """
-        return dict(zip(RANGES, self.gains, strict=True)).get(range_, 1.0)
-
-    def looks_of(self, range_: MiscalibrationRange) -> int:
-        """How often the stage with this range looks at most; another look costs its time again, from much nearer."""
-        return dict(zip(RANGES, self.looks, strict=True)).get(range_, 1)
 
     @property
     def volume_scales(self) -> tuple[int, ...]:

@@ -8,7 +8,8 @@ import torch
 from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
-from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.network.batch import NetworkInputs
+from calibnet.network.network import CalibrationNetwork
 
 
 class ModuleCost(NamedTuple):

@@ -28,7 +28,7 @@ WIDTHS = tuple(level[-1][1] for level in LEVELS)
 """Channels at 1/2, 1/4, 1/8 and 1/16. The blocks at 1/32, three quarters of its parameters, are left out."""
 
 WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensors"
-"""ImageNet weights, Apache-2.0; docs/training.md says how the file was made."""
+"""ImageNet weights, Apache-2.0; how the file was made stands in docs/weights.md, "The image encoder's conversion"."""
 
 
 class SameConv(Conv2d):

@@ -5,42 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-import torch
 from torch import Tensor, nn
 
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, range_of, scaled
-from calibnet.geometry.types import Transform
+from calibnet.geometry import MiscalibrationRange
 from calibnet.network.aggregation import Aggregation
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
 from calibnet.network.displacement import DisplacementDecoder, DisplacementField
 from calibnet.network.features import FeatureExtractor
 from calibnet.network.layers import channels_last
 from calibnet.network.pose import HEADS, Pose
-
-
-class NetworkInputs(NamedTuple):
-    """A batch of frames under their initial extrinsics, at the network's input size.
-
-    Attributes:
-        image: ``[B, 3, H, W]`` RGB 0..255, any dtype.
-        lidar: ``[B, 2, H', W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1. Of the lowest
-            ``H'`` rows, a multiple of the coarsest stride: those above them, which hold no point, may be left out.
-        intrinsics: ``[B, 3, 3]`` float32.
-        cells: per scale, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR point of
-            each cell in the camera frame, zeros where there is none.
-    """
-
-    image: Tensor
-    lidar: Tensor
-    intrinsics: Tensor
-    cells: list[Tensor]
-
-    def to(self, device: torch.device) -> NetworkInputs:
-        """The batch on another device."""
-        cells = [part.to(device) for part in self.cells]
-        return NetworkInputs(self.image.to(device), self.lidar.to(device), self.intrinsics.to(device), cells)
 
 
 class Activations(NamedTuple):
@@ -85,29 +60,6 @@ class CalibrationNetwork(nn.Module):
         self.displacement = DisplacementDecoder(config)
         self.pose = HEADS[config.head](config, range_)
         channels_last(self)
-
-    def input_camera(self, camera: PinholeCamera) -> PinholeCamera:
-        """The camera of this stage's image of a frame."""
-        config, zoom = self.config, self.config.zoom(self.range)
-        return camera.fitted(zoom * config.input_height, zoom * config.input_width, config.scales[-1])
-
-    @property
-    def looks(self) -> int:
-        """How often this stage runs at most, one look after the other."""
-        return self.config.looks_of(self.range)
-
-    def is_settled(self, correction: Transform) -> bool:
-        """Whether the next stage can take over: what this look corrected (4x4) is within that one's range."""
-        position = RANGES.index(self.range) if self.range in RANGES else len(RANGES)
-        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], range_of(correction)
-        return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
-
-    def correction(self, output: NetworkOutput) -> Transform:
-        """The 4x4 correction of the first frame of a batch, extended by the stage's gain."""
-        estimate = output.pose.correction[0].double().cpu().numpy()
-        if not np.isfinite(estimate).all():
-            return estimate.astype(np.float64)
-        return scaled(orthonormal(estimate), self.config.gain_of(self.range))
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:
         """Only the features and their raw matching scores ``[B, D, h_s, w_s]``: a sixth of the work of `forward`."""

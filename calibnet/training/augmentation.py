@@ -1,4 +1,4 @@
-"""Augmentations that vary the rig and the weather, and not only the view (DESIGN.md, prototype, 7).
+"""Augmentations that vary the rig and the weather, not only the view (docs/decisions.md, "Where the paper is silent").
 
 Real frames come from few rigs. A mirrored image, a camera turned about its centre, another lens and
 fewer beams are all exact: the same scene as another rig would have seen it.

@@ -12,7 +12,7 @@ from lightning_fabric.plugins.precision import MixedPrecision
 from torch.utils.data import Sampler
 
 from calibnet.errors import CalibnetError
-from calibnet.network.network import NetworkInputs
+from calibnet.network.batch import NetworkInputs
 from calibnet.runtime.interruption import SIGNALS
 from calibnet.runtime.precision import autocast
 from calibnet.training.losses import Target

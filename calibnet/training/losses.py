@@ -8,9 +8,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import TEMPERATURE
-from calibnet.network.network import NetworkInputs, NetworkOutput
+from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import project_points
 
 
@@ -19,7 +20,8 @@ class Target(NamedTuple):
 
     Attributes:
         correction: ``[B, 4, 4]`` that undoes the miscalibration.
-        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced besides; zero but in the warm-up.
+        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced besides; zero but where features
+            train alone.
         visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
             inside the image).
     """
@@ -27,6 +29,11 @@ class Target(NamedTuple):
     correction: Tensor
     shift: Tensor
     visible: list[Tensor]
+
+    @property
+    def of_features(self) -> bool:
+        """Whether the batch trains features alone: its LiDAR images are displaced, which no pose explains."""
+        return bool(self.shift.any())
 
 
 class Losses(NamedTuple):
@@ -64,13 +71,46 @@ def true_displacement(cells: Tensor, correction: Tensor, intrinsics: Tensor) -> 
     return offset.transpose(1, 2).unflatten(2, cells.shape[2:])
 
 
-def matching_loss(logits: Tensor, displacement: Tensor, visible: Tensor, stride: int, radius: int) -> Tensor:
+DEPTH_BANDS = (6.0, 9.0, 13.0, 20.0, 35.0)
+"""Metres between bands of depth that count alike in the matching loss, however many cells each of them holds.
+
+Shifts show in near cells, which are few; where all cells count alike, features learn to match far ones.
+"""
+RAREST_BAND = 0.02
+"""Share of the cells below which a band counts less than the others: few cells would be heard too loud."""
+
+
+def balanced(depth: Tensor, counted: Tensor, strength: float = 1.0) -> Tensor:
+    """Weights under which all bands of depth count alike.
+
+    Args:
+        depth: ``[...]`` metres.
+        counted: ``[...]`` bool: the cells that are weighted.
+        strength: 1 balances, 0 leaves all cells alike, between them a mixture.
+
+    Returns:
+        ``[...]`` weights: mean 1 over the cells that count, 0 for the others.
+    """
+    band = torch.bucketize(depth.contiguous(), depth.new_tensor(DEPTH_BANDS), right=True)
+    cells = torch.bincount(band[counted], minlength=len(DEPTH_BANDS) + 1)
+    total = cells.sum().clamp(min=1)
+    weight = counted / (cells / total).clamp(min=RAREST_BAND)[band]
+    weight = weight * (total / weight.sum().clamp(min=1e-6))
+    return strength * weight + (1 - strength) * counted
+
+
+def matching_loss(
+    logits: Tensor, displacement: Tensor, visible: Tensor, depth: Tensor, stride: int, radius: int
+) -> Tensor:
     """Cross-entropy over the window against the true displacement, spread over its four nearest cells.
+
+    All bands of depth count alike, see `balanced`.
 
     Args:
         logits: ``[B, D, h, w]``.
         displacement: ``[B, 2, h, w]`` true, in pixels.
         visible: ``[B, h, w]``; cells whose truth lies outside the window do not count either.
+        depth: ``[B, h, w]`` of the cells' points, metres.
         stride: pixels a cell.
         radius: of the window, in cells.
     """
@@ -87,7 +127,7 @@ def matching_loss(logits: Tensor, displacement: Tensor, visible: Tensor, stride:
             wy = fraction[:, 1] if dy else 1 - fraction[:, 1]
             index = ((corner[:, 1] + dy) * window + corner[:, 0] + dx).long()
             loss = loss - wx * wy * log_probability.gather(1, index[:, None])[:, 0]
-    return (loss * inside).sum() / inside.sum().clamp(min=1)
+    return (loss * balanced(depth, inside)).sum() / inside.sum().clamp(min=1)
 
 
 def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Tensor:
@@ -97,6 +137,7 @@ def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, con
             scale_logits,
             true_displacement(cells, target.correction, inputs.intrinsics) - target.shift[:, :, None, None],
             visible,
+            cells[:, 2],
             stride,
             config.radius,
         )
@@ -112,11 +153,15 @@ def feature_loss(scores: list[Tensor], inputs: NetworkInputs, target: Target, co
     return scores_loss([TEMPERATURE * score for score in scores], inputs, target, config)
 
 
-def displacement_loss(output: NetworkOutput, displacement: Tensor, visible: Tensor) -> Tensor:
-    """Laplace negative log-likelihood of the field, per axis, in units of pixels."""
+def displacement_loss(output: NetworkOutput, displacement: Tensor, visible: Tensor, depth: Tensor) -> Tensor:
+    """Laplace negative log-likelihood of the field, per axis, in units of pixels.
+
+    Half balanced over depth, as the pose is solved from all cells together.
+    """
     error = (output.field.displacement - displacement).abs()
     likelihood = error * torch.exp(-output.field.log_scale) + output.field.log_scale
-    return (likelihood * visible[:, None]).sum() / (2 * visible.sum().clamp(min=1))
+    weight = balanced(depth, visible, strength=0.5)
+    return (likelihood * weight[:, None]).sum() / (2 * visible.sum().clamp(min=1))
 
 
 def quaternion_angle(rotation: Tensor) -> Tensor:
@@ -145,7 +190,7 @@ def hybrid_loss(
         matching = 0.5 * feature_loss(output.scores, inputs, target, config)
         matching = matching + 0.5 * scores_loss(output.logits, inputs, target, config)
         truth_here = true_displacement(inputs.cells[0], truth, inputs.intrinsics)
-        field = displacement_loss(output, truth_here, target.visible[0])
+        field = displacement_loss(output, truth_here, target.visible[0], inputs.cells[0][:, 2])
         cloud = inputs.cells[-1].flatten(2).transpose(1, 2)
         occupied = cloud[..., 2] > 0
         distance = (move(estimate, cloud) - move(truth, cloud)).norm(dim=-1) * occupied

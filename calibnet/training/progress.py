@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,16 +36,18 @@ class Means:
 
     def __init__(self) -> None:
         self.sums: dict[str, float] = {}
-        self.count = 0
+        self.counts: dict[str, int] = {}
 
     def add(self, losses: Losses) -> None:
-        """Take one step's losses in."""
-        self.count += 1
+        """Take one step's losses in; what it does not tell, as features alone have no pose, is left out."""
         for name, value in losses._asdict().items():
-            self.sums[name] = self.sums.get(name, 0.0) + float(value.detach())
+            number = float(value.detach())
+            known = not math.isnan(number)
+            self.sums[name] = self.sums.get(name, 0.0) + (number if known else 0.0)
+            self.counts[name] = self.counts.get(name, 0) + known
 
     def take(self) -> dict[str, float]:
-        """The means since the last call."""
-        means = {name: total / max(1, self.count) for name, total in self.sums.items()}
-        self.sums, self.count = {}, 0
+        """The means since the last call; NaN where no step told."""
+        means = {name: total / (self.counts[name] or math.nan) for name, total in self.sums.items()}
+        self.sums, self.counts = {}, {}
         return means

@@ -34,7 +34,7 @@ def training_record(
         "commit": _commit(),
         "validation": figures._asdict() if figures else None,
         "licence_note": "Trained on KITTI (CC BY-NC-SA 3.0), nuScenes, RELLIS-3D and other frames, the image branch "
-        "of compact from EfficientNet-Lite0 (Apache-2.0): see the README.",
+        "of compact from EfficientNet-Lite0 (Apache-2.0): see docs/weights.md.",
     }
 
 

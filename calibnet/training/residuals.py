@@ -5,16 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import torch
 
-from calibnet.datasets.frame import Frame
-from calibnet.geometry import RANGES, MiscalibrationRange, sample_miscalibration
-from calibnet.geometry.miscalibration import range_of
+from calibnet.cascade.stage import Stage, load_stage
+from calibnet.errors import CalibrationError
+from calibnet.geometry import RANGES, MiscalibrationRange, invert, range_of, sample_miscalibration
 from calibnet.geometry.types import Transform
-from calibnet.network.network import CalibrationNetwork
-from calibnet.runtime.precision import autocast
-from calibnet.training.samples import TrainingSamples, collate, make_sample, plain
-from calibnet.weights import load_network, weights_path
+from calibnet.training.samples import TrainingSamples
+from calibnet.weights.manifest import load_manifest
 
 LARGEST_ROTATION, LARGEST_TRANSLATION = 3.0, 6.0
 """Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them.
@@ -23,24 +20,25 @@ A stage corrects less than it should of what is larger than all it has seen, so 
 """
 
 
-def stages_before(preset: str, range_: MiscalibrationRange, folder: Path) -> list[CalibrationNetwork]:
-    """The networks of wider ranges in ``folder``, coarse to fine; those without weights are left out."""
+def stages_before(preset: str, range_: MiscalibrationRange, folder: Path) -> list[Stage]:
+    """The stages of wider ranges in ``folder``, coarse to fine; those without weights are left out."""
+    manifest = load_manifest(preset, folder)
     wider = RANGES[: RANGES.index(range_)] if range_ in RANGES else ()
-    paths = [weights_path(preset, stage, folder) for stage in wider]
-    return [load_network(path) for path in paths if path.is_file()]
+    stages = [load_stage(number, manifest, folder) for number in range(1, len(wider) + 1)]
+    return [stage for stage in stages if stage is not None]
 
 
 def residual_errors(
-    networks: list[CalibrationNetwork],
+    stages: list[Stage],
     data: TrainingSamples,
     range_: MiscalibrationRange,
     count: int,
-    start: CalibrationNetwork | None = None,
+    start: Stage | None = None,
 ) -> list[Transform]:
-    """Errors ``correction @ delta`` (4x4) that the networks leave on ``count`` augmented training frames.
+    """Errors ``correction @ delta`` that the stages leave on ``count`` augmented training frames.
 
     Args:
-        networks: run one after the other, each from where the one before arrived.
+        stages: run one after the other, each from where the one before arrived.
         data: where frames come from.
         range_: of the stage to be trained.
         count: frames to run; what is lost altogether is left out of the result.
@@ -50,35 +48,23 @@ def residual_errors(
     residuals = []
     for number in range(count):
         frame = data.draw_frame(number, generator, 1.0, whole=True)
-        delta = sample_miscalibration(networks[0].range if networks else range_, generator)
-        for network in networks:
-            seen = plain(frame, network.input_camera(frame.camera))
-            for _ in range(network.looks):
-                correction = look(network, seen, delta)
-                delta = correction @ delta
-                if network.is_settled(correction):
-                    break
-        if networks and within(delta, range_):
-            residuals.append(delta)
-        if start is not None:
-            delta = look(start, plain(frame, start.input_camera(frame.camera)), delta) @ delta
-            if within(delta, range_):
-                residuals.append(delta)
+        reference = frame.camera_from_lidar
+        extrinsic = sample_miscalibration(stages[0].range if stages else range_, generator) @ reference
+        left = []
+        try:
+            for stage in stages:
+                extrinsic = stage.correct(frame, stage.view(frame), extrinsic).after
+            left += [extrinsic] if stages else []
+            if start is not None:
+                left.append(start.look(frame, start.view(frame), extrinsic).after)
+        except CalibrationError:  # too few points are left in the image: a lost frame
+            pass
+        residuals += [delta for after in left if within(delta := after @ invert(reference), range_)]
     return residuals
 
 
-def look(network: CalibrationNetwork, frame: Frame, delta: Transform) -> Transform:
-    """The correction (4x4) of one frame, already at input size, under ``delta @ camera_from_lidar``."""
-    inputs, _ = collate([make_sample(frame, delta, network.config.volume_scales)])
-    device = next(network.parameters()).device
-    with torch.inference_mode(), autocast(device):
-        return network.correction(network(inputs.to(device)))
-
-
 def within(delta: Transform, range_: MiscalibrationRange) -> bool:
-    """Whether an error is near enough to be corrected by a stage of these range_."""
-    if not np.isfinite(delta).all():
-        return False
+    """Whether an error is near enough to be corrected by a stage of this range."""
     error = range_of(delta)
     return (
         error.rotation_deg < LARGEST_ROTATION * range_.rotation_deg

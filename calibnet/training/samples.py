@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -11,25 +11,23 @@ from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
 from calibnet.datasets.frame import Frame, Sequence
-from calibnet.datasets.images import resize_image
 from calibnet.errors import DatasetError
 from calibnet.geometry import (
     MiscalibrationRange,
     PinholeCamera,
     invert,
     project,
-    sample_miscalibration,
     scaled,
     transform_points,
 )
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform
-from calibnet.network.batch import LidarInput, below, lidar_input
-from calibnet.network.network import NetworkInputs
+from calibnet.network.batch import Cut, LidarInput, NetworkInputs, lidar_input, make_batch
 from calibnet.training.augmentation import augment
+from calibnet.training.draws import draws_of
 from calibnet.training.losses import Target
 
-MINIMUM_CELLS = 40
+FEWEST_VISIBLE_CELLS = 40
 """Cells with a point below which a sample teaches nothing and another is drawn."""
 
 
@@ -78,7 +76,7 @@ def make_sample(
 ) -> Sample:
     """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
 
-    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: for the features' warm-up only,
+    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: only where features train alone,
     since no pose explains it.
     """
     displaced = frame.camera.matrix.copy()
@@ -97,30 +95,22 @@ def make_sample(
     )
 
 
-def plain(frame: Frame, camera: PinholeCamera) -> Frame:
-    """The frame as a network sees it whose ``input_camera`` is given, not augmented."""
-    return replace(frame, image=resize_image(frame.image, camera), camera=camera)
-
-
 def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
-    """Stack samples of one input size, without the rows at the top that hold no point in any of them."""
-    top = min(sample.lidar.empty_rows for sample in samples)
-    scans = [sample.lidar.without_top(top) for sample in samples]
-    visible = [[below(mask, top, s.lidar.cells[-1]) for mask in s.visible] for s in samples]
+    """Stack samples of one input size."""
+    scans = [sample.lidar for sample in samples]
+    cut = Cut.of(scans)
 
     def stack(arrays: Many[NDArray[np.generic]]) -> torch.Tensor:
         return torch.from_numpy(np.stack(arrays))
 
-    scales = range(len(samples[0].visible))
-    inputs = NetworkInputs(
-        stack([s.image for s in samples]).permute(0, 3, 1, 2),
-        stack([scan.image for scan in scans]),
-        stack([s.intrinsics for s in samples]),
-        [stack([scan.cells[scale] for scan in scans]) for scale in scales],
+    image = stack([sample.image for sample in samples]).permute(0, 3, 1, 2)
+    inputs = make_batch(image, scans, [sample.intrinsics for sample in samples], cut)
+    visible = zip(*(sample.visible for sample in samples), strict=True)
+    return inputs, Target(
+        stack([sample.correction for sample in samples]),
+        stack([sample.shift for sample in samples]),
+        [stack([cut.apply(mask) for mask in scale]) for scale in visible],
     )
-    truth = stack([s.correction for s in samples])
-    shift = stack([s.shift for s in samples])
-    return inputs, Target(truth, shift, [stack([masks[scale] for masks in visible]) for scale in scales])
 
 
 @dataclass(frozen=True)
@@ -142,10 +132,11 @@ class TrainingSamples(Dataset[Sample]):
     SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
     ATTEMPTS = 100
     EASIEST = 0.5  # strength of augmentation that the warm-up starts with
-    RESIDUAL_SHARE = 0.7  # of the miscalibrations, when the errors of the stages before are known
     OWN_SHARE = 0.4  # where there are none before: only what a stage's own first look leaves
     RESIDUAL_STRETCH = (0.7, 1.8)  # times as large as measured: frames never trained on leave more behind
-    LARGEST_SHIFT = 40.0  # pixels by which the warm-up displaces the LiDAR image
+    WARM_UP_SHIFT = 40.0  # pixels in x and y by which the warm-up displaces the LiDAR image at most
+    SHIFT = 24.0  # the same later on, in every batch that trains features alone
+    FEATURES_EVERY = 3  # of so many batches after the warm-up, one trains features alone; 0: none does
 
     def __init__(
         self,
@@ -160,9 +151,10 @@ class TrainingSamples(Dataset[Sample]):
     ) -> None:
         """A stream whose first ``warm_up`` samples are for the features alone.
 
-        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random.
-        Miscalibrations scatter around none, so "the match is where the cell is" is a good guess that
-        features pick up from the image's borders, and then stay with; the displacement makes it a bad one.
+        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random; so are
+        those of every third batch after them. Miscalibrations scatter around none, so "the match is where the cell is"
+        is a good guess that features pick up, from the image's borders and on the ground near the car, and then stay
+        with; the displacement makes it a bad one.
 
         A stage whose image is larger than ``area`` by the square of ``magnification`` is trained on cuttings of it.
         """
@@ -173,7 +165,9 @@ class TrainingSamples(Dataset[Sample]):
         factor = (area / (160 * 512)) ** 0.5
         self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
         self.residuals: list[Transform] = []
-        self.residual_share = self.RESIDUAL_SHARE
+        self.features_every = self.FEATURES_EVERY
+        self.draws = draws_of(range_)
+        self.residual_share = self.draws.residual_share
         self.cache: dict[tuple[int, int], Frame] = {}
 
     def read(self, source: int, position: int) -> Frame:
@@ -200,14 +194,22 @@ class TrainingSamples(Dataset[Sample]):
         generator = np.random.default_rng([self.seed, 2, number])
         for _ in range(self.ATTEMPTS):
             frame = self.draw_frame(number, generator, strength)
-            shift = generator.uniform(-self.LARGEST_SHIFT, self.LARGEST_SHIFT, 2) * (number < self.warm_up)
+            largest = self.largest_shift(number)
+            shift = generator.uniform(-largest, largest, 2)
             sample = make_sample(frame, self.draw(generator), self.scales, shift)
-            if sample.visible[0].sum() >= MINIMUM_CELLS:
+            if sample.visible[0].sum() >= FEWEST_VISIBLE_CELLS:
                 return sample
         raise DatasetError(
-            f"None of {self.ATTEMPTS} draws gave {MINIMUM_CELLS} cells with a visible LiDAR point, the last one from "
-            f"{frame.source}; check that the training data's calibration fits its scans."
+            f"None of {self.ATTEMPTS} draws gave {FEWEST_VISIBLE_CELLS} cells with a visible LiDAR point, the last one "
+            f"from {frame.source}; check that the training data's calibration fits its scans."
         )
+
+    def largest_shift(self, number: int) -> float:
+        """Pixels by which the LiDAR image of a sample is displaced at most: 0 but where features train alone."""
+        if number < self.warm_up:
+            return self.WARM_UP_SHIFT
+        every = self.features_every
+        return self.SHIFT if every and number // self.batch % every == every - 1 else 0.0
 
     def draw_frame(self, number: int, generator: np.random.Generator, strength: float, whole: bool = False) -> Frame:
         """An augmented frame at the size of sample ``number``; ``whole`` keeps the magnification out of it."""
@@ -225,13 +227,8 @@ class TrainingSamples(Dataset[Sample]):
                 return source
 
     def draw(self, generator: np.random.Generator) -> Transform:
-        """A miscalibration anywhere in the range, or, mostly, as the looks before leave behind.
-
-        Sometimes a small one, as a stage must also know when to stop.
-        """
+        """A miscalibration as `Draws` has them, or as the looks before leave behind."""
         if self.residuals and generator.random() < self.residual_share:
             residual = self.residuals[generator.integers(len(self.residuals))]
             return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
-        share = 1.0 if generator.random() < 0.7 else float(generator.uniform(0.03, 1.0))
-        range_ = MiscalibrationRange(self.range.rotation_deg * share, self.range.translation_m * share)
-        return sample_miscalibration(range_, generator)
+        return self.draws.uniform(generator)

@@ -14,10 +14,12 @@ from lightning_fabric import Fabric
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 from torch.utils.data import DataLoader
 
+from calibnet.cascade.stage import Stage
 from calibnet.errors import CalibrationError, ConfigError
-from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import load_preset
-from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.interruption import StopRequest
 from calibnet.training.batches import Batch, BatchNumbers, FloatInputs, leave_signals_to_main, next_batch
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
@@ -30,6 +32,7 @@ from calibnet.training.residuals import residual_errors, stages_before
 from calibnet.training.samples import TrainingSamples, collate
 from calibnet.training.validation import Validation, ValidationFigures
 from calibnet.weights import load_network, save_network, weights_path
+from calibnet.weights.manifest import StageEntry, load_manifest, manifest_path
 
 STOPPING = "Stopping after this step; once more stops at once."
 
@@ -81,16 +84,22 @@ class Trainer:
             self.warm_up = 0
         if options.samples:
             self.warm_up = min(self.warm_up, options.samples // 3)
-        zoom = config.zoom(self.range)
+        number = RANGES.index(self.range) + 1 if self.range in RANGES else 0
+        self.manifest = load_manifest(options.preset, self.folder)
+        settings = self.manifest.settings(self.range)
+        self.stage = Stage(number, self.range, self.network, settings)
+        zoom = settings.image_size
         area = config.input_height * config.input_width * min(zoom, 1.0) ** 2
         self.data = TrainingSamples(
             sources, self.range, config.volume_scales, area, options.batch, options.seed, self.warm_up, max(zoom, 1.0)
         )
+        if not config.hybrid_loss:
+            self.data.features_every = 0
         if options.after:
             self._draw_residuals(Path(options.after), start)
         self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(0.995))
         optimizer = torch.optim.AdamW(self._parameters(), lr=options.learning_rate, weight_decay=1e-4)
-        self.validation = Validation(held_out, self.network, 4, options.seed) if held_out else None
+        self.validation = Validation(held_out, self.stage, 4, options.seed) if held_out else None
         self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
         self.model.mark_forward_method("match")
         self.average.to(self.fabric.device)
@@ -122,11 +131,11 @@ class Trainer:
         Not so the look of a neighbour of which this stage starts, nor of a stage that looks only once.
         """
         before = stages_before(self.options.preset, self.range, folder)
-        looks_again = start is not None and start.range == self.range and start.looks > 1
-        if before or looks_again:
-            self.data.residuals = residual_errors(
-                before, self.data, self.range, self.RESIDUALS, start if looks_again else None
-            )
+        again = None
+        if start is not None and start.range == self.range and self.stage.settings.looks > 1:
+            again = replace(self.stage, network=start.to(self.fabric.device))
+        if before or again:
+            self.data.residuals = residual_errors(before, self.data, self.range, self.RESIDUALS, again)
         if not before:
             self.data.residual_share = self.data.OWN_SHARE
 
@@ -230,7 +239,7 @@ class Trainer:
 
     def _losses(self, inputs: NetworkInputs, target: Target) -> Losses:
         config = self.network.config
-        if self.samples < self.warm_up:
+        if target.of_features:
             return Losses.of_features(feature_loss(self.model.match(inputs), inputs, target, config))
         pose_share = min(1.0, (self.samples - self.warm_up) / self.POSE_RAMP) if self.warm_up else 1.0
         return hybrid_loss(self.model(inputs), inputs, target, config, pose_share)
@@ -263,4 +272,7 @@ class Trainer:
         path = weights_path(self.options.preset, self.range, self.folder)
         if self.fabric.is_global_zero:
             save_network(path, self.network, self.average.module.state_dict(), record)
+            validation = figures._asdict() if figures else {}
+            entry = StageEntry(self.range, path.name, self.stage.settings, self.folder.name, "", validation)
+            self.manifest.with_stage(entry).write(manifest_path(self.options.preset, self.folder))
         return path

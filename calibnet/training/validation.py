@@ -1,21 +1,24 @@
-"""Single-shot errors of one stage on held-out frames, under miscalibrations that never change."""
+"""Errors that one look of a stage leaves on held-out frames, under miscalibrations that never change."""
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
-from calibnet.datasets import Sequence
+from calibnet.cascade.stage import Stage
+from calibnet.datasets import Frame, Sequence
+from calibnet.datasets.images import resize_image
+from calibnet.errors import CalibrationError
 from calibnet.geometry import pose_error, sample_miscalibration
+from calibnet.geometry.types import Extrinsic
 from calibnet.network.network import CalibrationNetwork
-from calibnet.runtime.precision import autocast
-from calibnet.training.samples import Sample, collate, make_sample, plain
 
 
 class ValidationFigures(NamedTuple):
-    """Errors before and after one shot of the stage: medians, and the rotation's 95th percentile."""
+    """Errors before and after one look, its gain included: medians, and the rotation's 95th percentile."""
 
     initial_rotation_deg: float
     initial_translation_cm: float
@@ -26,33 +29,32 @@ class ValidationFigures(NamedTuple):
 
 
 class Validation:
-    """The held-out samples, prepared once."""
+    """The held-out frames with their miscalibrations, prepared once."""
 
-    def __init__(self, sequences: list[Sequence], network: CalibrationNetwork, repeats: int, seed: int) -> None:
-        config = network.config
+    def __init__(self, sequences: list[Sequence], stage: Stage, repeats: int, seed: int) -> None:
+        """Draw ``repeats`` miscalibrations of the stage's range for every frame."""
         generator = np.random.default_rng([seed, 3])
-        self.samples: list[Sample] = []
+        self.stage = stage
+        self.cases: list[tuple[Frame, Extrinsic]] = []
         for sequence in sequences:
             for frame in sequence:
-                small = plain(frame, network.input_camera(frame.camera))
-                self.samples += [
-                    make_sample(small, sample_miscalibration(network.range, generator), config.volume_scales)
-                    for _ in range(repeats)
-                ]
+                camera = stage.camera(frame)  # kept at the size the stage wants, which is smaller
+                small = replace(frame, image=resize_image(frame.image, camera), camera=camera)
+                deltas = [sample_miscalibration(stage.range, generator) for _ in range(repeats)]
+                self.cases += [(small, delta @ frame.camera_from_lidar) for delta in deltas]
 
     def __call__(self, network: CalibrationNetwork) -> ValidationFigures:
-        """Run the network over all samples, one by one as the cascade does."""
-        device = next(network.parameters()).device
+        """Look once at every frame with the stage's network as it is now, as the cascade does."""
+        stage = replace(self.stage, network=network)
         before, after = [], []
         training = network.training
         network.eval()
-        with torch.inference_mode(), autocast(device):
-            for sample in self.samples:
-                inputs, _ = collate([sample])
-                estimate = network(inputs.to(device)).pose.correction[0].double().cpu().numpy()
-                truth = sample.correction.astype(np.float64)
-                before.append(pose_error(np.eye(4), truth))
-                after.append(pose_error(estimate, truth))
+        for frame, initial in self.cases:
+            corrected = initial
+            with contextlib.suppress(CalibrationError):  # counts with its initial error
+                corrected = stage.look(frame, stage.view(frame), initial).after
+            before.append(pose_error(initial, frame.camera_from_lidar))
+            after.append(pose_error(corrected, frame.camera_from_lidar))
         network.train(training)
         rotation = [error.rotation_deg for error in after]
         return ValidationFigures(
@@ -61,5 +63,5 @@ class Validation:
             float(np.median(rotation)),
             float(np.median([error.translation_cm for error in after])),
             float(np.percentile(rotation, 95)),
-            len(self.samples),
+            len(self.cases),
         )

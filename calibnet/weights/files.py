@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.runtime.whole_file import write_whole
+from calibnet.weights.manifest import PACKAGE, load_manifest
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -17,12 +18,13 @@ if TYPE_CHECKING:
     from calibnet.network.network import CalibrationNetwork
 
 HEADER = "calib-inspect"
+MOVED = {"zooms", "rounds", "gains", "largest_match_error"}
+"""Keys of older headers that act no more: how a network is used is said by its manifest."""
 
 
 def weights_path(preset: str, range_: MiscalibrationRange, folder: Path | None = None) -> Path:
     """Where the weights of a preset's stage lie: in ``folder``, or in the package."""
-    name = f"{preset}-{range_.rotation_deg:g}deg-{range_.translation_m:g}m.safetensors"
-    return (folder or Path(__file__).parent) / name
+    return (folder or PACKAGE) / load_manifest(preset, folder).file(range_)
 
 
 def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tensor], record: dict[str, Any]) -> None:
@@ -95,9 +97,9 @@ def load_network(path: Path) -> CalibrationNetwork:
     from calibnet.network.network import CalibrationNetwork
 
     header = read_header(path)
-    header["config"] = {"looks" if key == "rounds" else key: value for key, value in header["config"].items()}
+    values = {key: value for key, value in header["config"].items() if key not in MOVED}
     try:
-        config = parse_config(header["config"], f"The header of {path}")
+        config = parse_config(values, f"The header of {path}")
         network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))
     except ConfigError as error:
         raise WeightsError(f"{error} Use the version of calib-inspect that wrote it, or train it again.") from None

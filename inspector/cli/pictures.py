@@ -1,4 +1,4 @@
-"""``calib-inspect pictures``: a picture of every tab of a recording, as the viewer shows it."""
+"""``calib-inspect pictures``: a picture of every tab of a recording, or one that moves from stage to stage."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from inspector.cli.options import FOLDER
+from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
 
 class SizeType(click.ParamType[tuple[int, int]]):
@@ -26,22 +27,43 @@ class SizeType(click.ParamType[tuple[int, int]]):
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path), metavar="RUN.rrd")
-@click.option("--out", type=FOLDER, required=True, metavar="DIR", help="Folder of the pictures; created if need be.")
+@click.argument("recording", type=RECORDING, metavar="RUN.rrd")
+@click.option("--out", type=FOLDER, metavar="DIR", help="Folder of the tabs' pictures; created if need be.")
 @click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Of the viewer's window.")
-@click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first]")
+@click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first; with --animate, three]")
 @click.option("--tab", "wanted", multiple=True, metavar="TEXT", help="Only tabs whose name contains this. Repeatable.")
-def pictures(recording: Path, out: Path, size: tuple[int, int], frame: int | None, wanted: tuple[str, ...]) -> None:
+@click.option(
+    "--animate",
+    type=OUTPUT_FILE,
+    metavar="FILE",
+    help="Write a moving picture (.webp or .gif) of frames before the calibration and after every stage.",
+)
+def pictures(
+    recording: Path,
+    out: Path | None,
+    size: tuple[int, int],
+    frame: int | None,
+    wanted: tuple[str, ...],
+    animate: Path | None,
+) -> None:
     """Take a picture of every tab of a recording in the real viewer, without a window.
 
-    Needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers).
+    That needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers). --animate needs none, and
+    takes no pictures of the tabs unless --out is given as well.
     """
-    from inspector.read.run import read_run
-    from inspector.read.screenshots import take_pictures
+    if out is None and animate is None:
+        raise click.UsageError("Give --out DIR for pictures of the tabs, --animate FILE for one that moves, or both.")
+    run = open_run(recording)
+    numbers = [recorded.index for recorded in run.frames]
+    if frame is not None and frame not in numbers:
+        raise click.UsageError(f"{recording} has no frame {frame}, only {numbers[0]} to {numbers[-1]}.")
+    if animate is not None:
+        from inspector.report.animation import spread, write_animation
 
-    numbers = [recorded.index for recorded in read_run(recording).frames]
-    shown = numbers[0] if frame is None else frame
-    if shown not in numbers:
-        raise click.UsageError(f"{recording} has no frame {shown}, only {numbers[0]} to {numbers[-1]}.")
-    for file in take_pictures(recording, out, size, shown, wanted):
-        click.echo(str(file))
+        write_animation(run, animate, spread(run) if frame is None else [frame])
+        click.echo(str(animate))
+    if out is not None:
+        from inspector.read.screenshots import take_pictures
+
+        for file in take_pictures(recording, out, size, numbers[0] if frame is None else frame, wanted):
+            click.echo(str(file))

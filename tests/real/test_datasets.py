@@ -1,4 +1,4 @@
-"""Every real frame beside the repository loads, and its points fall where the README says."""
+"""Every real frame beside the repository loads, and as many of its points fall into the image as that sensor has."""
 
 from __future__ import annotations
 

@@ -8,8 +8,9 @@ from typing import Any
 import torch
 
 from calibnet.geometry import RANGES
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
-from calibnet.network.network import CalibrationNetwork, NetworkInputs
+from calibnet.network.network import CalibrationNetwork
 
 TINY = NetworkConfig(
     name="tiny",

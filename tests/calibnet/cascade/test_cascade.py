@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,15 +11,16 @@ import torch
 from torch import Tensor
 
 from calibnet.alignment import Evidence
-from calibnet.cascade.cascade import Cascade, SkippedStage, Stage
+from calibnet.cascade import Cascade, SkippedStage, Stage
 from calibnet.datasets.frame import Frame
-from calibnet.drive.solve import LOOKS, due
+from calibnet.drive.convergence import Due
+from calibnet.drive.solve import LOOKS
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, pose_error, project, scaled
 from calibnet.network.features import FeatureExtractor
-from calibnet.network.network import CalibrationNetwork
 from calibnet.trace import CascadeTrace
 from calibnet.weights import save_network, weights_path
+from calibnet.weights.manifest import StageSettings
 from tests.support.scene import REFERENCE, make_frame
 from tests.support.tiny import TINY, tiny_network
 
@@ -30,14 +32,28 @@ def frame() -> Frame:
     return make_frame(3)
 
 
-def cascade(numbers: tuple[int, ...] = (3, 4, 5), shared: bool = True, **changes: Any) -> Cascade:
-    """Random networks; with ``shared``, all with the first one's image branch."""
+def cascade(
+    numbers: tuple[int, ...] = (3, 4, 5),
+    shared: bool = True,
+    limit: float = math.inf,
+    settings: dict[int, StageSettings] | None = None,
+    **changes: Any,
+) -> Cascade:
+    """Random networks; with ``shared``, all with the first one's image branch; settings by stage."""
     networks = [tiny_network(seed=number, stage=number, **changes) for number in numbers]
     if shared:
         branch = {k: v for k, v in networks[0].features.state_dict().items() if k.startswith("image_")}
         for network in networks[1:]:
             network.features.load_state_dict(branch, strict=False)
-    return Cascade([Stage(number, RANGES[number - 1], net) for number, net in zip(numbers, networks, strict=True)])
+    used = settings or {}
+    return Cascade(
+        [
+            Stage(
+                number, RANGES[number - 1], net, used.get(number, StageSettings()), limit if number == 5 else math.inf
+            )
+            for number, net in zip(numbers, networks, strict=True)
+        ]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,28 +79,31 @@ def test_stages_follow_one_another(trace: CascadeTrace) -> None:
 def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: CascadeTrace) -> None:
     last = trace.stages[-1]
     assert trace.confirmed and last.match_error_px > 0.5 and not np.array_equal(trace.corrected, INITIAL)
-    doubting = cascade(largest_match_error=last.match_error_px - 0.01).calibrate(frame, INITIAL)
+    doubting = cascade(limit=last.match_error_px - 0.01).calibrate(frame, INITIAL)
     assert not doubting.confirmed and np.array_equal(doubting.corrected, INITIAL)
     assert np.array_equal(doubting.stages[-1].after, trace.stages[-1].after), "what the stages found can be seen"
-    believing = cascade(largest_match_error=last.match_error_px + 0.01).calibrate(frame, INITIAL)
+    believing = cascade(limit=last.match_error_px + 0.01).calibrate(frame, INITIAL)
     assert believing.confirmed and np.array_equal(believing.corrected, trace.corrected)
 
 
 def test_corrections_are_extended_by_the_gain_of_their_stage(frame: Frame, trace: CascadeTrace) -> None:
-    plain, extended = trace.stages[0], cascade((3,), gains=(1, 1, 1.5, 1, 1)).calibrate(frame, INITIAL).stages[0]
+    plain, extended = (
+        trace.stages[0],
+        cascade((3,), settings={3: StageSettings(gain=1.5)}).calibrate(frame, INITIAL).stages[0],
+    )
     np.testing.assert_allclose(extended.correction, scaled(plain.correction, 1.5), atol=1e-9)
     np.testing.assert_allclose(extended.after, extended.correction @ INITIAL, atol=1e-12)
     assert np.linalg.norm(extended.correction[:3, 3]) == pytest.approx(1.5 * np.linalg.norm(plain.correction[:3, 3]))
 
 
 def test_only_the_finest_stage_judges(frame: Frame) -> None:
-    coarse = cascade((3, 4), largest_match_error=0.01).calibrate(frame, INITIAL)
+    coarse = cascade((3, 4), limit=0.01).calibrate(frame, INITIAL)
     assert coarse.confirmed and np.array_equal(coarse.corrected, coarse.stages[-1].after)
 
 
 def test_a_drive_of_pictures_that_fit_no_scan_has_no_estimate(frame: Frame) -> None:
     with pytest.raises(CalibrationError, match=r"scan of frame 3 .* do not fit together after stage 5, .* px off"):
-        cascade(largest_match_error=0.01).calibrate_drive([frame, frame], INITIAL)
+        cascade(limit=0.01).calibrate_drive([frame, frame], INITIAL)
 
 
 def test_detail_has_the_shapes_and_units_of_the_contract(trace: CascadeTrace, frame: Frame) -> None:
@@ -186,7 +205,9 @@ def test_image_features_are_computed_once_where_the_branch_is_shared(
 
 def test_stages_see_the_image_at_their_own_sizes(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_image_features(monkeypatch)
-    zooming = cascade((1, 2, 3, 4, 5), zooms=(0.5, 0.5, 1.0, 2.0, 2.0))
+    zooming = cascade(
+        (1, 2, 3, 4, 5), settings={n: StageSettings(size) for n, size in enumerate((0.5, 0.5, 1.0, 2.0, 2.0), 1)}
+    )
     trace = zooming.calibrate(frame, INITIAL, detail=True)
     assert len(calls) == 3, "one run of the image branch a size, not a stage"
     areas = [stage.camera.width * stage.camera.height for stage in trace.stages]
@@ -226,11 +247,11 @@ def test_rows_above_the_scan_are_spared_and_still_in_the_detail(frame: Frame, mo
 
 
 def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CalibrationNetwork, "is_settled", lambda network, correction: False)
+    monkeypatch.setattr(Stage, "is_settled", lambda stage, correction: False)
     first = cascade((3,)).calibrate(frame, INITIAL, detail=True)
     second = cascade((3,)).calibrate(frame, first.corrected)
     calls = count_image_features(monkeypatch)
-    both = cascade((3,), looks=(1, 1, 2, 1, 1)).calibrate(frame, INITIAL, detail=True)
+    both = cascade((3,), settings={3: StageSettings(looks=2)}).calibrate(frame, INITIAL, detail=True)
     assert len(calls) == 1, "the image is the same in both looks"
     (stage,) = both.stages
     np.testing.assert_allclose(stage.after, second.corrected, atol=1e-9)
@@ -245,12 +266,12 @@ def test_a_stage_looks_again_until_the_next_one_can_take_over(frame: Frame, monk
     once = cascade((3,)).calibrate(frame, INITIAL).stages[0]
     found: list[np.ndarray] = []
 
-    def is_settled(network: CalibrationNetwork, correction: np.ndarray) -> bool:
+    def is_settled(stage: Stage, correction: np.ndarray) -> bool:
         found.append(correction)
         return len(found) == 2
 
-    monkeypatch.setattr(CalibrationNetwork, "is_settled", is_settled)
-    stage = cascade((3,), looks=(1, 1, 5, 1, 1)).calibrate(frame, INITIAL).stages[0]
+    monkeypatch.setattr(Stage, "is_settled", is_settled)
+    stage = cascade((3,), settings={3: StageSettings(looks=5)}).calibrate(frame, INITIAL).stages[0]
     np.testing.assert_allclose(found[0], once.correction, atol=1e-9)
     np.testing.assert_allclose(found[1] @ found[0], stage.correction, atol=1e-9)
 
@@ -406,7 +427,7 @@ def test_edges_are_aligned_after_the_finest_stage_only(frame: Frame) -> None:
 
 def test_a_long_drive_notes_the_estimate_down_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("calibnet.drive.solve.FRAMES_ALIGNED", 2)
-    monkeypatch.setattr("calibnet.drive.solve.CURVE_POINTS", 2)
+    monkeypatch.setattr("calibnet.drive.convergence.POINTS", 2)
     gathered: list[int] = []
     monkeypatch.setattr("calibnet.drive.solve.gather", lambda frame, _: gathered.append(frame.index) or Evidence(()))
     estimate = cascade((5,)).calibrate_drive(Drive(5), INITIAL)
@@ -416,16 +437,15 @@ def test_a_long_drive_notes_the_estimate_down_now_and_then(monkeypatch: pytest.M
 
 
 def test_the_curve_of_a_drive_ends_at_its_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("calibnet.drive.solve.CURVE_POINTS", 2)
+    monkeypatch.setattr("calibnet.drive.convergence.POINTS", 2)
     estimate = cascade((5,)).calibrate_drive(Drive(4, blind=frozenset({3})), INITIAL)
     assert [(frame, then.frames) for frame, then in estimate.history] == [(11, 2), (12, 3)]
     np.testing.assert_array_equal(estimate.history[-1][1].camera_from_lidar, estimate.camera_from_lidar)
 
 
 def test_frames_that_fail_are_made_up_for_by_the_next() -> None:
-    positions = [1, 3, 4]
-    assert [due(positions, position) for position in (0, 2, 3, 5)] == [False, True, True, True]
-    assert positions == []
+    due = Due([1, 3, 4])
+    assert [due.reached(position) for position in (0, 2, 3, 5, 6)] == [False, True, True, True, False]
 
 
 def test_a_drive_without_a_usable_frame_is_an_error() -> None:
@@ -433,3 +453,23 @@ def test_a_drive_without_a_usable_frame_is_an_error() -> None:
         cascade().calibrate_drive(Drive(2, blind=frozenset({0, 1})), INITIAL)
     with pytest.raises(ValueError, match="no frames"):
         cascade().calibrate_drive([], INITIAL)
+
+
+@pytest.mark.parametrize(
+    ("stage", "angles", "offset", "settled"),
+    [
+        (1, [9.9, -9.9, 9.9], [0.9, -0.9, 0.9], True),
+        (1, [0, 0, 10.1], [0, 0, 0], False),
+        (1, [0, 0, 0], [0, -1.1, 0], False),
+        (3, [1.9, 0, 0], [0.19, 0, 0], True),
+        (3, [2.1, 0, 0], [0, 0, 0], False),
+        (5, [0.9, 0, 0], [0.09, 0, 0], True),
+        (5, [1.1, 0, 0], [0, 0, 0], False),
+    ],
+)
+def test_a_stage_is_settled_within_the_range_of_the_next(
+    stage: int, angles: list[float], offset: list[float], settled: bool
+) -> None:
+    assert (
+        Stage(stage, RANGES[stage - 1], tiny_network(stage=stage)).is_settled(miscalibration(angles, offset)) is settled
+    )

@@ -106,6 +106,10 @@ def test_no_frames_are_an_error() -> None:
         Consensus(REFERENCE, PRIOR).estimate()
 
 
+COMMON = np.diag(np.square([0.08] * 3 + [np.radians(0.12)] * 3))
+"""Covariance of what networks get wrong in all frames alike."""
+
+
 class Pull:
     """Evidence that pulls towards a correction."""
 
@@ -120,11 +124,10 @@ class Pull:
 def test_evidence_moves_what_frames_agree_on() -> None:
     consensus = drive(30)
     agreed, towards = consensus.estimate(), pose_vector(TRUTH) + np.array([0.05, 0, 0, 0, 0.001, 0])
-    still = consensus.aligned([])
+    still = consensus.aligned([], COMMON)
     np.testing.assert_allclose(still.camera_from_lidar, agreed.camera_from_lidar, atol=1e-9)
-    common = np.diag(np.square([0.08] * 3 + [np.radians(0.12)] * 3))
-    np.testing.assert_allclose(still.covariance, agreed.covariance + common, rtol=1e-6)
-    firm = consensus.aligned([Evidence((Pull(towards, 10.0),))], [agreed, still])
+    np.testing.assert_allclose(still.covariance, agreed.covariance + COMMON, rtol=1e-6)
+    firm = consensus.aligned([Evidence((Pull(towards, 10.0),))], COMMON, [agreed, still])
     target = pose_from_vector(towards) @ REFERENCE
     assert pose_error(firm.camera_from_lidar, target).translation_cm < 0.5
     assert pose_error(agreed.camera_from_lidar, target).translation_cm > 3
@@ -138,5 +141,5 @@ def test_frames_that_scatter_too_far_are_not_aligned() -> None:
         correction[0, 3] += shift
         consensus.add(correction, None)
     assert consensus.estimate().translation_cm > 30
-    pulled = consensus.aligned([Evidence((Pull(np.ones(6), 10.0),))])
+    pulled = consensus.aligned([Evidence((Pull(np.ones(6), 10.0),))], COMMON)
     np.testing.assert_allclose(pulled.camera_from_lidar, consensus.estimate().camera_from_lidar, atol=1e-6)

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 import pytest
 
 from calibnet.errors import ConfigError
-from calibnet.geometry import RANGES, MiscalibrationRange
 from calibnet.network.config import load_preset, parse_config, preset_names
 from tests.support.tiny import TINY
 
@@ -41,9 +40,6 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
         ({"hourglass_blocks": [1, 1, 1]}, "hourglass_blocks"),
         ({"head": "transformer"}, "geometric, regression"),
         ({"normalization": "layer"}, "group, batch"),
-        ({"zooms": [1.0, 1.0]}, "one positive number a stage, 5 in all"),
-        ({"zooms": [0.0, 1.0, 1.0, 1.0, 1.0]}, "one positive number a stage"),
-        ({"looks": [1, 1, 1, 0, 1]}, "one number of at least 1 a stage, 5 in all"),
         ({"widths": 8}, "mine.toml"),
     ],
 )
@@ -58,11 +54,3 @@ def test_missing_keys_are_named() -> None:
     del values["radius"], values["head"]
     with pytest.raises(ConfigError, match=r"mine.toml is not a complete network.*radius.*head"):
         parse_config(values, "mine.toml")
-
-
-def test_each_range_has_its_zoom_and_rounds_and_others_have_none() -> None:
-    config = replace(TINY, zooms=(0.5, 0.6, 1.0, 1.5, 2.0), looks=(3, 2, 1, 1, 2))
-    assert [config.looks_of(range_) for range_ in RANGES] == [3, 2, 1, 1, 2]
-    assert config.looks_of(MiscalibrationRange(7, 0.7)) == 1
-    assert [config.zoom(range_) for range_ in RANGES] == [0.5, 0.6, 1.0, 1.5, 2.0]
-    assert config.zoom(MiscalibrationRange(7, 0.7)) == 1.0

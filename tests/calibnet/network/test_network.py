@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from calibnet.geometry import RANGES, miscalibration
+from calibnet.geometry import RANGES
 from calibnet.network.aggregation import refinement
 from calibnet.network.config import load_preset
 from calibnet.network.cost_volume import band_index
@@ -133,21 +133,3 @@ def test_every_ablation_trains_every_parameter(preset: str, switch: str | None) 
     for name, parameter in network.named_parameters():
         assert parameter.grad is not None, f"{name} is in the network but not in use"
         assert parameter.grad.isfinite().all(), name
-
-
-@pytest.mark.parametrize(
-    ("stage", "angles", "offset", "settled"),
-    [
-        (1, [9.9, -9.9, 9.9], [0.9, -0.9, 0.9], True),
-        (1, [0, 0, 10.1], [0, 0, 0], False),
-        (1, [0, 0, 0], [0, -1.1, 0], False),
-        (3, [1.9, 0, 0], [0.19, 0, 0], True),
-        (3, [2.1, 0, 0], [0, 0, 0], False),
-        (5, [0.9, 0, 0], [0.09, 0, 0], True),
-        (5, [1.1, 0, 0], [0, 0, 0], False),
-    ],
-)
-def test_a_stage_is_settled_within_the_range_of_the_next(
-    stage: int, angles: list[float], offset: list[float], settled: bool
-) -> None:
-    assert tiny_network(stage=stage).is_settled(miscalibration(angles, offset)) is settled

@@ -8,12 +8,15 @@ import torch
 from torch import Tensor
 
 from calibnet.geometry import rotation_from_euler_xyz
+from calibnet.network.batch import NetworkInputs
 from calibnet.network.displacement import DisplacementField
-from calibnet.network.network import NetworkInputs, NetworkOutput
+from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import Pose
 from calibnet.training.losses import (
+    RAREST_BAND,
     Losses,
     Target,
+    balanced,
     displacement_loss,
     hybrid_loss,
     matching_loss,
@@ -142,7 +145,7 @@ def test_matching_is_least_at_the_true_cell() -> None:
     for cell in range(window**2):
         logits = torch.zeros(1, window**2, 1, 1)
         logits[0, cell] = 10.0
-        costs.append(float(matching_loss(logits, displacement, visible, stride, radius)))
+        costs.append(float(matching_loss(logits, displacement, visible, torch.full((1, 1, 1), 7.0), stride, radius)))
     true_cell = (radius - 2) * window + radius + 3
     assert int(np.argmin(costs)) == true_cell
     assert costs[true_cell] < 0.01 and min(np.delete(costs, true_cell)) > 5
@@ -151,7 +154,7 @@ def test_matching_is_least_at_the_true_cell() -> None:
 def test_matching_between_cells_asks_for_shares() -> None:
     displacement = torch.tensor([2.0, 4.0])[None, :, None, None]  # a quarter of a cell right, half a cell down
     logits = torch.zeros(1, 25, 1, 1, requires_grad=True)
-    matching_loss(logits, displacement, torch.ones(1, 1, 1, dtype=torch.bool), 8, 2).backward()
+    matching_loss(logits, displacement, torch.ones(1, 1, 1, dtype=torch.bool), torch.ones(1, 1, 1), 8, 2).backward()
     assert logits.grad is not None
     asked = (1 / 25 - logits.grad).reshape(5, 5)  # the gradient of a cross-entropy is softmax minus target
     expected = torch.zeros(5, 5)
@@ -163,7 +166,7 @@ def test_matching_between_cells_asks_for_shares() -> None:
 def test_matching_leaves_out_what_the_window_cannot_hold(displacement: tuple[float, float]) -> None:
     logits = torch.randn(1, 81, 2, 2, requires_grad=True)
     truth = torch.tensor(displacement)[None, :, None, None].expand(1, 2, 2, 2)
-    loss = matching_loss(logits, truth, torch.ones(1, 2, 2, dtype=torch.bool), 8, 4)
+    loss = matching_loss(logits, truth, torch.ones(1, 2, 2, dtype=torch.bool), torch.full((1, 2, 2), 7.0), 8, 4)
     loss.backward()
     assert loss == 0 and logits.grad is not None and logits.grad.abs().sum() == 0
 
@@ -173,8 +176,56 @@ def test_matching_counts_the_end_of_the_window_and_hidden_cells_not_at_all() -> 
     logits[0, 80, 0, 0] = 50.0  # the last displacement: 4 cells right, 4 down
     truth = torch.full((1, 2, 1, 2), 32.0)
     visible = torch.tensor([[[True, False]]])
-    assert float(matching_loss(logits, truth, visible, 8, 4)) == pytest.approx(0.0, abs=1e-3)
-    assert float(matching_loss(logits, truth, ~visible, 8, 4)) == pytest.approx(np.log(81), abs=1e-3)
+    depth = torch.tensor([[[7.0, 50.0]]])
+    assert float(matching_loss(logits, truth, visible, depth, 8, 4)) == pytest.approx(0.0, abs=1e-3)
+    assert float(matching_loss(logits, truth, ~visible, depth, 8, 4)) == pytest.approx(np.log(81), abs=1e-3)
+
+
+def test_bands_of_depth_count_alike() -> None:
+    depth = torch.tensor([3.0, 7.0, 7.5, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 10.0])
+    counted = torch.tensor([True] * 9 + [False])
+    weight = balanced(depth, counted)
+    # nine cells in three bands: each band weighs three, however many cells share that
+    torch.testing.assert_close(weight, torch.tensor([3.0, 1.5, 1.5, *[0.5] * 6, 0.0]))
+    torch.testing.assert_close(balanced(depth, counted, 0.5), torch.tensor([2.0, 1.25, 1.25, *[0.75] * 6, 0.0]))
+    torch.testing.assert_close(balanced(depth, counted, 0.0), counted.float())
+
+
+@pytest.mark.parametrize(("metres", "band"), [(5.9, 0), (6.0, 1), (8.9, 1), (9.0, 2), (13.0, 3), (20.0, 4), (35.0, 5)])
+def test_bands_end_at_their_metres(metres: float, band: int) -> None:
+    centres = torch.tensor([3.0, 7.5, 11.0, 16.0, 27.0, 50.0])
+    weight = balanced(torch.cat([centres, torch.tensor([metres])]), torch.ones(7, dtype=torch.bool))
+    assert [other for other in range(6) if weight[other] == weight[6]] == [band], "two cells share their band's weight"
+    assert weight[6] == weight[(band + 1) % 6] / 2
+
+
+def test_a_band_of_very_few_cells_is_not_heard_louder() -> None:
+    depth = torch.cat([torch.full((999,), 50.0), torch.tensor([3.0])])
+    weight = balanced(depth, torch.ones(1000, dtype=torch.bool))
+    assert float(weight.sum()) == pytest.approx(1000, rel=1e-5)
+    assert float(weight[-1] / weight[0]) == pytest.approx(0.999 / RAREST_BAND, rel=1e-4)
+
+
+def test_nothing_is_weighted_where_nothing_counts() -> None:
+    assert not balanced(torch.tensor([3.0, 50.0]), torch.tensor([False, False])).any()
+
+
+def test_matching_and_displacement_hear_the_near_cell_as_loud_as_all_far_ones() -> None:
+    depth, ones = torch.tensor([[[4.0, *[50.0] * 3]]]), torch.ones(1, 1, 4, dtype=torch.bool)
+    logits = torch.zeros(1, 81, 1, 4)
+    logits[0, 40, 0, 1:] = 50.0  # the far ones are sure of their place, which is right; the near one knows nothing
+    still = torch.zeros(1, 2, 1, 4)
+    assert float(matching_loss(logits, still, ones, depth, 8, 4)) == pytest.approx(np.log(81) / 2, rel=1e-3)
+    error = torch.zeros(1, 2, 1, 4)
+    error[..., 0] = 8.0  # half of the weight is balanced (2 of 4 for the near cell), half is not (1 of 4)
+    said = output(TRUTH)._replace(field=DisplacementField(error, torch.zeros_like(error), torch.empty(0)))
+    assert float(displacement_loss(said, still, ones, depth)) == pytest.approx(8.0 * (2 + 1) / 2 / 4)
+
+
+def test_a_displaced_batch_trains_features_alone() -> None:
+    _, target = inputs_and_target()
+    assert not target.of_features
+    assert target._replace(shift=torch.tensor([[0.0, -3.0]])).of_features
 
 
 def test_displacement_loss_rewards_honest_uncertainty() -> None:
@@ -183,7 +234,8 @@ def test_displacement_loss_rewards_honest_uncertainty() -> None:
     def cost(error: float, log_scale: float) -> float:
         field = DisplacementField(torch.full((1, 2, 1, 1), error), torch.full((1, 2, 1, 1), log_scale), torch.empty(0))
         said = made._replace(field=field)
-        return float(displacement_loss(said, torch.zeros(1, 2, 1, 1), torch.ones(1, 1, 1, dtype=torch.bool)))
+        one = torch.ones(1, 1, 1)
+        return float(displacement_loss(said, torch.zeros(1, 2, 1, 1), one.bool(), 7.0 * one))
 
     scales = np.linspace(-1, 4, 101)
     for error in (1.0, 5.0, 20.0):

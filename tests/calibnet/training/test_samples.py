@@ -9,11 +9,11 @@ import torch
 from calibnet.datasets.frame import Frame
 from calibnet.errors import DatasetError
 from calibnet.geometry import RANGES, invert, miscalibration, project, range_of
-from calibnet.network.batch import lidar_input
+from calibnet.network.batch import Cut, lidar_input
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.pose import GeometricHead
 from calibnet.training.losses import true_displacement
-from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, plain, visible_cells
+from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, visible_cells
 from tests.support.scene import REFERENCE, Scenes, make_frame
 from tests.support.tiny import TINY
 
@@ -62,8 +62,8 @@ def test_miscalibrations_fill_the_range_and_stay_in_it() -> None:
     samples, generator = stream(), np.random.default_rng(0)
     drawn = [range_of(samples.draw(generator)) for _ in range(400)]
     assert max(range_.rotation_deg for range_ in drawn) == pytest.approx(5.0, abs=0.05)
-    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.5, abs=0.005)
-    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.5001 for range_ in drawn)
+    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.9, abs=0.009)
+    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.9001 for range_ in drawn)
     assert sum(range_.rotation_deg < 2.0 for range_ in drawn) > 20, "a stage must also know when to stop"
 
 
@@ -112,11 +112,18 @@ def test_the_warm_up_displaces_the_lidar_image() -> None:
     assert np.array_equal(displaced.intrinsics, still.intrinsics)
 
 
-def test_only_the_warm_up_is_displaced() -> None:
-    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 4, 0, warm_up=5)
-    displaced = [bool(samples[number].shift.any()) for number in range(8)]
-    assert displaced == [True] * 5 + [False] * 3
-    assert np.abs([samples[number].shift for number in range(5)]).max() <= TrainingSamples.LARGEST_SHIFT
+def test_the_warm_up_and_every_third_batch_are_displaced() -> None:
+    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 2, 0, warm_up=3)
+    shifts = [np.abs(samples[number].shift).max() for number in range(12)]
+    assert [shift > 0 for shift in shifts] == [True] * 3 + [False, True, True] + [False] * 4 + [True] * 2
+    assert [samples.largest_shift(number) for number in (0, 2, 3, 4, 5, 6, 10, 11)] == [40, 40, 0, 24, 24, 0, 24, 24]
+    assert all(shift <= samples.largest_shift(number) for number, shift in enumerate(shifts))
+
+
+def test_no_batch_is_displaced_where_features_never_train_alone() -> None:
+    samples = stream()
+    samples.features_every = 0
+    assert [samples.largest_shift(number) for number in range(24)] == [0.0] * 24
 
 
 def test_collated_samples_keep_their_order_and_types() -> None:
@@ -133,7 +140,7 @@ def test_collated_samples_keep_their_order_and_types() -> None:
 def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
     frames = [make_frame(seed, 128, 128) for seed in range(2)]
     samples = [make_sample(lowered(frame, row), DELTA, SCALES) for frame, row in zip(frames, (100, 70), strict=True)]
-    assert [sample.lidar.empty_rows for sample in samples] == [3, 2]
+    assert [Cut.of([sample.lidar]).rows for sample in samples] == [3, 2]
     inputs, target = collate(samples)
     assert inputs.image.shape == (2, 3, 128, 128) and inputs.lidar.shape == (2, 2, 64, 128)
     for scale, cells, mask, position in zip(SCALES, inputs.cells, target.visible, range(3), strict=True):
@@ -141,14 +148,6 @@ def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
         for number, sample in enumerate(samples):
             assert np.array_equal(cells[number].numpy(), sample.lidar.cells[position][:, 64 // scale :])
             assert np.array_equal(mask[number].numpy(), sample.visible[position][64 // scale :])
-
-
-def test_plain_frames_have_the_size_of_inference() -> None:
-    large = make_frame(0, 621, 188)
-    frame = plain(large, large.camera.fitted(160, 512, 32))
-    assert frame.image.shape == (frame.camera.height, frame.camera.width, 3)
-    assert frame.image.shape[0] % 32 == frame.image.shape[1] % 32 == 0
-    assert np.array_equal(frame.camera_from_lidar, REFERENCE)
 
 
 def test_everything_is_visible_from_the_scanner_s_own_place() -> None:

@@ -16,6 +16,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from calibnet.datasets.images import resize_image
 from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
 from calibnet.network.efficientnet import load_weights
@@ -24,10 +25,11 @@ from calibnet.training import trainer as trainer_module
 from calibnet.training.losses import feature_loss
 from calibnet.training.options import TrainingOptions
 from calibnet.training.progress import Progress
-from calibnet.training.samples import Source, TrainingSamples, collate, make_sample, plain
+from calibnet.training.samples import Source, TrainingSamples, collate, make_sample
 from calibnet.training.trainer import Trainer
 from calibnet.training.validation import ValidationFigures
 from calibnet.weights import load_network, read_record, save_network
+from calibnet.weights.manifest import Manifest, StageEntry, StageSettings, manifest_path
 from tests.support.scene import Scenes, make_frame
 from tests.support.tiny import TINY
 
@@ -68,7 +70,11 @@ def held_out_matching(network: CalibrationNetwork) -> float:
     """The features' loss on scenes that are not trained on."""
     generator = np.random.default_rng(5)
     large = [make_frame(seed) for seed in range(90, 96)]
-    frames = [plain(frame, frame.camera.fitted(TINY.input_height, TINY.input_width, 32)) for frame in large]
+    cameras = [frame.camera.fitted(TINY.input_height, TINY.input_width, 32) for frame in large]
+    frames = [
+        replace(frame, image=resize_image(frame.image, camera), camera=camera)
+        for frame, camera in zip(large, cameras, strict=True)
+    ]
     inputs, target = collate(
         [
             make_sample(
@@ -219,14 +225,16 @@ def test_only_a_stage_that_starts_from_itself_and_looks_again_is_shown_what_its_
     tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def residuals(looks: int, initialize: str) -> tuple[int, float]:
-        monkeypatch.setattr(trainer_module, "load_preset", lambda name: replace(TINY, looks=(looks,) * 5))
         start = tmp_path / f"{looks}.safetensors"
-        network = CalibrationNetwork(replace(TINY, looks=(looks,) * 5), MiscalibrationRange.parse(initialize))
+        network = CalibrationNetwork(TINY, MiscalibrationRange.parse(initialize))
         save_network(start, network, network.state_dict(), {})
+        entry = StageEntry(MiscalibrationRange(5, 0.5), start.name, StageSettings(looks=looks))
+        Manifest("tiny").with_stage(entry).write(manifest_path("tiny", tmp_path / "out"))
         nothing_before = str(tmp_path / "empty")
         trainer = Trainer(options(tmp_path / "out", initialize=str(start), after=nothing_before), Watcher())
         return len(trainer.data.residuals), trainer.data.residual_share
 
+    (tmp_path / "out").mkdir()
     monkeypatch.setattr(Trainer, "RESIDUALS", 5)
     found, share = residuals(2, "5/0.5")
     assert found > 0 and share == TrainingSamples.OWN_SHARE, "the range itself stays the larger part"

@@ -2,10 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from calibnet.datasets.images import resize_image
 from calibnet.geometry import PinholeCamera, project, transform
-from calibnet.network.batch import lidar_input
+from calibnet.network.batch import Cut, lidar_input, make_batch
 
 CAMERA_FROM_LIDAR = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.05, -0.1, -0.2])
 
@@ -88,22 +89,25 @@ def test_no_point_in_view_gives_empty_inputs() -> None:
         assert lidar.image.dtype == np.float32 and all(cells.dtype == np.float32 for cells in lidar.cells)
 
 
-def test_rows_above_the_scan_can_be_left_out() -> None:
+def test_rows_above_the_scan_are_left_out_and_put_back() -> None:
     points, view = scan(3000), camera(128, 128)
     whole = lidar_input(points, CAMERA_FROM_LIDAR, view, (8, 16, 32))
-    assert whole.empty_rows == 0
+    assert Cut.of([whole]) == (0, 4)
     low = points[project(points, CAMERA_FROM_LIDAR, view).index]
     pixel = project(low, CAMERA_FROM_LIDAR, view)
     low = low[pixel.index[pixel.pixels[:, 1] > 70]]
     scanned = lidar_input(low, CAMERA_FROM_LIDAR, view, (8, 16, 32))
-    assert scanned.empty_rows == 2, "of four rows of 32 pixels, those above pixel 64"
-    part = scanned.without_top(2)
-    np.testing.assert_array_equal(part.image, scanned.image[:, 64:])
-    for scale, cells, cut in zip((8, 16, 32), scanned.cells, part.cells, strict=True):
-        np.testing.assert_array_equal(cut, cells[:, 64 // scale :])
-        assert not cells[:, : 64 // scale].any()
+    assert Cut.of([whole, scanned]) == (0, 4), "nothing is lost of any scan of a batch"
+    cut = Cut.of([scanned])
+    assert cut == (2, 4), "of four rows of 32 pixels, those above pixel 64"
+    batch = make_batch(torch.zeros(1, 3, 128, 128), [scanned], [view.matrix])
+    np.testing.assert_array_equal(batch.lidar[0].numpy(), scanned.image[:, 64:])
+    for scale, cells, rest in zip((8, 16, 32), scanned.cells, batch.cells, strict=True):
+        np.testing.assert_array_equal(rest[0].numpy(), cells[:, 64 // scale :])
+        np.testing.assert_array_equal(cut.undo(rest[0]).numpy(), cells)
 
 
 def test_a_scan_out_of_view_keeps_a_row() -> None:
     empty = lidar_input(np.zeros((0, 4), np.float32), CAMERA_FROM_LIDAR, camera(128, 128), (8, 16, 32))
-    assert empty.empty_rows == 3 and empty.without_top(3).cells[-1].shape == (3, 1, 4)
+    cut = Cut.of([empty])
+    assert cut == (3, 4) and cut.apply(empty.cells[-1]).shape == (3, 1, 4)

@@ -1,0 +1,174 @@
+"""One stage of the cascade: its network, and how it is used on a frame (paper section 3.5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from calibnet.cascade.stage_detail import stage_detail
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import resize_image
+from calibnet.errors import CalibrationError, WeightsError
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, range_of, scaled
+from calibnet.geometry.types import Extrinsic, Transform
+from calibnet.network.batch import Cut, lidar_input, make_batch
+from calibnet.network.convolution import pack
+from calibnet.network.displacement import expected_error
+from calibnet.network.network import CalibrationNetwork, NetworkOutput
+from calibnet.runtime.clock import Clock
+from calibnet.runtime.precision import autocast, fastest
+from calibnet.trace import StageTrace
+from calibnet.weights import load_network
+from calibnet.weights.manifest import Manifest, StageSettings
+
+FEWEST_CELLS = 20
+"""Cells with a LiDAR point below which a pose of six parameters would be a guess."""
+
+
+class View(NamedTuple):
+    """A frame's image at the size a stage wants, ``[1, 3, H, W]``, and what its image branch makes of it."""
+
+    image: Tensor
+    features: list[Tensor]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One network of the cascade.
+
+    Attributes:
+        number: 1 (coarsest) to 5 (finest).
+        range: what the network was trained for.
+        network: in evaluation mode.
+        settings: image size, looks and gain.
+        match_error_limit_px: what error the stage may expect of its matches, in pixels of its image, to be believed.
+    """
+
+    number: int
+    range: MiscalibrationRange
+    network: CalibrationNetwork
+    settings: StageSettings = field(default_factory=StageSettings)
+    match_error_limit_px: float = math.inf
+
+    @property
+    def device(self) -> torch.device:
+        """Where the network lies."""
+        return next(self.network.parameters()).device
+
+    def camera(self, frame: Frame) -> PinholeCamera:
+        """The camera of this stage's image of a frame."""
+        config, size = self.network.config, self.settings.image_size
+        return frame.camera.fitted(size * config.input_height, size * config.input_width, config.scales[-1])
+
+    @torch.inference_mode()
+    def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
+        """The frame's image as this stage sees it; ``clock`` hears ``"resize"`` and ``"image_features"``."""
+        with autocast(self.device):
+            image = torch.from_numpy(resize_image(frame.image, self.camera(frame)))
+            image = image.permute(2, 0, 1)[None].to(self.device)
+            clock("resize")
+            view = View(image, self.network.features.image(image))
+            clock("image_features")
+        return view
+
+    def correct(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+        """Look at a frame, and again from where that arrives, until the next stage can take over.
+
+        Args:
+            frame: scan and camera; its own extrinsic is not looked at.
+            view: its image, as `view` gives it.
+            before: the extrinsic to correct.
+            detail: keep the intermediate results of the first look.
+
+        Raises:
+            CalibrationError: see `look`.
+        """
+        look = trace = self.look(frame, view, before, detail)
+        for _ in range(self.settings.looks - 1):
+            if self.is_settled(look.correction):
+                break
+            look = self.look(frame, view, look.after)
+            trace = trace.followed_by(look)
+        return trace
+
+    @torch.inference_mode()
+    def look(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+        """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
+
+        Raises:
+            CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
+        """
+        clock, camera = Clock(self.device), self.camera(frame)
+        lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
+        if lidar.occupied.sum() < FEWEST_CELLS:
+            raise CalibrationError(
+                f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
+                f"stage {self.number}; check that the extrinsic maps LiDAR points (x forward, y left, z up) into the "
+                "camera (x right, y down, z forward)."
+            )
+        clock("projection")
+        cut = Cut.of([lidar])
+        inputs = make_batch(view.image, [lidar], [camera.matrix], cut)
+        with autocast(self.device):
+            output = self.network(inputs, view.features, keep_activations=detail, clock=clock)
+        correction = self._correction(output)
+        if not np.isfinite(correction).all():
+            raise CalibrationError(
+                f"Stage {self.number} found no finite correction for frame {frame.index} ({frame.source}); "
+                "train its weights again if this happens on every frame."
+            )
+        return StageTrace(
+            self.number,
+            self.range,
+            camera,
+            before,
+            correction @ before,
+            correction,
+            clock.parts,
+            None if output.pose.information is None else output.pose.information[0].double().cpu().numpy(),
+            stage_detail(self.network.config, lidar, cut, output) if detail else None,
+            float(expected_error(output.field, inputs.cells[0])[0]),
+        )
+
+    def is_settled(self, correction: Transform) -> bool:
+        """Whether the next stage can take over: what a look has corrected is within that stage's range."""
+        position = RANGES.index(self.range) if self.range in RANGES else len(RANGES)
+        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], range_of(correction)
+        return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
+
+    def _correction(self, output: NetworkOutput) -> Transform:
+        """The correction of a batch of one, extended by the stage's gain."""
+        estimate: Transform = output.pose.correction[0].double().cpu().numpy()
+        return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
+
+
+def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
+    """The stage of a set of weights, ready to run; None where the set has none.
+
+    Args:
+        number: 1 (coarsest) to 5 (finest).
+        manifest: of the set.
+        folder: where its files lie.
+
+    Raises:
+        WeightsError: the file cannot be used, or holds another stage.
+    """
+    range_ = RANGES[number - 1]
+    path = folder / manifest.file(range_)
+    if not path.is_file():
+        return None
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    network = load_network(path).to(device)
+    if network.range != range_:
+        raise WeightsError(f"{path} holds the weights of range {network.range}; give it its own name back.")
+    pack(network, fastest(device))
+    # the coarser stages' matches are coarse anyway, and the next stage looks again: only the finest one judges
+    limit = manifest.match_error_limit_px if is_finest(range_) else math.inf
+    return Stage(number, range_, network, manifest.settings(range_), limit)

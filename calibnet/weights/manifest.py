@@ -1,0 +1,163 @@
+"""What acts when a set of weights runs, in one readable file: ``PRESET.toml`` beside its safetensors.
+
+The networks' tensors are in the safetensors; how they are used (image size, looks, gain, which matches are believed)
+is here and nowhere else, to be read and changed in any editor.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calibnet.errors import ConfigError, WeightsError
+from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.types import Matrix6
+from calibnet.runtime.whole_file import write_whole
+
+PACKAGE = Path(__file__).parent
+"""Where the weights that ship with the package lie."""
+
+
+@dataclass(frozen=True)
+class StageSettings:
+    """How the network of a stage is used.
+
+    Attributes:
+        image_size: width and height of the stage's image, relative to the preset's input size. A wide range is about
+            coarse things, and its search window has to reach far; a narrow one is about fractions of a cell.
+        looks: how often the stage looks at most, each time at the scan projected anew.
+        gain: what its corrections are multiplied by. Trained to be least wrong on average, a network falls short
+            where it is unsure; most of what is left then lies in the direction in which it has gone.
+    """
+
+    image_size: float = 1.0
+    looks: int = 1
+    gain: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.image_size > 0 and self.gain > 0 and self.looks >= 1):
+            raise ConfigError(
+                f"image_size ({self.image_size:g}) and gain ({self.gain:g}) must be positive, and looks ({self.looks}) "
+                "at least 1."
+            )
+
+
+@dataclass(frozen=True)
+class StageEntry:
+    """A stage of a set.
+
+    Attributes:
+        range: what its network was trained for.
+        file: name of its weights, in the manifest's folder.
+        settings: how it is used.
+        run: number or name of the training run that made it.
+        recipe: that run in a sentence.
+        validation: figures of one look on the validation frames, as `calibnet.training.validation` measures them.
+    """
+
+    range: MiscalibrationRange
+    file: str
+    settings: StageSettings = field(default_factory=StageSettings)
+    run: str = ""
+    recipe: str = ""
+    validation: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A set of weights: the stages of one preset, and what holds for all of them.
+
+    Attributes:
+        preset: name of the network's preset.
+        match_error_limit_px: error, in pixels of its image, that the finest stage may expect of its matches; beyond
+            it, picture and scan are taken not to fit together.
+        common_rotation_deg: standard deviation, an axis, of what the networks get wrong in all frames of a drive alike.
+        common_translation_m: likewise of the translation.
+        stages: in any order.
+    """
+
+    preset: str
+    match_error_limit_px: float = math.inf
+    common_rotation_deg: float = 0.12
+    common_translation_m: float = 0.08
+    stages: tuple[StageEntry, ...] = ()
+
+    def settings(self, range_: MiscalibrationRange) -> StageSettings:
+        """How the stage of a range is used; as it comes where the set has no such stage."""
+        return next((entry.settings for entry in self.stages if entry.range == range_), StageSettings())
+
+    def file(self, range_: MiscalibrationRange) -> str:
+        """Name of the weights of a stage."""
+        return next((entry.file for entry in self.stages if entry.range == range_), file_name(self.preset, range_))
+
+    @property
+    def common(self) -> Matrix6:
+        """Covariance of what the networks get wrong in all frames of a drive alike."""
+        sigma = [self.common_translation_m] * 3 + [float(np.radians(self.common_rotation_deg))] * 3
+        return np.diag(np.square(sigma))
+
+    def with_stage(self, entry: StageEntry) -> Manifest:
+        """The set with this stage added, or in the place of the one with its range."""
+        others = [stage for stage in self.stages if stage.range != entry.range]
+        return replace(self, stages=tuple(sorted([*others, entry], key=lambda stage: stage.range, reverse=True)))
+
+    def write(self, path: Path) -> None:
+        """Write the manifest as TOML."""
+        import tomli_w
+
+        content = {key: value for key, value in asdict(self).items() if key != "stages"}
+        if math.isinf(self.match_error_limit_px):
+            del content["match_error_limit_px"]
+        stages = [
+            {"range": str(entry.range), "file": entry.file, **asdict(entry.settings), "run": entry.run}
+            | ({"recipe": entry.recipe} if entry.recipe else {})
+            | ({"validation": entry.validation} if entry.validation else {})
+            for entry in self.stages
+        ]
+        write_whole(path, tomli_w.dumps({**content, "stages": stages}).encode())
+
+
+def file_name(preset: str, range_: MiscalibrationRange) -> str:
+    """What the weights of a stage are called where no manifest says otherwise."""
+    return f"{preset}-{range_.rotation_deg:g}deg-{range_.translation_m:g}m.safetensors"
+
+
+def manifest_path(preset: str, folder: Path | None = None) -> Path:
+    """Where the manifest of a preset's weights lies: in ``folder``, or in the package."""
+    return (folder or PACKAGE) / f"{preset}.toml"
+
+
+def load_manifest(preset: str, folder: Path | None = None) -> Manifest:
+    """The manifest of a preset's weights.
+
+    A folder without one is used as the weights that ship with the package are; where there are none of this preset
+    either, every stage looks once, at the preset's input size.
+
+    Raises:
+        WeightsError: a manifest is malformed; the message names the file and the key.
+    """
+    path = next((path for path in (manifest_path(preset, folder), manifest_path(preset)) if path.is_file()), None)
+    if path is None:
+        return Manifest(preset)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        stages = tuple(_entry(stage) for stage in content.pop("stages", []))
+        manifest = Manifest(**content, stages=stages)
+    except (TypeError, KeyError, ValueError, ConfigError) as error:
+        raise WeightsError(
+            f"{path} is no manifest of weights ({error}); compare it with the one that ships with the package."
+        ) from None
+    if manifest.preset != preset:
+        raise WeightsError(f"{path} is the manifest of preset {manifest.preset}, not of {preset}; rename or mend it.")
+    return manifest
+
+
+def _entry(content: dict[str, Any]) -> StageEntry:
+    range_ = MiscalibrationRange.parse(content.pop("range"))
+    settings = {key: content.pop(key) for key in ("image_size", "looks", "gain") if key in content}
+    return StageEntry(range_, settings=StageSettings(**settings), **content)
