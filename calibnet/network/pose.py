@@ -187,10 +187,3 @@ def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
     by_rotation = [-xy, -1 - y * y, 1 + x * x, xy, -y, x]
     focal = intrinsics.diagonal(dim1=1, dim2=2)[:, None, :2, None]
     return torch.stack([*by_translation, *by_rotation], dim=1).unflatten(1, (6, 2)) * focal
-
-
-HEADS: dict[str, type[RegressionHead] | type[GeometricHead]] = {
-    "regression": RegressionHead,
-    "geometric": GeometricHead,
-}
-"""Pose heads by the name a preset uses; a new head is a class with the same `forward` and a line here."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.datasets import DATASETS, PickedFrames, Sequence, open_sequence, select_frames
+from calibnet.datasets import PickedFrames, Sequence, dataset_names, open_sequence, select_frames
+from calibnet.methods.registry import METHODS, open_method
 from inspector.cli.options import FOLDER, FRAMES, RANGE, STAGES
 from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
 
@@ -19,14 +20,14 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--dataset", type=click.Choice(list(DATASETS)), required=True, help="What --root holds.")
+@click.option("--dataset", type=click.Choice(dataset_names()), required=True, help="What --root holds.")
 @click.option("--root", type=click.Path(path_type=Path), required=True, help="The dataset's folder.")
 @click.option(
     "--sequences",
     multiple=True,
     metavar="NAME [NAME]...",
-    help="Numbers (kitti-odometry), DATE/DRIVE (kitti-raw), splits (kitti-object), folders below --root (folder; "
-    "without it --root itself).",
+    help="Numbers (kitti-odometry), DATE/DRIVE (kitti-raw), splits (kitti-object), folders below --root (folder and "
+    "the datasets of other packages; without it --root itself).",
 )
 @click.argument("more", nargs=-1, metavar="")
 @click.option("--camera", type=click.IntRange(0, 3), help="Camera of the KITTI datasets.  [default: 2]")
@@ -40,6 +41,13 @@ if TYPE_CHECKING:
 @click.option("--audit", is_flag=True, help="Again with the image swapped, with a grey one, and with fewer rings.")
 @click.option("--drives/--no-drives", default=True, help="Also solve every drive from all its frames.  [default: yes]")
 @click.option("--classical/--no-classical", default=True, help="Also a refinement without training.  [default: yes]")
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    type=click.Choice(METHODS.names()),
+    help="Another method, on the same single frames. Repeatable.",
+)
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 def evaluate(
     dataset: str,
@@ -57,6 +65,7 @@ def evaluate(
     audit: bool,
     drives: bool,
     classical: bool,
+    methods: tuple[str, ...],
     json_file: str | None,
 ) -> None:
     """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
@@ -75,22 +84,24 @@ def evaluate(
 
     from calibnet.cascade.cascade import Cascade
     from calibnet.datasets.discovery import find_sequences
-    from calibnet.evaluation.measure import measure
+    from calibnet.evaluation import measure as measuring
     from calibnet.geometry import stages_within
     from inspector.cli.evaluation_tables import print_evaluation
 
     cascade = Cascade.load(preset, stages or stages_within(range_), weights)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
+    references = measuring.classical(range_) if classical else {}
+    references |= {name: open_method(name, range_) for name in methods}
     console = console_beside(json_file)
     with Bars() as bars:
-        evaluation = measure(
+        evaluation = measuring.measure(
             cascade,
             opened,
             range_,
             repeats,
             seed,
-            references=None if classical else {},
+            references=references,
             drives=drives,
             audit=audit,
             beside=lambda: find_sequences(dataset, root),
@@ -103,7 +114,7 @@ def evaluate(
 def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:
     """Open what ``--sequences`` names; each dataset calls its parts differently."""
     options = {} if camera is None else {"camera": camera}
-    if dataset == "folder":
+    if dataset not in ("kitti-odometry", "kitti-raw", "kitti-object"):
         return [open_sequence(dataset, root / part, **options) for part in parts or ["."]]
     if dataset == "kitti-object":
         return [open_sequence(dataset, root, split=part, **options) for part in parts or ["training"]]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.datasets import dataset_names
 from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER
 from inspector.cli.run import calibrate, run_options
@@ -75,8 +76,15 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
 @click.command()
 @click.argument("directory", type=FOLDER)
+@click.option(
+    "--dataset",
+    type=click.Choice([name for name in dataset_names() if not name.startswith("kitti-")]),
+    default="folder",
+    show_default=True,
+    help="What the folder holds; packages can add to these.",
+)
 @run_options
-def folder(directory: Path, **asked: Any) -> int:
+def folder(directory: Path, dataset: str, **asked: Any) -> int:
     """Calibrate your own images/, clouds/ and calibration.yaml.
 
     Without --range and --miscalibrate the calibration.yaml is what is to be corrected; with them it
@@ -85,7 +93,7 @@ def folder(directory: Path, **asked: Any) -> int:
     from calibnet.datasets import open_sequence
 
     as_is = asked["range"] is None and asked["miscalibration"] is None
-    return calibrate(open_sequence("folder", directory), as_is=as_is, **asked)
+    return calibrate(open_sequence(dataset, directory), as_is=as_is, **asked)
 
 
 @click.command()

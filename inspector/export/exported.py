@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,14 @@ from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
 
 
+class FrameNames(NamedTuple):
+    """What a robot calls the two coordinate frames, and whether the LiDAR's is the parent; for formats that say it."""
+
+    camera: str = "camera_optical_frame"
+    lidar: str = "lidar"
+    lidar_is_parent: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class Exported:
     """A calibration on its way to another tool.
@@ -24,12 +33,14 @@ class Exported:
         camera: intrinsics; of the rectified images.
         distortion: OpenCV's coefficients of the raw images; zeros where the images are rectified already.
         origin: where it comes from, for the file's comment.
+        frames: names of the two coordinate frames.
     """
 
     camera_from_lidar: Extrinsic = field(repr=False)
     camera: PinholeCamera
     distortion: Floats = field(repr=False)
     origin: str
+    frames: FrameNames = field(default_factory=FrameNames)
 
 
 def exported_frame(run: RecordedRun, index: int) -> Exported:
