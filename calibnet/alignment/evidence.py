@@ -43,7 +43,7 @@ REFLECTANCE_JUMP = 0.3
 """A point is at an edge of reflectance if this share of the scan's points lies between its reflectance and that of a
 darker neighbour."""
 FEWEST_POINTS, ENOUGH_POINTS = 30, 100
-"""Points of a term: with fewer than the first it is left out; with fewer than the second it weighs less in proportion."""
+"""Points of a term: with fewer than the first it is left out; with fewer than the second it weighs less accordingly."""
 MOST_POINTS = 2000
 """Points of a term at most; more are thinned out evenly."""
 BINS = 16

@@ -14,7 +14,7 @@ ITERATIONS = 200
 SETTLED = 1e-13
 """Move of the median, in the points' unit, below which it has settled."""
 SMOOTHING = 1e-4
-"""A point's pull on the median stops growing at this share of the median distance; at the point it would be infinite."""
+"""A point's pull stops growing at this share of the median distance: at the point itself it would be infinite."""
 SMALLEST = 1e-12
 """The distance at which it stops where all points are the same, in their unit."""
 RECENTRINGS = 3
