@@ -12,8 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import MiscalibrationRange, PinholeCamera
+from calibnet.geometry import MiscalibrationRange, PinholeCamera, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+
+MARGIN = 1.2
+"""How far a calibration may end from its start, relative to the range that was searched, to be believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +111,7 @@ class CascadeTrace:
         initial: ``camera_from_lidar`` the run started from, 4x4.
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (resizing, image features).
+        wider: stages of wider ranges that ran before them, because a first try left the range it searched.
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
     """
 
@@ -115,16 +119,37 @@ class CascadeTrace:
     stages: tuple[StageTrace, ...]
     milliseconds: dict[str, float] = field(default_factory=dict)
     match_error_limit_px: float = math.inf
+    wider: tuple[StageTrace, ...] = ()
 
     @property
-    def confirmed(self) -> bool:
-        """Whether picture and scan fit together under what the stages found; true where the last one cannot tell."""
+    def searched(self) -> MiscalibrationRange | None:
+        """The range that was searched around the initial extrinsic: the first stage's; None where no stage ran."""
+        return next((stage.range for stage in (*self.wider, *self.stages)), None)
+
+    @property
+    def arrived(self) -> Extrinsic:
+        """``camera_from_lidar`` after the last stage, whether or not it is believed."""
+        return self.stages[-1].after if self.stages else self.initial
+
+    @property
+    def stayed(self) -> bool:
+        """Whether that lies within the range that was searched."""
+        return self.searched is None or self.searched.contains(self.arrived @ invert(self.initial), MARGIN)
+
+    @property
+    def fits(self) -> bool:
+        """Whether picture and scan fit together there; true where the last stage cannot tell."""
         return not self.stages or not self.stages[-1].match_error_px > self.match_error_limit_px
 
     @property
+    def confirmed(self) -> bool:
+        """Whether what the stages found is believed."""
+        return self.fits and self.stayed
+
+    @property
     def corrected(self) -> Extrinsic:
-        """``camera_from_lidar`` after the last stage; the initial one where the picture does not confirm that."""
-        return self.stages[-1].after if self.stages and self.confirmed else self.initial
+        """``camera_from_lidar`` after the last stage; the initial one where that is not believed."""
+        return self.arrived if self.confirmed else self.initial
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,10 @@
-"""What one frame has to say of its extrinsic, without training.
+"""The evidence of one frame for its extrinsic, without training.
 
 Depth edges: after Levinson & Thrun, "Automatic online calibration of cameras and lasers" (2013), points behind
 which the scene falls away belong onto edges of the picture. Edges of reflectance (road markings, signs, plates)
 likewise. Reflectance as a whole: after Pandey et al., "Automatic targetless extrinsic calibration" (2012), and
-Koide et al., "General, single-shot, target-less" (2023), it tells most of the picture's brightness where it fits,
-measured by the normalised information distance.
+Koide et al., "General, single-shot, target-less" (2023), reflectance and the picture's brightness depend on each other
+most where scan and picture fit, which the normalised information distance measures.
 """
 
 from __future__ import annotations
@@ -24,28 +24,32 @@ from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector6
 
 HEIGHT, WIDTH = 320, 1024
-"""Size of the picture that is looked at, in area; all pixels below are its own."""
+"""The picture is resized to the area of so many pixels, its aspect kept; all lengths in pixels below are its own."""
 BLUR = 2.0
-"""Pixels by which edges are blurred: as far as they pull, and finer than the cells of the networks."""
+"""Standard deviation, in pixels, of the blur over edges: it is how far they pull, and less than a network's cell."""
 BRIGHTNESS_BLUR = 2.5
-"""Pixels by which the brightness is that reflectance is compared with: what is finer makes the way there rough."""
+"""Standard deviation, in pixels, of the blur over the brightness that reflectance is compared with; finer detail would
+give the cost local minima."""
 SURROUNDINGS = 61
-"""Pixels, a side, of the square that an edge's contrast is relative to."""
+"""Side, in pixels, of the square over which the usual contrast is taken, which an edge's strength is relative to."""
 FAINTEST, SHARPEST = 1.0, 4.0
-"""Contrast of surroundings without any, in grey levels a pixel; and how many times theirs an edge counts at most."""
+"""What is added to the usual contrast, in grey levels a pixel, so that noise in a plain area is no edge; and the
+strength, in times the usual contrast, beyond which a stronger edge counts no more."""
 DEPTH_REACH, REFLECTANCE_REACH = 3, 6
-"""Pixels to either side in which the neighbours of a point are looked for."""
+"""Pixels to either side of a point in which its neighbours lie, for edges of depth and of reflectance."""
 JUMP_METRES, JUMP_SHARE = 0.5, 0.1
-"""Neighbours are on another surface where their depth differs by both, the second a share of the depth."""
+"""A neighbour lies on another surface if its depth differs by more than so many metres and more than this share."""
 REFLECTANCE_JUMP = 0.3
-"""A point is at an edge of reflectance where a neighbour is darker than it by this share of the scan."""
+"""A point is at an edge of reflectance if this share of the scan's points lies between its reflectance and that of a
+darker neighbour."""
 FEWEST_POINTS, ENOUGH_POINTS = 30, 100
-"""Of a term: with fewer it is left out; and up to so many it counts by their share."""
+"""Points of a term: with fewer than the first it is left out; with fewer than the second it weighs less accordingly."""
 MOST_POINTS = 2000
-"""Of a term; more are thinned out evenly."""
+"""Points of a term at most; more are thinned out evenly."""
 BINS = 16
+"""Of the histograms of reflectance and of brightness."""
 INFORMATION_WEIGHT = 10.0
-"""Of the information distance, beside the two kinds of edges, which are means over points."""
+"""Weight of the information distance in the sum; the two kinds of edges, whose values are means, weigh 1."""
 
 
 class Edges:

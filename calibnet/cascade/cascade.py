@@ -8,17 +8,17 @@ from pathlib import Path
 
 import torch
 
-from calibnet.cascade.image_views import image_branches, image_views
+from calibnet.cascade.image_views import ImageViews, image_branches
 from calibnet.cascade.stage import Stage, load_stage
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import ConfigError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange
-from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.geometry import RANGES, MiscalibrationRange, invert
+from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.network.config import load_preset
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
-from calibnet.trace import CascadeTrace, DriveEstimate
+from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
 
 
@@ -35,7 +35,11 @@ class Cascade:
     """The stages that have weights, coarse to fine; a stage without them is skipped, never guessed."""
 
     def __init__(
-        self, stages: Sequence[Stage], skipped: Sequence[SkippedStage] = (), common: Matrix6 | None = None
+        self,
+        stages: Sequence[Stage],
+        skipped: Sequence[SkippedStage] = (),
+        common: Matrix6 | None = None,
+        wider: Sequence[Stage] = (),
     ) -> None:
         """Use ``Cascade.load`` unless the networks are already there.
 
@@ -44,18 +48,23 @@ class Cascade:
             skipped: stages that were asked for and cannot run.
             common: covariance of what the networks get wrong in all frames of a drive alike; that of
                 `calibnet.weights.manifest.Manifest` by default.
+            wider: stages of wider ranges, coarse to fine, kept for calibrations that leave the first stage's range.
         """
-        self.stages, self.skipped = list(stages), list(skipped)
+        self.stages, self.skipped, self.wider = list(stages), list(skipped), list(wider)
         if not stages:
             reasons = " ".join(stage.reason for stage in skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
         self.common = Manifest("").common if common is None else common
         self.device = stages[0].device
-        self.image_branches = image_branches([stage.network for stage in stages])
+        self.image_branches = image_branches([stage.network for stage in (*stages, *wider)])
 
     @classmethod
     def load(
-        cls, preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Path | None = None
+        cls,
+        preset: str = "compact",
+        stages: tuple[int, ...] | None = None,
+        folder: Path | None = None,
+        wider: bool = False,
     ) -> Cascade:
         """Load the weights of a preset, and its manifest, which says how they are used.
 
@@ -63,6 +72,7 @@ class Cascade:
             preset: name of a shipped preset.
             stages: numbers 1 (coarsest) to 5 (finest); all by default.
             folder: where the weights lie; the package's own by default.
+            wider: keep the stages before the first one as well, for calibrations that leave its range.
 
         Raises:
             ConfigError: there is no such preset or stage.
@@ -76,7 +86,8 @@ class Cascade:
         found = {number: load_stage(number, manifest, folder or PACKAGE) for number in numbers}
         loaded = [stage for stage in found.values() if stage is not None]
         skipped = [skipped_stage(number, preset) for number, stage in found.items() if stage is None]
-        return cls(loaded, skipped, manifest.common)
+        before = [load_stage(number, manifest, folder or PACKAGE) for number in range(1, numbers[0] if wider else 1)]
+        return cls(loaded, skipped, manifest.common, [stage for stage in before if stage is not None])
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct the extrinsic of one frame.
@@ -89,13 +100,15 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, extrinsic, traces = Clock(self.device), initial, []
+        clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
         with torch.inference_mode(), autocast(self.device):
-            views = image_views(self.stages, self.image_branches, frame, clock)
-            for stage, view in zip(self.stages, views, strict=True):
-                traces.append(stage.correct(frame, view, extrinsic, detail))
-                extrinsic = traces[-1].after
-        return CascadeTrace(initial, tuple(traces), clock.parts, self.stages[-1].match_error_limit_px)
+            views = ImageViews(frame, clock)
+            trace = CascadeTrace(initial, self._run(self.stages, views, initial, detail), clock.parts, limit)
+            if wider := self._covering(trace.arrived @ invert(initial)):
+                before = self._run(wider, views, initial)
+                stages = self._run(self.stages, views, before[-1].after, detail)
+                trace = CascadeTrace(initial, stages, clock.parts, limit, before)
+        return trace
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -111,7 +124,31 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        return solve_drive(self.stages, frames, initial, self.common, observer)
+        estimate = solve_drive(self.stages, frames, initial, self.common, observer)
+        if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
+            estimate = solve_drive([*wider, *self.stages], frames, initial, self.common, observer)
+        return estimate
+
+    def _run(
+        self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False
+    ) -> tuple[StageTrace, ...]:
+        """Some stages, each from where the one before arrived."""
+        branches = dict(zip((*self.stages, *self.wider), self.image_branches, strict=True))
+        traces: list[StageTrace] = []
+        for stage in stages:
+            before = traces[-1].after if traces else initial
+            traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail))
+        return tuple(traces)
+
+    def _covering(self, moved: Transform) -> list[Stage]:
+        """The wider stages with which to start again after moving so far; none where the first stage's range covers it.
+
+        They begin with the one whose range does, or with the widest of all.
+        """
+        if not self.wider or self.stages[0].range.contains(moved, MARGIN):
+            return []
+        covering = [position for position, stage in enumerate(self.wider) if stage.range.contains(moved, MARGIN)]
+        return self.wider[max(covering, default=0) :]
 
 
 def skipped_stage(number: int, preset: str) -> SkippedStage:

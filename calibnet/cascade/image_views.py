@@ -11,25 +11,21 @@ from calibnet.datasets.frame import Frame
 from calibnet.network.network import CalibrationNetwork
 
 
-def image_views(
-    stages: Sequence[Stage], branches: Sequence[int], frame: Frame, clock: Callable[[str], None]
-) -> list[View]:
-    """Each stage's view of a frame; those that share image size and image branch have the same one.
+class ImageViews:
+    """A frame's image as stages see it; those that share image size and image branch have one view."""
 
-    Args:
-        stages: all on one device.
-        branches: of each, see `image_branches`.
-        frame: whose image.
-        clock: called with ``"resize"`` and ``"image_features"`` when each is done.
-    """
-    views: dict[tuple[int, int, int], View] = {}
-    keys = []
-    for stage, branch in zip(stages, branches, strict=True):
-        camera = stage.camera(frame)
-        keys.append((branch, camera.width, camera.height))
-        if keys[-1] not in views:
-            views[keys[-1]] = stage.view(frame, clock)
-    return [views[key] for key in keys]
+    def __init__(self, frame: Frame, clock: Callable[[str], None]) -> None:
+        """Of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
+        self.frame, self.clock = frame, clock
+        self._views: dict[tuple[int, int, int], View] = {}
+
+    def of(self, stage: Stage, branch: int) -> View:
+        """The view of a stage, whose image branch is that of the stage at position ``branch``; see `image_branches`."""
+        camera = stage.camera(self.frame)
+        key = branch, camera.width, camera.height
+        if key not in self._views:
+            self._views[key] = stage.view(self.frame, self.clock)
+        return self._views[key]
 
 
 def image_branches(networks: Sequence[CalibrationNetwork]) -> list[int]:

@@ -16,7 +16,7 @@ from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
 from calibnet.errors import CalibrationError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, range_of, scaled
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.network.batch import Cut, lidar_input, make_batch
 from calibnet.network.convolution import pack
@@ -140,8 +140,7 @@ class Stage:
     def is_settled(self, correction: Transform) -> bool:
         """Whether the next stage can take over: what a look has corrected is within that stage's range."""
         position = RANGES.index(self.range) if self.range in RANGES else len(RANGES)
-        reach, found = RANGES[min(position + 1, len(RANGES) - 1)], range_of(correction)
-        return found.rotation_deg <= reach.rotation_deg and found.translation_m <= reach.translation_m
+        return RANGES[min(position + 1, len(RANGES) - 1)].contains(correction)
 
     def _correction(self, output: NetworkOutput) -> Transform:
         """The correction of a batch of one, extended by the stage's gain."""

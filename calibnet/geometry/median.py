@@ -1,4 +1,4 @@
-"""The middle of several extrinsics of one mount: outliers, up to half of them, hardly move it."""
+"""The median of several extrinsics of one mount: outliers, up to half of them, hardly move it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from calibnet.geometry.se3 import rotation_from_vector, rotation_vector, transfo
 from calibnet.geometry.types import Extrinsic, Floats, Rotation
 
 ITERATIONS = 200
+"""At most; Weiszfeld's iteration mostly settles within a few dozen."""
 SETTLED = 1e-13
+"""Move of the median, in the points' unit, below which it has settled."""
 SMOOTHING = 1e-4
-"""Share of the median distance below which a point's pull stops growing; it would be infinite at the point."""
+"""A point's pull stops growing at this share of the median distance: at the point itself it would be infinite."""
 SMALLEST = 1e-12
-"""The same where all points are one, in their unit."""
+"""The distance at which it stops where all points are the same, in their unit."""
 RECENTRINGS = 3
-"""Rotation vectors are exact distances only from the centre they are taken at."""
+"""Times that rotation vectors are taken anew from the median so far: only from their centre are they true distances."""
 
 
 def median_pose(extrinsics: Sequence[Extrinsic]) -> Extrinsic:

@@ -45,6 +45,11 @@ class MiscalibrationRange:
             raise ConfigError(f"Range {text!r} is outside 0..45 degrees and 0..10 metres.")
         return cls(rotation, translation)
 
+    def contains(self, delta: Transform, margin: float = 1.0) -> bool:
+        """Whether ``delta`` stays within so many times this range on every axis, in the camera frame."""
+        found = range_of(delta)
+        return found.rotation_deg <= margin * self.rotation_deg and found.translation_m <= margin * self.translation_m
+
     def __str__(self) -> str:
         return f"{self.rotation_deg:g}/{self.translation_m:g}"
 

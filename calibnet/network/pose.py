@@ -19,7 +19,8 @@ from calibnet.network.config import NetworkConfig
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.layers import ConvBlock
 
-MINIMUM_DEPTH = 0.1
+DEPTH_FLOOR = 0.1
+"""Metres that depths are clamped to before they divide: a point may pass the camera while the pose is solved."""
 
 
 class Pose(NamedTuple):
@@ -79,7 +80,7 @@ def rigid(rotation: Tensor, translation: Tensor) -> Tensor:
 def project_points(points: Tensor, intrinsics: Tensor) -> Tensor:
     """Camera-frame points ``[B, N, 3]`` to pixels ``[B, N, 2]``; depth is clamped to 0.1 m."""
     homogeneous = points @ intrinsics.transpose(1, 2)
-    return homogeneous[..., :2] / points[..., 2:].clamp(min=MINIMUM_DEPTH)
+    return homogeneous[..., :2] / points[..., 2:].clamp(min=DEPTH_FLOOR)
 
 
 class RegressionHead(nn.Module):
@@ -156,7 +157,7 @@ class GeometricHead(nn.Module):
         information = prior.expand(len(points), 6, 6)
         for _ in range(self.ITERATIONS):
             moved = rotation @ points + translation[..., None]
-            residual = target - (intrinsics @ moved)[:, :2] / moved[:, 2:].clamp(min=MINIMUM_DEPTH)
+            residual = target - (intrinsics @ moved)[:, :2] / moved[:, 2:].clamp(min=DEPTH_FLOOR)
             weight = share * (variance + residual.detach() ** 2).rsqrt()
             jacobian = projection_jacobian(moved, intrinsics)  # [B, 6, 2, N]
             weighted = (jacobian * weight[:, None]).flatten(2)
@@ -180,7 +181,7 @@ def rotation_vector(rotation: Tensor) -> Tensor:
 def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
     """Derivative ``[B, 6, 2, N]`` of the pixels by a left perturbation ``(translation, rotation)`` of ``[B, 3, N]``."""
     x, y, depth = points.unbind(1)
-    inverse = 1.0 / depth.clamp(min=MINIMUM_DEPTH)
+    inverse = 1.0 / depth.clamp(min=DEPTH_FLOOR)
     x, y, zero = x * inverse, y * inverse, torch.zeros_like(x)
     xy = x * y
     by_translation = [inverse, zero, zero, inverse, -x * inverse, -y * inverse]  # of (u, v) each

@@ -12,13 +12,15 @@ from torch import Tensor
 
 from calibnet.alignment import Evidence
 from calibnet.cascade import Cascade, SkippedStage, Stage
+from calibnet.cascade.stage import View
 from calibnet.datasets.frame import Frame
 from calibnet.drive.convergence import Due
 from calibnet.drive.solve import LOOKS
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, depth_image, invert, miscalibration, orthonormal, pose_error, project, scaled
+from calibnet.geometry.types import Extrinsic
 from calibnet.network.features import FeatureExtractor
-from calibnet.trace import CascadeTrace
+from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.weights import save_network, weights_path
 from calibnet.weights.manifest import StageSettings
 from tests.support.scene import REFERENCE, make_frame
@@ -73,17 +75,17 @@ def test_stages_follow_one_another(trace: CascadeTrace) -> None:
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(rotation) == pytest.approx(1.0)
         assert not np.array_equal(stage.correction, np.eye(4))
-    assert np.array_equal(trace.corrected, trace.stages[-1].after)
+    assert np.array_equal(trace.arrived, trace.stages[-1].after)
 
 
 def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: CascadeTrace) -> None:
     last = trace.stages[-1]
-    assert trace.confirmed and last.match_error_px > 0.5 and not np.array_equal(trace.corrected, INITIAL)
+    assert trace.fits and last.match_error_px > 0.5 and not np.array_equal(trace.arrived, INITIAL)
     doubting = cascade(limit=last.match_error_px - 0.01).calibrate(frame, INITIAL)
-    assert not doubting.confirmed and np.array_equal(doubting.corrected, INITIAL)
+    assert not doubting.fits and not doubting.confirmed and np.array_equal(doubting.corrected, INITIAL)
     assert np.array_equal(doubting.stages[-1].after, trace.stages[-1].after), "what the stages found can be seen"
     believing = cascade(limit=last.match_error_px + 0.01).calibrate(frame, INITIAL)
-    assert believing.confirmed and np.array_equal(believing.corrected, trace.corrected)
+    assert believing.fits and np.array_equal(believing.arrived, trace.arrived)
 
 
 def test_corrections_are_extended_by_the_gain_of_their_stage(frame: Frame, trace: CascadeTrace) -> None:
@@ -98,7 +100,7 @@ def test_corrections_are_extended_by_the_gain_of_their_stage(frame: Frame, trace
 
 def test_only_the_finest_stage_judges(frame: Frame) -> None:
     coarse = cascade((3, 4), limit=0.01).calibrate(frame, INITIAL)
-    assert coarse.confirmed and np.array_equal(coarse.corrected, coarse.stages[-1].after)
+    assert coarse.fits and np.array_equal(coarse.arrived, coarse.stages[-1].after)
 
 
 def test_a_drive_of_pictures_that_fit_no_scan_has_no_estimate(frame: Frame) -> None:
@@ -155,7 +157,7 @@ def test_occupied_cells_hold_points(trace: CascadeTrace) -> None:
 def test_detail_is_made_only_when_asked_for(frame: Frame, trace: CascadeTrace) -> None:
     silent = cascade().calibrate(frame, INITIAL)
     assert all(stage.detail is None for stage in silent.stages)
-    assert np.array_equal(silent.corrected, trace.corrected), "looking changes nothing"
+    assert np.array_equal(silent.arrived, trace.arrived), "looking changes nothing"
 
 
 def test_times_are_told_by_part(trace: CascadeTrace) -> None:
@@ -168,14 +170,14 @@ def test_times_are_told_by_part(trace: CascadeTrace) -> None:
 
 @pytest.mark.parametrize("head", ["geometric", "regression"])
 def test_the_same_frame_gives_the_same_extrinsic(frame: Frame, head: str) -> None:
-    one, again = (cascade((4,), head=head).calibrate(frame, INITIAL).corrected for _ in range(2))
+    one, again = (cascade((4,), head=head).calibrate(frame, INITIAL).arrived for _ in range(2))
     assert np.array_equal(one, again)
 
 
 def test_the_frame_s_own_extrinsic_is_not_looked_at(frame: Frame) -> None:
     network = cascade((5,))
     lost = replace(frame, camera_from_lidar=np.full((4, 4), np.nan))
-    assert np.array_equal(network.calibrate(lost, INITIAL).corrected, network.calibrate(frame, INITIAL).corrected)
+    assert np.array_equal(network.calibrate(lost, INITIAL).arrived, network.calibrate(frame, INITIAL).arrived)
 
 
 def count_image_features(monkeypatch: pytest.MonkeyPatch) -> list[int]:
@@ -200,7 +202,7 @@ def test_image_features_are_computed_once_where_the_branch_is_shared(
     shared.image_branches = [0, 1, 2]
     apart = shared.calibrate(frame, INITIAL)
     assert len(calls) == 1 + 3
-    np.testing.assert_allclose(together.corrected, apart.corrected, atol=1e-9)
+    np.testing.assert_allclose(together.arrived, apart.arrived, atol=1e-9)
 
 
 def test_stages_see_the_image_at_their_own_sizes(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,14 +251,14 @@ def test_rows_above_the_scan_are_spared_and_still_in_the_detail(frame: Frame, mo
 def test_a_stage_of_two_rounds_is_the_stage_run_twice(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Stage, "is_settled", lambda stage, correction: False)
     first = cascade((3,)).calibrate(frame, INITIAL, detail=True)
-    second = cascade((3,)).calibrate(frame, first.corrected)
+    second = cascade((3,)).calibrate(frame, first.arrived)
     calls = count_image_features(monkeypatch)
     both = cascade((3,), settings={3: StageSettings(looks=2)}).calibrate(frame, INITIAL, detail=True)
     assert len(calls) == 1, "the image is the same in both looks"
     (stage,) = both.stages
-    np.testing.assert_allclose(stage.after, second.corrected, atol=1e-9)
+    np.testing.assert_allclose(stage.after, second.arrived, atol=1e-9)
     np.testing.assert_allclose(stage.correction @ INITIAL, stage.after, atol=1e-9)
-    assert not np.allclose(stage.after, first.corrected, atol=1e-4)
+    assert not np.allclose(stage.after, first.arrived, atol=1e-4)
     assert stage.detail is not None and first.stages[0].detail is not None
     np.testing.assert_array_equal(stage.detail.depth, first.stages[0].detail.depth)
     assert stage.milliseconds.keys() == first.stages[0].milliseconds.keys()
@@ -283,8 +285,8 @@ def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkey
     assert len(calls) == 3
     before = INITIAL
     for stage in different.stages:
-        before = Cascade([stage]).calibrate(frame, before).corrected
-    np.testing.assert_allclose(trace.corrected, before, atol=1e-9)
+        before = Cascade([stage]).calibrate(frame, before).arrived
+    np.testing.assert_allclose(trace.arrived, before, atol=1e-9)
 
 
 def test_neighbours_share_an_image_branch_of_their_own() -> None:
@@ -473,3 +475,69 @@ def test_a_stage_is_settled_within_the_range_of_the_next(
     assert (
         Stage(stage, RANGES[stage - 1], tiny_network(stage=stage)).is_settled(miscalibration(angles, offset)) is settled
     )
+
+
+def wandering(monkeypatch: pytest.MonkeyPatch, corrections: dict[int, list[float]]) -> list[int]:
+    """Let stages move by so many metres along x, whatever they see, the next number at each look; returns who ran."""
+    ran: list[int] = []
+
+    def correct(stage: Stage, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+        ran.append(stage.number)
+        correction = miscalibration([0, 0, 0], [corrections[stage.number].pop(0), 0, 0])
+        return StageTrace(stage.number, stage.range, frame.camera, before, correction @ before, correction)
+
+    monkeypatch.setattr(Stage, "correct", correct)
+    return ran
+
+
+def with_wider_stages() -> Cascade:
+    whole = cascade((1, 2, 3, 4, 5))
+    return Cascade(whole.stages[2:], wider=whole.stages[:2])
+
+
+@pytest.mark.parametrize(
+    ("first_try", "again", "expected"),
+    [
+        (0.55, {}, [3, 4, 5]),  # within 1.2 x 0.5 m
+        (0.7, {2: 0.65, 3: 0.05}, [3, 4, 5, 2, 3, 4, 5]),
+        (1.3, {1: 1.2, 2: 0.05, 3: 0.05}, [3, 4, 5, 1, 2, 3, 4, 5]),
+        (4.5, {1: 1.2, 2: 0.05, 3: 0.05}, [3, 4, 5, 1, 2, 3, 4, 5]),
+    ],
+)
+def test_what_leaves_the_range_is_looked_for_again_from_the_stage_whose_range_it_lies_in(
+    frame: Frame,
+    monkeypatch: pytest.MonkeyPatch,
+    first_try: float,
+    again: dict[int, float],
+    expected: list[int],
+) -> None:
+    moves = {number: [again.get(number, 0.0)] for number in (1, 2)}
+    moves |= {3: [first_try, again.get(3, 0.0)], 4: [0.0, 0.0], 5: [0.0, 0.0]}
+    ran = wandering(monkeypatch, moves)
+    trace = with_wider_stages().calibrate(frame, INITIAL)
+    assert ran == expected and [stage.number for stage in trace.stages] == [3, 4, 5]
+    assert [stage.number for stage in trace.wider] == expected[3:-3]
+    assert trace.confirmed and trace.searched == RANGES[min(expected) - 1]
+    moved = sum(again.values()) or first_try
+    np.testing.assert_allclose(trace.corrected, miscalibration([0, 0, 0], [moved, 0, 0]) @ INITIAL, atol=1e-12)
+
+
+def test_what_wanders_from_all_ranges_is_left_as_it_was(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    wandering(monkeypatch, {1: [4.0], 2: [0.5], 3: [4.5, 0.0], 4: [0.0, 0.0], 5: [0.0, 0.0]})
+    trace = with_wider_stages().calibrate(frame, INITIAL)
+    assert trace.fits and not trace.stayed and not trace.confirmed
+    np.testing.assert_array_equal(trace.corrected, INITIAL)
+    np.testing.assert_allclose(trace.arrived[0, 3] - INITIAL[0, 3], 4.5, atol=1e-12)
+
+
+def test_stages_that_were_asked_for_only_reject(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran = wandering(monkeypatch, {3: [0.7], 4: [0.0], 5: [0.0]})
+    trace = cascade((3, 4, 5)).calibrate(frame, INITIAL)
+    assert ran == [3, 4, 5] and trace.wider == () and not trace.confirmed
+
+
+def test_wider_stages_are_loaded_where_they_are_wanted(tmp_path: Path) -> None:
+    save(tmp_path, 1, 3, 5)
+    loaded = Cascade.load("compact", (3, 5), tmp_path, wider=True)
+    assert [stage.number for stage in loaded.stages] == [3, 5] and [stage.number for stage in loaded.wider] == [1]
+    assert Cascade.load("compact", (3, 5), tmp_path).wider == []
