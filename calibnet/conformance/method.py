@@ -48,10 +48,11 @@ def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
     """Hold a trace to its own rules: it starts where it should, and each stage where the one before ended."""
     require(np.array_equal(trace.initial, initial), "The trace does not start from the extrinsic that was given.")
     require(len(trace.stages) > 0, "The trace has no stage; a method without stages has one.")
-    numbers = [stage.number for stage in trace.stages]
+    stages = (*trace.wider, *trace.stages)
+    numbers = [stage.number for stage in stages]
     require(numbers == sorted(set(numbers)), f"The stages are numbered {numbers}; numbers rise.")
     expected = initial
-    for stage in trace.stages:
+    for stage in stages:
         name = f"stage {stage.number}"
         require(np.array_equal(stage.before, expected), f"{name} does not start where the one before it ended.")
         require_rigid(stage.correction, f"the correction of {name}")

@@ -23,7 +23,7 @@ class DriveMetrics:
     """Errors of drives.
 
     Attributes:
-        estimate: of the estimate from all frames.
+        estimate: of the extrinsic solved from all frames, edges included where they were aligned.
         networks: of what the networks alone made of them; None where no edges were aligned after them, so that both
             would be the same.
     """

@@ -235,7 +235,7 @@ class ConsoleObserver:
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
         """Print the figures beside the initial ones."""
         self.console.print(
-            f"validation after {progress.samples:,d} samples, {figures.samples} single shots, medians: "
+            f"validation after {progress.samples:,d} samples, {figures.samples} single looks, medians: "
             f"rotation {figures.initial_rotation_deg:.2f}° -> {figures.rotation_deg:.2f}° "
             f"(p95 {figures.rotation_p95_deg:.2f}°), "
             f"translation {figures.initial_translation_cm:.1f} -> {figures.translation_cm:.1f} cm",
