@@ -24,11 +24,9 @@ if TYPE_CHECKING:
     from pyarrow import RecordBatch
     from rerun.chunk import Chunk
 
-
 PROPERTIES = "__properties"
 """Where Rerun keeps a recording's name and properties."""
-SAME_MOUNT = 1e-6
-"""References whose entries, in metres and of the rotation, differ by less are of one mount."""
+SAME_MOUNT = 1e-6  # references of one mount differ by less, in metres and in entries of the rotation
 PICTURES = (entities.IMAGE, entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_CORRECTED)
 
 
