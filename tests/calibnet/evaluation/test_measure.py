@@ -48,8 +48,8 @@ def test_every_row_that_was_asked_for_and_no_other() -> None:
     assert plain.final.rotation_deg.yaw == pytest.approx(1.0)
     assert plain.references == {"no correction": plain.initial}
     assert plain.drives is None and plain.audit == {}
-    whole = measure(Leaving(1.0), drives(), RANGE, 2, references={"other": Leaving(3.0)}, audit=True)
-    assert whole.references["other"].rotation_deg.yaw == pytest.approx(3.0)
+    whole = measure(Leaving(1.0), drives(), RANGE, 2, references={"other": Leaving(0.5)}, audit=True)
+    assert whole.references["other"].rotation_deg.yaw == pytest.approx(0.5)
     assert whole.drives is not None and whole.drives.rotation_deg.yaw == pytest.approx(1.0)
     assert whole.drives_networks is None
     assert whole.audit_unconfirmed == {"swapped": 0, "grey": 10, "thinned": 0}
