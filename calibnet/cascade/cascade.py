@@ -10,8 +10,8 @@ import torch
 
 from calibnet.cascade.image_views import ImageViews, image_branches
 from calibnet.cascade.stage import Stage, load_stage
-from calibnet.datasets.frame import Frame
-from calibnet.drive.solve import Frames, solve_drive
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.drive.solve import solve_drive
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
@@ -155,7 +155,7 @@ def skipped_stage(number: int, preset: str) -> SkippedStage:
     """A stage of a preset that has no weights."""
     range_ = RANGES[number - 1]
     reason = (
-        f"Stage {number} (±{range_.rotation_deg:g}°/{range_.translation_m:g} m) of preset {preset} has no weights: "
+        f"Stage {number} ({range_.label}) of preset {preset} has no weights: "
         f"train it with `calib-inspect train --preset {preset} --range {range_}`."
     )
     return SkippedStage(number, range_, reason)

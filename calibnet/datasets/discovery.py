@@ -13,11 +13,13 @@ def find_sequences(dataset: str, root: Path, name: str = "") -> Iterator[Sequenc
     """Open every sequence, of every colour camera, in the folder of a dataset.
 
     Args:
-        dataset: as in `DATASETS`.
+        dataset: one of `dataset_names`; one that another package adds is opened on the folder itself.
         root: the dataset's folder.
-        name: only this one: ``DATE/DRIVE``, a sequence's number, a split or a folder.
+        name: only this one: ``DATE/DRIVE``, a sequence's number, a split, or a folder below ``root``.
     """
-    return FINDERS[dataset](root, name)
+    if dataset in FINDERS:
+        return FINDERS[dataset](root, name)
+    return iter([open_sequence(dataset, root / name)])
 
 
 def _raw(root: Path, name: str) -> Iterator[Sequence]:

@@ -37,6 +37,18 @@ class Frame:
     source: str = ""
 
 
+class Frames(Protocol):
+    """What a drive is solved from: a `Sequence`, or a list of frames."""
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def __getitem__(self, position: int, /) -> Frame:
+        """Read one frame."""
+        ...
+
+
 @runtime_checkable
 class Sequence(Protocol):
     """Frames of one camera and one LiDAR on one mount, read lazily.

@@ -1,27 +1,34 @@
-"""The datasets by name. A new one is a class that satisfies `Sequence` and one line in `DATASETS`."""
+"""The datasets by name; those of other packages register as ``calib_inspect.datasets``.
+
+A dataset is a class whose instances are a `Sequence`, called as ``Class(root, **options)``;
+`calibnet.conformance.check_dataset` tests one. One of ours needs one line in `DATASETS`.
+"""
 
 from __future__ import annotations
 
 import inspect
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
 from calibnet.datasets.frame import Sequence
 from calibnet.errors import ConfigError
+from calibnet.runtime.plugins import Registry
 
-DATASETS: dict[str, str] = {
-    "kitti-odometry": "calibnet.datasets.kitti_odometry:KittiOdometry",
-    "kitti-raw": "calibnet.datasets.kitti_raw:KittiRaw",
-    "kitti-object": "calibnet.datasets.kitti_object:KittiObject",
-    "folder": "calibnet.datasets.folder:Folder",
-}
-"""Dataset name to ``module:Class``, called as ``Class(root, **options)`` and imported only then."""
+DATASETS = Registry(
+    "datasets",
+    "dataset",
+    {
+        "kitti-odometry": "calibnet.datasets.kitti_odometry:KittiOdometry",
+        "kitti-raw": "calibnet.datasets.kitti_raw:KittiRaw",
+        "kitti-object": "calibnet.datasets.kitti_object:KittiObject",
+        "folder": "calibnet.datasets.folder:Folder",
+    },
+)
 
 
 def dataset_names() -> tuple[str, ...]:
     """The names that `open_sequence` knows."""
-    return tuple(DATASETS)
+    return DATASETS.names()
 
 
 def open_sequence(dataset: str, root: Path | str, **options: Any) -> Sequence:
@@ -33,13 +40,10 @@ def open_sequence(dataset: str, root: Path | str, **options: Any) -> Sequence:
         **options: what its class takes besides, for instance ``sequence="04", camera=2``.
 
     Raises:
-        ConfigError: there is no such dataset, or it takes no such option.
+        ConfigError: there is no such dataset, its package is broken, or it takes no such option.
         DatasetError: the folder is missing, incomplete or inconsistent.
     """
-    if dataset not in DATASETS:
-        raise ConfigError(f"There is no dataset {dataset!r}; choose one of {', '.join(DATASETS)}.")
-    module, _, name = DATASETS[dataset].partition(":")
-    source = getattr(import_module(module), name)
+    source = DATASETS.load(dataset)
     try:
         inspect.signature(source).bind(root, **options)
     except TypeError as error:

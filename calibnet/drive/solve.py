@@ -6,16 +6,13 @@ import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-import numpy as np
-
 from calibnet.alignment import Evidence, gather
-from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due, spread
 from calibnet.errors import CalibrationError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.network.pose import prior_information
 from calibnet.trace import DriveEstimate, Estimate, StageTrace
 
 FRAMES_UNTIL_LAST_LOOK = 24
@@ -24,18 +21,6 @@ LOOKS = 2
 """Times that each stage corrects a drive, on scans projected anew; the last one does so once more in the end."""
 FRAMES_ALIGNED = 24
 """Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
-
-
-class Frames(Protocol):
-    """A drive: a `calibnet.datasets.Sequence`, or a list of frames."""
-
-    def __len__(self) -> int:
-        """Number of frames."""
-        ...
-
-    def __getitem__(self, position: int, /) -> Frame:
-        """Read one frame."""
-        ...
 
 
 class Looking(Protocol):
@@ -146,7 +131,7 @@ def agree(
         CalibrationError: none of the frames could be calibrated.
     """
     failure = None
-    consensus = Consensus(extrinsic, np.diag(prior_information(stage.range).double().numpy()))
+    consensus = Consensus(extrinsic, stage.range.information)
     for position in positions:
         frame = read(position)
         try:

@@ -1,1 +1,1 @@
-"""How good a calibration is: error metrics, and the runner that measures a cascade with them."""
+"""How good a calibration is: `measure` gives the figures that documents quote, `benchmark` the milliseconds."""

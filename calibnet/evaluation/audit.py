@@ -6,8 +6,9 @@ calibrator is as good with a grey image; an honest one is lost without the true 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -64,18 +65,18 @@ def alterations(donors: Sequence) -> dict[str, Alteration]:
     return {"swapped": swapped_with(donors), "grey": grey, "thinned": thinned}
 
 
-def other_drive(sequence: Sequence, opened: list[Sequence], beside: Callable[[], list[Sequence]]) -> Sequence:
+def other_drive(sequence: Sequence, opened: list[Sequence], beside: Callable[[], Iterable[Sequence]]) -> Sequence:
     """A drive whose images are not those of ``sequence``.
 
     Args:
         sequence: whose images are to be replaced.
         opened: what is evaluated besides.
-        beside: finds what else lies in the dataset's folder.
+        beside: opens what else lies in the dataset's folder, one after the other.
 
     Returns:
         Another one of these, or a drive through the synthetic world where there is none.
     """
-    for candidate in [*opened, *beside()]:
+    for candidate in chain(opened, beside()):
         if Path(candidate.name).name != Path(sequence.name).name:
             return candidate
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence

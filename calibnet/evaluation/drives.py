@@ -1,11 +1,10 @@
-"""Measure what a cascade makes of whole drives, each solved as one from seeded miscalibrations."""
+"""Drives: solve the extrinsic of each from all its frames, from seeded miscalibrations, and summarise the errors."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -13,32 +12,28 @@ from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
-from calibnet.geometry.types import Extrinsic
-from calibnet.trace import DriveEstimate
+from calibnet.methods.calibrator import DriveCalibrator
 
 FEWEST_FRAMES = 2
+"""One frame is no drive."""
 
 
 @dataclass(frozen=True)
 class DriveMetrics:
-    """Errors of drives solved as one, and, where edges were aligned, of what the networks alone made of them."""
+    """Errors of drives.
+
+    Attributes:
+        estimate: of the extrinsic solved from all frames, edges included where they were aligned.
+        networks: of what the networks alone made of them; None where no edges were aligned after them, so that both
+            would be the same.
+    """
 
     estimate: Metrics
     networks: Metrics | None
 
 
-class DriveCalibrator(Protocol):
-    """What is measured; `calibnet.cascade.Cascade` is one."""
-
-    def calibrate_drive(
-        self, frames: Sequence, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
-    ) -> DriveEstimate:
-        """Correct the extrinsic that all frames share; see `Cascade.calibrate_drive`."""
-        ...
-
-
 def evaluate_drives(
-    cascade: DriveCalibrator,
+    calibrator: DriveCalibrator,
     sequences: list[Sequence],
     range_: MiscalibrationRange,
     repeats: int,
@@ -48,7 +43,7 @@ def evaluate_drives(
     """Errors of ``repeats`` estimates of every drive; those that fail keep their initial error.
 
     Args:
-        cascade: what to measure.
+        calibrator: what to measure.
         sequences: the drives; what is not one drive on one mount (`shares_mount`) is left out.
         range_: range of the miscalibrations, of which there is one a drive and repeat.
         repeats: miscalibrations a drive.
@@ -72,7 +67,7 @@ def evaluate_drives(
                     observer(name, read, total)
 
             with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
-                solved = cascade.calibrate_drive(sequence, estimate, told)
+                solved = calibrator.calibrate_drive(sequence, estimate, told)
                 estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
                 aligned = aligned or solved.networks is not None
             errors.append(pose_error(estimate, reference))

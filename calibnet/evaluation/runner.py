@@ -1,28 +1,19 @@
-"""Measure a cascade: calibrate every frame from seeded miscalibrations and summarise the errors."""
+"""Single frames: calibrate each from seeded miscalibrations and summarise the errors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from calibnet.datasets import Frame
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
-from calibnet.geometry.types import Extrinsic, Transform
-from calibnet.trace import CascadeTrace
-
-
-class Calibrator(Protocol):
-    """What is measured; `calibnet.cascade.Cascade` is one."""
-
-    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """Correct ``initial``; see `Cascade.calibrate`."""
-        ...
+from calibnet.geometry.types import Transform
+from calibnet.methods.calibrator import Calibrator
 
 
 @dataclass(frozen=True)
@@ -76,9 +67,9 @@ class Evaluation:
         initial: errors before the first stage.
         stages: errors after each stage that ran, coarse to fine.
         runs: every single result.
-        sequence: errors of whole drives, each solved as one; None where that was not measured.
-        sequence_networks: likewise of what the networks alone made of them, before edges were aligned.
-        references: errors without a network, by name: no correction, a classical refinement.
+        drives: errors of the drives' extrinsics, each solved from all its frames; None where none was measured.
+        drives_networks: likewise of what the networks alone made of them, before edges were aligned.
+        references: errors of other methods on the same single frames, by name: no correction, a classical refinement.
         audit: errors after the last stage with altered frames, by name, see `calibnet.evaluation.audit`.
         audit_unconfirmed: how many of those runs the picture did not confirm, by the same names.
         audit_images: where the swapped images come from.
@@ -94,8 +85,8 @@ class Evaluation:
     initial: Metrics
     stages: tuple[StageMetrics, ...]
     runs: tuple[Run, ...] = field(repr=False)
-    sequence: Metrics | None = None
-    sequence_networks: Metrics | None = None
+    drives: Metrics | None = None
+    drives_networks: Metrics | None = None
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
     audit_unconfirmed: dict[str, int] = field(default_factory=dict)
@@ -126,8 +117,8 @@ class Evaluation:
             "stages": [
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
             ],
-            "sequence": None if self.sequence is None else self.sequence.as_dict(),
-            "sequence_networks": None if self.sequence_networks is None else self.sequence_networks.as_dict(),
+            "sequence": None if self.drives is None else self.drives.as_dict(),
+            "sequence_networks": None if self.drives_networks is None else self.drives_networks.as_dict(),
             "references": {name: metrics.as_dict() for name, metrics in self.references.items()},
         }
         if self.audit:
@@ -142,8 +133,8 @@ def draw_miscalibration(range_: MiscalibrationRange, seed: int, frame: int, repe
     return sample_miscalibration(range_, np.random.default_rng([seed, frame, repeat]))
 
 
-def evaluate(
-    cascade: Calibrator,
+def evaluate_frames(
+    calibrator: Calibrator,
     sequences: Sequence[FrameSequence],
     range_: MiscalibrationRange,
     repeats: int,
@@ -153,7 +144,7 @@ def evaluate(
     """Calibrate every frame of ``sequences`` from ``repeats`` miscalibrations each.
 
     Args:
-        cascade: what to measure.
+        calibrator: what to measure.
         sequences: where the frames come from; their own extrinsics are the reference.
         range_: range of the miscalibrations.
         repeats: miscalibrations a frame, at least 1.
@@ -175,7 +166,7 @@ def evaluate(
                 errors: dict[int, PoseError] = {}
                 unconfirmed = False
                 try:
-                    trace = cascade.calibrate(frame, initial)
+                    trace = calibrator.calibrate(frame, initial)
                     for stage in trace.stages:
                         ranges[stage.number] = stage.range
                         errors[stage.number] = pose_error(stage.after, reference)

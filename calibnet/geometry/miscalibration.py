@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +16,20 @@ from calibnet.geometry.se3 import (
     rotation_vector,
     transform,
 )
-from calibnet.geometry.types import Transform
+from calibnet.geometry.types import Matrix6, Transform
+
+SMALLEST_SIGMA = np.float32(1e-4)
+"""Metres or radians: a range of zero is taken as known this well, not beyond doubt."""
 
 
 @dataclass(frozen=True, order=True)
 class MiscalibrationRange:
-    """Bounds of a uniform miscalibration: +-degrees and +-metres on every axis."""
+    """Largest angle and offset, on every axis, of miscalibrations that are drawn uniformly.
+
+    Attributes:
+        rotation_deg: ± degrees about each axis.
+        translation_m: ± metres along each axis.
+    """
 
     rotation_deg: float
     translation_m: float
@@ -43,6 +52,20 @@ class MiscalibrationRange:
 
     def __str__(self) -> str:
         return f"{self.rotation_deg:g}/{self.translation_m:g}"
+
+    @property
+    def label(self) -> str:
+        """For people, for instance ``"±5°/0.5 m"``."""
+        return f"±{self.rotation_deg:g}°/{self.translation_m:g} m"
+
+    @property
+    def information(self) -> Matrix6:
+        """Inverse covariance ``[6, 6]`` of ``(translation m, rotation rad)``: what is known before anything is seen.
+
+        Of a uniform distribution within ± a the variance is a²/3. In single precision, as the pose head counts it.
+        """
+        sigma = np.array([self.translation_m] * 3 + [math.radians(self.rotation_deg)] * 3) / 3**0.5
+        return np.diag(1 / np.square(np.maximum(sigma.astype(np.float32), SMALLEST_SIGMA))).astype(np.float64)
 
 
 RANGES: tuple[MiscalibrationRange, ...] = tuple(

@@ -6,11 +6,13 @@ import itertools
 import tomllib
 from dataclasses import dataclass, fields
 from importlib import resources
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 from calibnet.errors import ConfigError
+from calibnet.network.heads import HEADS
 
-Head = Literal["geometric", "regression"]
+Head: TypeAlias = str
+"""A name in `calibnet.network.heads.HEADS`."""
 Normalization = Literal["group", "batch"]
 ImageEncoder = Literal["own", "efficientnet-lite0"]
 
@@ -49,6 +51,8 @@ class NetworkConfig:
     hybrid_loss: bool = True
 
     def __post_init__(self) -> None:
+        if self.head not in HEADS:
+            raise ConfigError(f"Preset {self.name!r}: head must be one of {', '.join(HEADS.names())}.")
         for wrong, message in (
             (len(self.widths) != len(self.blocks), "widths and blocks must have the same length"),
             (not self.scales, "there must be a scale"),
@@ -71,7 +75,6 @@ class NetworkConfig:
                 len(_each(self.hourglass_blocks, self.hourglasses)) != self.hourglasses,
                 "hourglass_blocks has one a hourglass",
             ),
-            (self.head not in get_args(Head), f"head must be one of {', '.join(get_args(Head))}"),
             (
                 self.normalization not in get_args(Normalization),
                 f"normalization must be one of {', '.join(get_args(Normalization))}",

@@ -14,8 +14,9 @@ from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import CostVolume, matching_score
 from calibnet.network.displacement import DisplacementDecoder, DisplacementField
 from calibnet.network.features import FeatureExtractor
+from calibnet.network.heads import HEADS
 from calibnet.network.layers import channels_last
-from calibnet.network.pose import HEADS, Pose
+from calibnet.network.pose import Pose
 
 
 class Activations(NamedTuple):
@@ -58,7 +59,7 @@ class CalibrationNetwork(nn.Module):
         self.cost_volumes = nn.ModuleList(CostVolume(config) for _ in config.volume_scales)
         self.aggregation = Aggregation(config)
         self.displacement = DisplacementDecoder(config)
-        self.pose = HEADS[config.head](config, range_)
+        self.pose: nn.Module = HEADS.load(config.head)(config, range_)
         channels_last(self)
 
     def match(self, inputs: NetworkInputs) -> list[Tensor]:

@@ -37,9 +37,8 @@ class Pose(NamedTuple):
 
 
 def prior_information(range_: MiscalibrationRange) -> Tensor:
-    """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration."""
-    sigma = [range_.translation_m / 3**0.5] * 3 + [math.radians(range_.rotation_deg) / 3**0.5] * 3
-    return torch.tensor(sigma).clamp(min=1e-4) ** -2
+    """Inverse variances ``[6]`` of ``(translation m, rotation rad)`` of a uniform miscalibration, float32."""
+    return torch.from_numpy(range_.information).diagonal().float()
 
 
 def skew(vector: Tensor) -> Tensor:
@@ -189,10 +188,3 @@ def projection_jacobian(points: Tensor, intrinsics: Tensor) -> Tensor:
     by_rotation = [-xy, -1 - y * y, 1 + x * x, xy, -y, x]
     focal = intrinsics.diagonal(dim1=1, dim2=2)[:, None, :2, None]
     return torch.stack([*by_translation, *by_rotation], dim=1).unflatten(1, (6, 2)) * focal
-
-
-HEADS: dict[str, type[RegressionHead] | type[GeometricHead]] = {
-    "regression": RegressionHead,
-    "geometric": GeometricHead,
-}
-"""Pose heads by the name a preset uses; a new head is a class with the same `forward` and a line here."""

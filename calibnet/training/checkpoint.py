@@ -12,6 +12,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from calibnet.errors import WeightsError
+from calibnet.runtime.whole_file import write_whole
 
 KEY = "calib-inspect-training"
 
@@ -34,10 +35,7 @@ def save_checkpoint(
     for index, moments in optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer.{index}.{name}": torch.as_tensor(value) for name, value in moments.items()}
     tensors = {name: tensor.detach().cpu().clone().contiguous() for name, tensor in tensors.items()}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".part")
-    save_file(tensors, partial, metadata={KEY: json.dumps(state)})
-    partial.replace(path)
+    write_whole(path, lambda partial: save_file(tensors, partial, metadata={KEY: json.dumps(state)}))
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +14,7 @@ from calibnet.datasets import Frame, Sequence, dataset_names
 from calibnet.datasets.discovery import find_sequences
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry import PinholeCamera
+from calibnet.runtime.whole_file import write_whole
 from calibnet.training.samples import Source
 
 
@@ -73,10 +73,7 @@ class SyntheticPool:
         from calibnet.datasets.synthetic import sample_frame
 
         frame = sample_frame(self.seed * 1_000_000 + position)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(f".{os.getpid()}.part")  # several processes may draw the same scene
-        partial.write_bytes(_pack(frame))
-        partial.replace(path)
+        write_whole(path, _pack(frame))
         return frame
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
+from calibnet.runtime.whole_file import write_whole
 from calibnet.weights.manifest import PACKAGE, load_manifest
 
 if TYPE_CHECKING:
@@ -38,11 +39,12 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
         "record": record,
     }
     tensors = {name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".part")
-    save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
-    partial.chmod(0o644)  # safetensors keeps its files to their owner, which a package must not
-    partial.replace(path)
+
+    def write(partial: Path) -> None:
+        save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
+        partial.chmod(0o644)  # safetensors keeps its files to their owner, which a package must not
+
+    write_whole(path, write)
 
 
 def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:

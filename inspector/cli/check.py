@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from calibnet.runtime.whole_file import write_whole
 from inspector.cli.errors import ExitCode
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run, write_file
+from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
 LIMIT = click.FloatRange(min=0.0)
 
@@ -44,6 +45,6 @@ def check(
     run = open_run(recording)
     verdicts = check_run(run, bounds)
     if junit_file is not None:
-        write_file(junit_file, junit(run, verdicts))
+        write_whole(junit_file, junit(run, verdicts))
     click.echo(summary(run, verdicts))
     return ExitCode.OK if all(verdict.passed for verdict in verdicts) else ExitCode.CHECK_FAILED

@@ -11,9 +11,10 @@ import click
 from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.recordings import RECORDING, open_run
-from inspector.cli.viewing import choose_outputs, saved_lines, viewing_options
+from inspector.cli.viewing import saved_lines, viewing_options
 
 if TYPE_CHECKING:
+    from inspector.cli.viewing import Viewing
     from inspector.compare.comparison import Comparison
     from inspector.record.outputs import Outputs
 
@@ -27,11 +28,7 @@ def compare(
     recordings: tuple[Path, ...],
     names: str | None,
     common_frames: bool,
-    save: Path | None,
-    headless: bool,
-    serve: bool,
-    bind: str,
-    connect: str | None,
+    viewing: Viewing,
 ) -> int:
     """Put recorded runs of one sequence side by side: other weights, miscalibration or preset.
 
@@ -48,7 +45,7 @@ def compare(
     from inspector.compare.recording import record_comparison
     from inspector.record.stream import RecordingLostError
 
-    outputs = choose_outputs(f"compare-{'-'.join(called)}", save, headless, serve, bind, connect)
+    outputs = viewing.outputs(f"compare-{'-'.join(called)}")
     refuse_overwriting(outputs.file, recordings)
     comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
     outputs.check()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.runtime.whole_file import write_whole
 from inspector.cli.options import FOLDER
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run, write_file
+from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
+from inspector.export.registry import FORMATS, export_as
 
 if TYPE_CHECKING:
     from inspector.export.exported import Exported
@@ -20,12 +23,10 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.command()
 @click.argument("recording", type=RECORDING, required=False, metavar="[RUN.rrd]")
 @click.option("--from", "folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
-@click.option(
-    "--format", "form", type=click.Choice(["kitti", "ros", "opencv", "json"]), required=True, help="What to write."
-)
+@click.option("--format", "form", type=click.Choice(FORMATS.names()), required=True, help="What to write.")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default]")
-@click.option("--drive", is_flag=True, help="The extrinsic solved from all frames together (--sequence-estimate).")
+@click.option("--drive", is_flag=True, help="The extrinsic of the drive, of a run with --drive.")
 @click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
 @click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
@@ -64,18 +65,15 @@ def export(
         if ROS_NAME.fullmatch(name) is None:
             raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
 
-    from inspector.export import formats as formats
+    from inspector.export.exported import FrameNames
 
-    exported = chosen(recording, folder, frame, drive)
-    if form == "ros":
-        text = formats.as_ros(exported, formats.RosFrames(camera_frame, lidar_frame, parent == "lidar"))
-    else:
-        write = {"kitti": formats.as_kitti, "opencv": formats.as_opencv, "json": formats.as_json}[form]
-        text = write(exported)
+    frames = FrameNames(camera_frame, lidar_frame, parent == "lidar")
+    exported = replace(chosen(recording, folder, frame, drive), frames=frames)
+    text = export_as(form, exported)
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_file(output, text.encode())
+        write_whole(output, text.encode())
         click.echo(f"Saved {output}: {exported.origin}.", err=True)
 
 

@@ -76,12 +76,19 @@ def import_folder(found: Recognised) -> None:
     sequence: Sequence = open_sequence(found.dataset, found.root, **found.options)
     positions = spread(len(sequence), MOST_FRAMES)
     start = Start(MiscalibrationRange.parse(RANGE), as_is=found.as_is)
+    cascade = Cascade.load(stages=start.stages)
     title = f"{sequence.name}, {len(positions)} of {len(sequence)} frames"
     identity = {"sequence": sequence.name, "rig": sequence.rig, "detail": str(Detail.OVERVIEW)}
-    description = RunDescription(title, identity)
-    contents, quiet = Contents.of(Detail.OVERVIEW), Console(quiet=True)
     Session(
-        sequence, positions, Cascade.load(stages=start.stages), start, Outputs(), description, contents, quiet
+        sequence=sequence,
+        positions=positions,
+        cascade=cascade,
+        skipped=cascade.skipped,
+        start=start,
+        outputs=Outputs(),
+        description=RunDescription(title, identity),
+        contents=Contents.of(Detail.OVERVIEW),
+        console=Console(quiet=True),
     ).run()
 
 

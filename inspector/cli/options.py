@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from calibnet.geometry.types import Transform
+from inspector.record.contents import Coloring, Detail, Part
 
 if TYPE_CHECKING:
     from calibnet.geometry import MiscalibrationRange
@@ -92,28 +94,40 @@ class MiscalibrationType(click.ParamType["Transform"]):
         return miscalibration(numbers[:3], numbers[3:])
 
 
-class PartsType(click.ParamType[tuple[str, ...]]):
-    """Names of `inspector.record.contents.Part` with commas between them, to a tuple."""
+class PartsType(click.ParamType[frozenset[Part]]):
+    """Names of `Part` with commas between them."""
 
     name = "PART,PART"
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, ...]:
-        """Check every name; a value that is a tuple already is kept."""
-        from inspector.record.contents import Part
-
-        if isinstance(value, tuple):
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> frozenset[Part]:
+        """Check every name; a value that is a set already is kept."""
+        if isinstance(value, frozenset):
             return value
-        parts = tuple(part.strip() for part in str(value).split(","))
+        parts = [part.strip() for part in str(value).split(",")]
         unknown = [part for part in parts if part not in list(Part)]
         if unknown:
             self.fail(f"{unknown[0]!r} is no part of a frame; choose from {', '.join(Part)}.", param, ctx)
-        return parts
+        return frozenset(map(Part, parts))
+
+
+class WordType(click.Choice[str]):
+    """One of the words of an enumeration, to its member."""
+
+    def __init__(self, words: type[StrEnum]) -> None:
+        super().__init__([str(word) for word in words])
+        self.words = words
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> StrEnum:
+        """Check the word; a value that is a member already is kept."""
+        return value if isinstance(value, self.words) else self.words(super().convert(value, param, ctx))
 
 
 RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()
 PARTS = PartsType()
+DETAIL = WordType(Detail)
+COLORING = WordType(Coloring)
 MISCALIBRATION = MiscalibrationType()
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""

@@ -23,11 +23,3 @@ def open_run(path: Path) -> RecordedRun:
     if run.warning:
         click.echo(run.warning, err=True)
     return run
-
-
-def write_file(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all, and its folder if need be."""
-    from calibnet.runtime.whole_file import write_whole
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, content)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.network.config import Head
+from calibnet.network.heads import HEADS
 from inspector.cli.options import FOLDER, RANGE
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network to train.")
-@click.option("--head", type=click.Choice(get_args(Head)), help="Pose head to train instead of the preset's.")
+@click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
 @click.option(
     "--all",
@@ -103,7 +103,7 @@ if TYPE_CHECKING:
 )
 def train(
     preset: str,
-    head: Head | None,
+    head: str | None,
     range_: MiscalibrationRange | None,
     every_stage: bool,
     data: tuple[str, ...],
@@ -235,7 +235,7 @@ class ConsoleObserver:
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
         """Print the figures beside the initial ones."""
         self.console.print(
-            f"validation after {progress.samples:,d} samples, {figures.samples} single shots, medians: "
+            f"validation after {progress.samples:,d} samples, {figures.samples} single looks, medians: "
             f"rotation {figures.initial_rotation_deg:.2f}° -> {figures.rotation_deg:.2f}° "
             f"(p95 {figures.rotation_p95_deg:.2f}°), "
             f"translation {figures.initial_translation_cm:.1f} -> {figures.translation_cm:.1f} cm",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,23 +27,50 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
 )
 
 
+@dataclass(frozen=True)
+class Viewing:
+    """Where a recording is shown and kept, as it was asked for.
+
+    Attributes:
+        save: file to write.
+        headless: open no window.
+        serve: offer the viewer as a web page.
+        bind: address that it listens on.
+        connect: gRPC address of a viewer that runs already.
+    """
+
+    save: Path | None
+    headless: bool
+    serve: bool
+    bind: str
+    connect: str | None
+
+    def outputs(self, name: str) -> Outputs:
+        """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows.
+
+        Args:
+            name: of what is recorded, for that file's name.
+        """
+        from inspector.record.outputs import Outputs, has_display
+
+        save, viewer = self.save, has_display() and not (self.headless or self.serve or self.connect)
+        if save is None and not (viewer or self.serve or self.connect):
+            save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.rrd"
+        return Outputs(save, viewer, self.serve, self.connect, self.bind)
+
+
 def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options that `choose_outputs` takes."""
+    """Give a command the options of `Viewing`, which it gets as one, ``viewing``."""
+    names = [field.name for field in fields(Viewing)]
+
+    @wraps(command)
+    def packed(**given: Any) -> Any:
+        return command(viewing=Viewing(**{name: given.pop(name) for name in names}), **given)
+
+    decorated: Callable[..., Any] = packed
     for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
-
-
-def choose_outputs(
-    name: str, save: Path | None, headless: bool, serve: bool, bind: str, connect: str | None
-) -> Outputs:
-    """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows."""
-    from inspector.record.outputs import Outputs, has_display
-
-    viewer = has_display() and not (headless or serve or connect)
-    if save is None and not (viewer or serve or connect):
-        save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.rrd"
-    return Outputs(save, viewer, serve, connect, bind)
+        decorated = option(decorated)
+    return decorated
 
 
 def saved_lines(file: Path, frames: int) -> list[str]:

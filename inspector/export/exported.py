@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +13,15 @@ from calibnet.geometry import PinholeCamera
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
 from inspector.read.file import RecordingError
-from inspector.read.run import RecordedFrame, RecordedRun
+from inspector.read.run import RecordedRun
 
-SAME_MOUNT = 1e-6
-"""References that differ by less, in metres and in entries of the rotation, are of one mount."""
+
+class FrameNames(NamedTuple):
+    """What a robot calls the two coordinate frames, and whether the LiDAR's is the parent; for formats that say it."""
+
+    camera: str = "camera_optical_frame"
+    lidar: str = "lidar"
+    lidar_is_parent: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +33,14 @@ class Exported:
         camera: intrinsics; of the rectified images.
         distortion: OpenCV's coefficients of the raw images; zeros where the images are rectified already.
         origin: where it comes from, for the file's comment.
+        frames: names of the two coordinate frames.
     """
 
     camera_from_lidar: Extrinsic = field(repr=False)
     camera: PinholeCamera
     distortion: Floats = field(repr=False)
     origin: str
+    frames: FrameNames = field(default_factory=FrameNames)
 
 
 def exported_frame(run: RecordedRun, index: int) -> Exported:
@@ -59,8 +67,8 @@ def exported_median(run: RecordedRun) -> Exported:
     Raises:
         RecordingError: the frames are not all of one camera on one mount.
     """
-    first = run.frames[0]
-    if not all(_same_mount(first, frame) for frame in run.frames[1:]):
+    camera = run.frames[0].camera
+    if not (run.one_mount and all(_same_camera(camera, frame.camera) for frame in run.frames)):
         raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
     count = sum(frame.confirmed for frame in run.frames)
     if not count:
@@ -69,7 +77,7 @@ def exported_median(run: RecordedRun) -> Exported:
             "they belong together, and record again from a wider --range."
         )
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
-    return Exported(median_pose(run.results), first.camera, np.zeros(5), origin)
+    return Exported(median_pose(run.results), camera, np.zeros(5), origin)
 
 
 def exported_drive(run: RecordedRun) -> Exported:
@@ -80,7 +88,7 @@ def exported_drive(run: RecordedRun) -> Exported:
     """
     if run.drive is None:
         raise RecordingError(
-            f"{run.path} has no estimate from the whole drive; record it with --sequence-estimate, or use --median."
+            f"{run.path} has no estimate from the whole drive; record it with --drive, or use --median."
         )
     return Exported(run.drive, run.frames[0].camera, np.zeros(5), f"{run.title}, all frames solved together")
 
@@ -97,10 +105,5 @@ def exported_folder(folder: Path) -> Exported:
     return Exported(content.calibration.camera_from_lidar, camera, content.distortion, f"{folder.name}/{path.name}")
 
 
-def _same_mount(one: RecordedFrame, other: RecordedFrame) -> bool:
-    same_camera = (one.camera.width, one.camera.height) == (other.camera.width, other.camera.height)
-    if not (same_camera and np.array_equal(one.camera.matrix, other.camera.matrix)):
-        return False
-    if one.reference is None or other.reference is None:
-        return True
-    return float(np.abs(one.reference - other.reference).max()) < SAME_MOUNT
+def _same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
+    return (one.width, one.height) == (other.width, other.height) and np.array_equal(one.matrix, other.matrix)

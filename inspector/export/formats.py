@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -14,14 +13,6 @@ from inspector.export.exported import Exported
 
 AXES = "LiDAR x forward, y left, z up; camera x right, y down, z forward (optical frame); metres"
 CONVENTION = f"camera_from_lidar maps LiDAR points into the camera, x_camera = R x_lidar + t; {AXES}"
-
-
-class RosFrames(NamedTuple):
-    """Names of the two frames, and whether the LiDAR is the parent."""
-
-    camera: str = "camera_optical_frame"
-    lidar: str = "lidar"
-    lidar_is_parent: bool = True
 
 
 def as_kitti(exported: Exported) -> str:
@@ -39,9 +30,9 @@ def as_kitti(exported: Exported) -> str:
     return "\n".join([*lines, ""])
 
 
-def as_ros(exported: Exported, frames: RosFrames) -> str:
+def as_ros(exported: Exported) -> str:
     """A ROS 2 launch file (YAML) of a static transform, with the same as a command line in its comment."""
-    lidar_is_parent = frames.lidar_is_parent
+    frames, lidar_is_parent = exported.frames, exported.frames.lidar_is_parent
     parent, child = (frames.lidar, frames.camera) if lidar_is_parent else (frames.camera, frames.lidar)
     parent_from_child = invert(exported.camera_from_lidar) if lidar_is_parent else exported.camera_from_lidar
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from pyarrow import RecordBatch
     from rerun.chunk import Chunk
 
-
 PROPERTIES = "__properties"
 """Where Rerun keeps a recording's name and properties."""
+SAME_MOUNT = 1e-6  # references of one mount differ by less, in metres and in entries of the rotation
 PICTURES = (entities.IMAGE, entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_CORRECTED)
 
 
@@ -107,6 +107,12 @@ class RecordedRun:
     drive: Extrinsic | None = field(repr=False)
     warning: str
     _file: RecordingFile = field(repr=False)
+
+    @property
+    def one_mount(self) -> bool:
+        """Whether the references of all frames are the same; true where there is none to tell."""
+        references = [frame.reference for frame in self.frames if frame.reference is not None]
+        return not references or float(np.ptp(references, axis=0).max()) < SAME_MOUNT
 
     @property
     def results(self) -> list[Extrinsic]:

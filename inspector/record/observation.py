@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import PoseError, invert, pose_error, project
+from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, project
 from calibnet.geometry.projection import Projection
 from calibnet.geometry.types import Extrinsic, Vector3
 from calibnet.trace import CascadeTrace, StageTrace
@@ -113,8 +113,7 @@ class StageLayout:
     @property
     def title(self) -> str:
         """For view names, for instance ``"Stage 3 (±5°/0.5 m)"``."""
-        degrees, metres = self.range.split("/")
-        return f"Stage {self.number} (±{degrees}°/{metres} m)"
+        return f"Stage {self.number} ({MiscalibrationRange.parse(self.range).label})"
 
 
 @dataclass(frozen=True)

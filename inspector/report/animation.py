@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from calibnet.errors import ConfigError
+from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.whole_file import write_whole
 from inspector import entities
@@ -78,7 +79,6 @@ def write_animation(run: RecordedRun, file: Path, frames: Sequence[int]) -> None
     pictures[0].save(
         encoded, kind[1:], save_all=True, append_images=pictures[1:], duration=durations, loop=0, **FORMATS[kind]
     )
-    file.parent.mkdir(parents=True, exist_ok=True)
     write_whole(file, encoded.getvalue())
 
 
@@ -88,8 +88,7 @@ def steps_of(run: RecordedRun, frame: RecordedFrame) -> Iterator[Step]:
     yield Step(entities.OVERLAY_MISCALIBRATED, start, _error(frame, frame.initial), FIRST_MS)
     for stage in run.stages:
         last = frame.confirmed and stage == run.stages[-1]
-        degrees, _, metres = stage.range.partition("/")
-        name = f"after stage {stage.number} (for ±{degrees}° / {metres} m)"
+        name = f"after stage {stage.number} (for {MiscalibrationRange.parse(stage.range).label})"
         error = _error(frame, frame.stages[stage.number])
         yield Step(entities.overlay_stage(stage.number), name, error, LAST_MS if last else STAGE_MS)
     if not frame.confirmed:

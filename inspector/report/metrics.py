@@ -17,8 +17,6 @@ from inspector.read.run import RecordedFrame, RecordedRun
 
 DISTANCE_M = 10.0
 """Frames are ranked by how far, at most, a point at this distance is misplaced."""
-SAME_MOUNT = 1e-6
-"""References that differ by less than this are of one mount."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,6 @@ class Figures:
         frames = run.frames
         median = median_pose(run.results)
         yardsticks = [median if frame.reference is None else frame.reference for frame in frames]
-        one_mount = float(np.ptp(yardsticks, axis=0).max()) < SAME_MOUNT
 
         def errors(extrinsics: Sequence[Extrinsic]) -> tuple[PoseError, ...]:
             return tuple(pose_error(mine, other) for mine, other in zip(extrinsics, yardsticks, strict=True))
@@ -102,8 +99,8 @@ class Figures:
             run,
             tuple(states),
             tuple(pose_error(frame.corrected, frame.initial) for frame in frames),
-            median if one_mount else None,
-            pose_error(median, yardsticks[0]) if one_mount and run.has_reference else None,
+            median if run.one_mount else None,
+            pose_error(median, yardsticks[0]) if run.one_mount and run.has_reference else None,
         )
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from html import escape
 
+from calibnet.geometry import MiscalibrationRange
 from inspector.report.metrics import Figures, State
 from inspector.report.verdict import ROTATION, TRANSLATION
 
@@ -46,8 +47,7 @@ def axes_table(figures: Figures) -> str:
 def _row(state: State, cells: Iterable[str]) -> str:
     trained_for = ""
     if state.range is not None:
-        degrees, metres = state.range.split("/")
-        trained_for = f' <span class="range">±{escape(degrees)}° / {escape(metres)} m</span>'
+        trained_for = f' <span class="range">{escape(MiscalibrationRange.parse(state.range).label)}</span>'
     return f"<th>{state.name}{trained_for}</th>" + "".join(f"<td>{cell}</td>" for cell in cells)
 
 

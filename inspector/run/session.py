@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from dataclasses import dataclass
-from typing import Protocol
 
 from rich.console import Console
 from rich.progress import (
@@ -19,12 +17,11 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError
-from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
-from calibnet.trace import CascadeTrace, DriveEstimate
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
@@ -36,26 +33,7 @@ from inspector.run.summary import Summary
 STOPPING = "Stopping after this frame; once more stops at once."
 
 
-class Calibrator(Protocol):
-    """What the loop needs of a cascade."""
-
-    @property
-    def skipped(self) -> Positions[Skipped]:
-        """Stages that were asked for and have no weights."""
-        ...
-
-    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """Run the stages on one frame."""
-        ...
-
-    def calibrate_drive(
-        self, frames: PickedFrames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
-    ) -> DriveEstimate:
-        """Estimate one extrinsic from all frames."""
-        ...
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Session:
     """Everything a run needs; `run` does it.
 
@@ -63,23 +41,25 @@ class Session:
         sequence: where frames come from.
         positions: which of them, in order.
         cascade: what calibrates them.
+        skipped: stages that were asked for and have no weights.
         start: where each calibration starts.
         outputs: where the recording goes.
         description: what the recording says about itself.
         contents: what is logged of each frame.
         console: where progress is shown.
-        as_one: after the frames, also solve all of them as one drive.
+        drive: after the frames, also solve the drive's extrinsic from all of them.
     """
 
     sequence: Sequence
     positions: Positions[int]
-    cascade: Calibrator
+    cascade: DriveCalibrator
+    skipped: Positions[Skipped] = ()
     start: Start
     outputs: Outputs
     description: RunDescription
     contents: Contents
     console: Console
-    as_one: bool = False
+    drive: bool = False
 
     def run(self) -> Summary:
         """Calibrate and record every frame; stop at the first that cannot be read.
@@ -101,13 +81,13 @@ class Session:
                         break
                     observation = self._observe(position)
                     if recording is None:
-                        layout = Layout.of(observation, self.contents, self.as_one)
+                        layout = Layout.of(observation, self.contents, self.drive)
                         recording = Recording(self.outputs.open(), self.description, layout)
                     self.outputs.check_space()
                     recording.log(observation)
                     summary.add(observation)
-                if self.as_one and recording is not None and not summary.interrupted:
-                    summary.drive = self._solve_as_one(recording, progress, stop)
+                if self.drive and recording is not None and not summary.interrupted:
+                    summary.drive = self._solve_drive(recording, progress, stop)
         except KeyboardInterrupt:
             summary.interrupted = True
         except CalibnetError as error:
@@ -120,14 +100,14 @@ class Session:
     def _observe(self, position: int) -> Observation:
         frame = self.sequence[position]
         trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
-        return Observation(frame, trace, self.start.reference(frame), tuple(self.cascade.skipped))
+        return Observation(frame, trace, self.start.reference(frame), tuple(self.skipped))
 
-    def _solve_as_one(self, recording: Recording, progress: Progress, stop: StopRequest) -> str:
-        """Estimate one extrinsic from all frames and log how it converges; returns the result in words."""
+    def _solve_drive(self, recording: Recording, progress: Progress, stop: StopRequest) -> str:
+        """Solve the drive's extrinsic from all frames and log how it converges; returns the result in words."""
         frames = PickedFrames(self.sequence, self.positions)
         first = frames[0]
         initial, reference = self.start.initial(first), self.start.reference(first)
-        task = progress.add_task("whole drive as one", total=None)
+        task = progress.add_task("whole drive", total=None)
 
         def advance(read: int, total: int) -> None:
             progress.update(task, completed=read, total=total)

@@ -14,7 +14,7 @@ from calibnet.geometry.types import Extrinsic
 
 @dataclass(frozen=True)
 class Start:
-    """Starting extrinsics, the same for the same seed.
+    """Starting extrinsics, the same for the same seed; as text, where they come from.
 
     Attributes:
         range: what miscalibrations are drawn from, and what decides which stages run.
@@ -34,6 +34,13 @@ class Start:
     def stages(self) -> tuple[int, ...]:
         """Numbers of the stages that a run from here goes through."""
         return stages_within(self.range if self.given is None else range_of(self.given))
+
+    def __str__(self) -> str:
+        if self.as_is:
+            return "from the calibration as it is"
+        if self.given is not None:
+            return "miscalibrated as given"
+        return f"miscalibrated within {self.range}{', anew every frame' if self.per_frame else ''}, seed {self.seed}"
 
     def initial(self, frame: Frame) -> Extrinsic:
         """The ``camera_from_lidar`` that the cascade starts from on this frame."""

@@ -43,14 +43,15 @@ def record() -> Callable[..., None]:
         **cascade: Any,
     ) -> Any:
         session = Session(
-            sequence or fakes_module.FakeSequence(length),
-            range(length),
-            fakes_module.FakeCascade(**cascade),
-            Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
-            Outputs(file),
-            RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),
-            Contents.of(Detail(detail), frozenset(map(Part, parts)), Coloring(color)),
-            Console(quiet=True),
+            sequence=sequence or fakes_module.FakeSequence(length),
+            positions=range(length),
+            cascade=fakes_module.FakeCascade(**cascade),
+            skipped=fakes_module.FakeCascade.skipped,
+            start=Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
+            outputs=Outputs(file),
+            description=RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),
+            contents=Contents.of(Detail(detail), frozenset(map(Part, parts)), Coloring(color)),
+            console=Console(quiet=True),
         )
         return session.run()
 

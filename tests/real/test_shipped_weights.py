@@ -8,7 +8,7 @@ import pytest
 
 from calibnet.cascade.cascade import Cascade
 from calibnet.datasets import open_sequence
-from calibnet.evaluation.runner import evaluate
+from calibnet.evaluation.runner import evaluate_frames
 from calibnet.geometry import MiscalibrationRange
 
 ODOMETRY = Path(__file__).parents[3] / "shared" / "kitti" / "odometry"
@@ -18,7 +18,7 @@ ODOMETRY = Path(__file__).parents[3] / "shared" / "kitti" / "odometry"
 def test_rotation_errors_shrink_on_a_rig_never_trained_on() -> None:
     sequence = open_sequence("kitti-odometry", ODOMETRY, sequence="04")
     range_ = MiscalibrationRange(5, 0.5)
-    evaluation = evaluate(Cascade.load("compact", (3, 4, 5)), [sequence], range_, repeats=2, seed=7)
+    evaluation = evaluate_frames(Cascade.load("compact", (3, 4, 5)), [sequence], range_, repeats=2, seed=7)
     before, after = evaluation.initial.as_dict(), evaluation.stages[-1].metrics.as_dict()
     assert evaluation.failed == 0
     assert after["rotation_deg"]["median"] < 0.85 * before["rotation_deg"]["median"]

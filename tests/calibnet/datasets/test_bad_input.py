@@ -7,10 +7,10 @@ import shutil
 import numpy as np
 import pytest
 
-from calibnet.datasets import dataset_names
+from calibnet.datasets import DATASETS
 from calibnet.errors import DatasetError
 
-ON_FILES = [name for name in dataset_names() if name != "synthetic"]
+ON_FILES = list(DATASETS.own)
 """The datasets that read images and scans from files."""
 
 

@@ -9,40 +9,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibnet.datasets import Sequence, dataset_names, open_sequence
+from calibnet.conformance import check_dataset
+from calibnet.datasets import DATASETS, dataset_names, open_sequence
+from calibnet.datasets.discovery import find_sequences
 from calibnet.errors import ConfigError
+from tests.support.toy_package import install_toys
 
 
-@pytest.mark.parametrize("dataset", dataset_names())
+@pytest.mark.parametrize("dataset", DATASETS.own)
 def test_dataset_keeps_the_protocol(dataset, write_layout):
     layout = write_layout(dataset)
-    sequence = layout.open()
+    check_dataset(layout.open)
 
-    assert isinstance(sequence, Sequence)
-    assert sequence.name
-    assert sequence.rig
-    frames = list(sequence)
+
+@pytest.mark.parametrize("dataset", DATASETS.own)
+def test_what_is_on_disk_is_what_is_read(dataset, write_layout):
+    layout = write_layout(dataset)
+    frames = list(layout.open())
     assert [frame.index for frame in frames] == layout.indices
-    assert len(sequence) == len(frames)
-    times = [frame.timestamp for frame in frames]
-    assert times[0] == 0.0
-    assert times == sorted(times)
-
     for frame in frames:
-        height, width = frame.image.shape[:2]
-        assert frame.image.dtype == np.uint8
-        assert frame.image.shape == (height, width, 3)
-        assert (frame.camera.width, frame.camera.height) == (width, height)
         np.testing.assert_allclose(frame.camera.matrix, layout.matrix, rtol=1e-12)
-        assert frame.points.dtype == np.float32
-        assert frame.points.ndim == 2
-        assert frame.points.shape[1] == 4
-        assert len(frame.points) > 0
-        assert np.isfinite(frame.points).all()
-        assert 0.0 <= frame.points[:, 3].min() <= frame.points[:, 3].max() <= 1.0
-        assert frame.camera_from_lidar.dtype == np.float64
         np.testing.assert_allclose(frame.camera_from_lidar, layout.camera_from_lidar, rtol=0, atol=1e-12)
-        assert frame.source
 
     for frame, pixels in zip(frames, layout.pixels, strict=bool(layout.pixels)):
         np.testing.assert_array_equal(frame.image, pixels)
@@ -50,19 +37,14 @@ def test_dataset_keeps_the_protocol(dataset, write_layout):
         np.testing.assert_array_equal(frame.points, points)
 
 
-@pytest.mark.parametrize("dataset", dataset_names())
-def test_frames_are_read_anew_and_by_position(dataset, write_layout):
-    sequence = write_layout(dataset).open()
-    first, again, last = sequence[0], sequence[0], sequence[-1]
-    np.testing.assert_array_equal(first.image, again.image)
-    np.testing.assert_array_equal(first.points, again.points)
-    assert last.index == [frame.index for frame in sequence][-1]
-    first.image[:] = 0  # frames are the reader's own: changing one changes no other
-    first.points[:] = 0
-    assert sequence[0].image.any()
-    assert sequence[0].points.any()
-    with pytest.raises(IndexError):
-        sequence[len(sequence)]
+def test_a_dataset_of_another_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    install_toys(tmp_path, monkeypatch)
+    assert dataset_names()[-2:] == ("broken", "toy")
+    check_dataset(lambda: open_sequence("toy", tmp_path / "drive", first=3))
+    assert [frame.index for frame in open_sequence("toy", tmp_path, first=3)] == [3, 4]
+    assert [one.name for one in find_sequences("toy", tmp_path, "drive")] == ["toy/drive"]
+    with pytest.raises(ConfigError, match=r"toy takes \(root, first\)"):
+        open_sequence("toy", tmp_path, camera=2)
 
 
 def test_unknown_dataset_and_option_name_what_there_is(tmp_path: Path):

@@ -10,6 +10,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 
+from calibnet.conformance import check_dataset
 from calibnet.datasets.frame import Sequence
 from calibnet.datasets.synthetic import (
     KITTI_LIKE,
@@ -214,6 +215,10 @@ def test_lane_paint_returns_more_than_asphalt():
     tiles = atlas()
     first = tiles.texels[: len(tiles.tile_metres) * 256 * 256].reshape(-1, 256 * 256, 4)[..., 3].mean(axis=1)
     assert first[list(tiles.groups["paint"])].min() > 3.0 * first[list(tiles.groups["asphalt"])].max()
+
+
+def test_sequence_keeps_the_promises_of_a_dataset():
+    check_dataset(lambda: SyntheticSequence(5, 2, SMALL))
 
 
 def test_sequence_keeps_the_protocol_whatever_is_read_first():

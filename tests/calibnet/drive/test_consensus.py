@@ -16,11 +16,10 @@ from calibnet.geometry.se3 import (
     rotation_vector,
 )
 from calibnet.geometry.types import Transform
-from calibnet.network.pose import prior_information
 from calibnet.trace import Estimate
 from tests.support.fakes import REFERENCE
 
-PRIOR = np.diag(prior_information(RANGES[2]).double().numpy())
+PRIOR = RANGES[2].information
 TRUTH = miscalibration([0.5, -0.8, 1.2], [0.05, -0.1, 0.08])
 """The correction that all frames should agree on."""
 SIGMA = np.array([0.1, 0.1, 0.2, 0.004, 0.004, 0.004])

@@ -13,7 +13,7 @@ from calibnet.geometry.types import Transform
 from calibnet.trace import DriveEstimate, Estimate
 from tests.support.drive import REFERENCE, Drive
 
-BOUNDS = MiscalibrationRange(5, 0.5)
+RANGE = MiscalibrationRange(5, 0.5)
 
 
 class Solver:
@@ -38,26 +38,26 @@ class Solver:
 def test_every_drive_is_solved_from_every_miscalibration() -> None:
     solver, told = Solver(), []
     drives: list[Sequence] = [Drive([0, 1, 2]), Drive([0, 1], "other")]
-    metrics = evaluate_drives(solver, drives, BOUNDS, 3, 7, lambda *seen: told.append(seen))
+    metrics = evaluate_drives(solver, drives, RANGE, 3, 7, lambda *seen: told.append(seen))
     assert metrics is not None and metrics.estimate.rotation_deg.yaw == pytest.approx(0.5)
     assert metrics.networks is not None and metrics.networks.rotation_deg.yaw == pytest.approx(1.5)
     assert len({initial.tobytes() for initial in solver.initials}) == 6
     assert told == [("test/drive", 0, 3)] * 3 + [("other", 0, 2)] * 3
     again = Solver()
-    evaluate_drives(again, drives, BOUNDS, 3, 7)
+    evaluate_drives(again, drives, RANGE, 3, 7)
     np.testing.assert_array_equal(again.initials, solver.initials)
 
 
 def test_a_drive_that_cannot_be_solved_keeps_its_initial_error() -> None:
     solver = Solver(fails=True)
-    metrics = evaluate_drives(solver, [Drive([0, 1])], BOUNDS, 1, 0)
+    metrics = evaluate_drives(solver, [Drive([0, 1])], RANGE, 1, 0)
     assert metrics is not None
     initial = pose_error(solver.initials[0], REFERENCE)
     assert metrics.estimate.rotation_deg.mean == pytest.approx(initial.rotation_deg) and metrics.networks is None
 
 
 def test_networks_have_no_row_of_their_own_where_nothing_is_aligned() -> None:
-    metrics = evaluate_drives(Solver(aligns=False), [Drive([0, 1])], BOUNDS, 1, 0)
+    metrics = evaluate_drives(Solver(aligns=False), [Drive([0, 1])], RANGE, 1, 0)
     assert metrics is not None and metrics.networks is None
 
 
@@ -65,4 +65,4 @@ def test_frames_of_several_mounts_are_no_drive() -> None:
     assert shares_mount(Drive([0, 1, 2]))
     assert not shares_mount(Drive([0, 1, 2], moving=True))
     assert not shares_mount(Drive([0]))
-    assert evaluate_drives(Solver(), [Drive([0, 1], moving=True)], BOUNDS, 1, 0) is None
+    assert evaluate_drives(Solver(), [Drive([0, 1], moving=True)], RANGE, 1, 0) is None

@@ -7,7 +7,7 @@ import pytest
 
 from calibnet.datasets import Frame, PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
-from calibnet.evaluation.runner import Run, draw_miscalibration, evaluate
+from calibnet.evaluation.runner import Run, draw_miscalibration, evaluate_frames
 from calibnet.geometry import (
     RANGES,
     MiscalibrationRange,
@@ -19,7 +19,7 @@ from calibnet.geometry.types import Transform
 from calibnet.trace import CascadeTrace, StageTrace
 from tests.support.drive import CAMERA, REFERENCE, Drive
 
-BOUNDS = MiscalibrationRange(5, 0.5)
+RANGE = MiscalibrationRange(5, 0.5)
 
 
 @dataclass
@@ -47,7 +47,7 @@ class ShrinkingCascade:
 
 
 def test_every_stage_is_measured_against_the_reference() -> None:
-    evaluation = evaluate(ShrinkingCascade(), [Drive([0, 1, 2])], BOUNDS, repeats=2, seed=7)
+    evaluation = evaluate_frames(ShrinkingCascade(), [Drive([0, 1, 2])], RANGE, repeats=2, seed=7)
     third, fourth = evaluation.stages
     assert (third.number, str(third.range), fourth.number, str(fourth.range)) == (3, "5/0.5", 4, "2/0.2")
     assert third.metrics.rotation_deg.pitch == pytest.approx(1.5)
@@ -60,7 +60,7 @@ def test_every_stage_is_measured_against_the_reference() -> None:
 
 
 def test_runs_that_the_picture_does_not_confirm_keep_their_initial_error_in_the_end() -> None:
-    evaluation = evaluate(ShrinkingCascade(doubted=frozenset({1})), [Drive([0, 1, 2])], BOUNDS, repeats=2, seed=7)
+    evaluation = evaluate_frames(ShrinkingCascade(doubted=frozenset({1})), [Drive([0, 1, 2])], RANGE, repeats=2, seed=7)
     assert evaluation.unconfirmed == evaluation.as_dict()["unconfirmed"] == 2
     for run in evaluation.runs:
         assert run.unconfirmed == (run.frame == 1)
@@ -70,7 +70,7 @@ def test_runs_that_the_picture_does_not_confirm_keep_their_initial_error_in_the_
 
 def test_initial_errors_are_those_of_what_the_cascade_was_given() -> None:
     cascade = ShrinkingCascade()
-    evaluation = evaluate(cascade, [Drive([0, 1, 2, 3])], BOUNDS, repeats=1, seed=7)
+    evaluation = evaluate_frames(cascade, [Drive([0, 1, 2, 3])], RANGE, repeats=1, seed=7)
     angles = [pose_error(initial, REFERENCE).rotation_deg for _, initial in cascade.initials]
     assert evaluation.initial.rotation_deg.mean == pytest.approx(np.mean(angles))
     assert len(set(angles)) == 4
@@ -79,17 +79,17 @@ def test_initial_errors_are_those_of_what_the_cascade_was_given() -> None:
 
 def test_a_miscalibration_depends_on_seed_frame_and_repeat_alone() -> None:
     whole, part = ShrinkingCascade(), ShrinkingCascade()
-    evaluate(whole, [Drive([0, 1, 2, 3])], BOUNDS, repeats=2, seed=7)
-    evaluate(part, [Drive([3, 1])], BOUNDS, repeats=1, seed=7)
+    evaluate_frames(whole, [Drive([0, 1, 2, 3])], RANGE, repeats=2, seed=7)
+    evaluate_frames(part, [Drive([3, 1])], RANGE, repeats=1, seed=7)
     drawn = {(frame, n % 2): initial for n, (frame, initial) in enumerate(whole.initials)}
     for frame, initial in part.initials:
         assert np.array_equal(initial, drawn[frame, 0])
     assert len({initial.tobytes() for initial in drawn.values()}) == 8
-    assert not np.array_equal(draw_miscalibration(BOUNDS, 7, 1, 0), draw_miscalibration(BOUNDS, 8, 1, 0))
+    assert not np.array_equal(draw_miscalibration(RANGE, 7, 1, 0), draw_miscalibration(RANGE, 8, 1, 0))
 
 
 def test_frames_that_cannot_be_calibrated_keep_their_initial_error() -> None:
-    evaluation = evaluate(ShrinkingCascade(blind=frozenset({1})), [Drive([0, 1])], BOUNDS, repeats=1, seed=0)
+    evaluation = evaluate_frames(ShrinkingCascade(blind=frozenset({1})), [Drive([0, 1])], RANGE, repeats=1, seed=0)
     blind = evaluation.runs[1]
     assert evaluation.failed == 1
     expected = (1.5 + blind.initial.rotation_deg) / 2
@@ -99,16 +99,16 @@ def test_frames_that_cannot_be_calibrated_keep_their_initial_error() -> None:
 
 def test_nothing_measured_is_an_error() -> None:
     with pytest.raises(CalibrationError, match="No point"):
-        evaluate(ShrinkingCascade(blind=frozenset({0})), [Drive([0])], BOUNDS, repeats=1, seed=0)
+        evaluate_frames(ShrinkingCascade(blind=frozenset({0})), [Drive([0])], RANGE, repeats=1, seed=0)
     with pytest.raises(DatasetError, match="no frame"):
-        evaluate(ShrinkingCascade(), [], BOUNDS, repeats=1, seed=0)
+        evaluate_frames(ShrinkingCascade(), [], RANGE, repeats=1, seed=0)
 
 
 def test_frame_selection_and_observer() -> None:
     seen: list[Run] = []
     drives = [Drive([10, 11, 12, 13]), Drive([0, 1, 2, 3], name="other", rig="other rig")]
     sequences = [PickedFrames(drive, [1, 3]) for drive in drives]
-    evaluation = evaluate(ShrinkingCascade(), sequences, BOUNDS, 1, 0, observer=seen.append)
+    evaluation = evaluate_frames(ShrinkingCascade(), sequences, RANGE, 1, 0, observer=seen.append)
     assert [(run.sequence, run.frame) for run in seen] == [
         ("test/drive", 11),
         ("test/drive", 13),
@@ -120,7 +120,7 @@ def test_frame_selection_and_observer() -> None:
 
 
 def test_json_form() -> None:
-    content = evaluate(ShrinkingCascade(), [Drive([0, 1])], BOUNDS, repeats=3, seed=1).as_dict()
+    content = evaluate_frames(ShrinkingCascade(), [Drive([0, 1])], RANGE, repeats=3, seed=1).as_dict()
     assert (content["frames"], content["repeats"], content["rig"], content["range"]) == (2, 3, "test rig", "5/0.5")
     assert [stage["range"] for stage in content["stages"]] == ["5/0.5", "2/0.2"]
     figures = {"rotation_deg", "translation_cm", "success_2deg_5cm", "success_1deg_2.5cm"}

@@ -77,6 +77,26 @@ def test_malformed_range(text):
         MiscalibrationRange.parse(text)
 
 
+def test_label_for_people():
+    assert [range_.label for range_ in RANGES[:3]] == ["±20°/1.5 m", "±10°/1 m", "±5°/0.5 m"]
+
+
+def test_information_is_the_inverse_variance_of_what_is_drawn():
+    information = MiscalibrationRange(5, 0.5).information
+    assert information.shape == (6, 6) and information.dtype == np.float64
+    assert_array_equal(information, np.diag(np.diag(information)))
+    metres, radians = np.diag(information)[[0, 5]]
+    assert metres == pytest.approx(12.0)  # 3 / 0.5²
+    assert radians == pytest.approx(3 / np.radians(5) ** 2)
+    assert_array_equal(information, information.astype(np.float32))
+    drawn = [sample_miscalibration(MiscalibrationRange(5, 0.5), np.random.default_rng(seed)) for seed in range(2000)]
+    assert np.var([delta[0, 3] for delta in drawn]) == pytest.approx(1 / metres, rel=0.05)
+
+
+def test_nothing_is_known_beyond_doubt():
+    assert_allclose(np.diag(MiscalibrationRange(0, 0).information), 1e8, rtol=1e-6)
+
+
 def test_bounds_of_a_given_miscalibration():
     range_ = range_of(miscalibration([1.0, -4.5, 2.0], [0.1, -0.3, 0.05]))
     assert range_.rotation_deg == pytest.approx(4.5)

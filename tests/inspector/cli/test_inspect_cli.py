@@ -184,6 +184,34 @@ def test_contents_that_make_no_sense_are_wrong_usage(
     assert not Path("own.rrd").exists()
 
 
+class AskedError(Exception):
+    """Raised instead of running, with what was asked for."""
+
+
+@pytest.mark.parametrize("option", ["--drive", "--sequence-estimate"])
+def test_a_drive_is_solved_under_the_new_name_and_the_former(
+    invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    from inspector.run.session import Session
+
+    def run(session: Session) -> None:
+        raise AskedError(session.drive)
+
+    monkeypatch.setattr(Session, "run", run)
+    for given, drive in (((option,), True), ((), False)):
+        with pytest.raises(AskedError) as asked:
+            invoke("folder", str(own_folder), "--save", "own.rrd", *given)
+        assert asked.value.args == (drive,)
+    code, _, err = invoke("folder", str(own_folder), option, "--range", "5/0.5", "--per-frame")
+    assert code == 2 and "--drive needs one mount" in err
+
+
+def test_help_does_not_show_the_former_name(invoke: Invoke) -> None:
+    shown = invoke("raw", "--help")[1]
+    assert "--drive" in shown and "--sequence-estimate" not in shown
+    assert "Usage: calib-inspect raw [OPTIONS] DATE DRIVE" in shown
+
+
 def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke, own_folder: Path) -> None:
     code, out, _ = invoke("folder", str(own_folder), "--frames", "0", "--save", "own.rrd", "--log", "overlays,scene")
     assert code == 0

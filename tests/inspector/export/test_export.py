@@ -206,7 +206,7 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
         (("RUN", "--frame", 1, "--median"), 2, "one of --frame, --median and --drive"),
         (("--from", "x", "--median"), 2, "has one calibration"),
         (("RUN", "--lidar-frame", "two words"), 2, "no ROS frame name"),
-        (("RUN", "--drive"), 3, "record it with --sequence-estimate"),
+        (("RUN", "--drive"), 3, "record it with --drive"),
         (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),
         (("--from", "nowhere"), 3, "cannot be read"),
         (("nowhere.rrd",), 3, "There is no recording nowhere.rrd"),

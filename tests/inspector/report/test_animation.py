@@ -42,9 +42,9 @@ def test_the_steps_of_a_frame_name_every_stage_with_its_error(recorded: Recorded
     start, *stages = steps_of(recorded, recorded.frames[0])
     assert [step.name for step in (start, *stages)] == [
         "miscalibrated",
-        "after stage 3 (for ±5° / 0.5 m)",
-        "after stage 4 (for ±2° / 0.2 m)",
-        "after stage 5 (for ±1° / 0.1 m)",
+        "after stage 3 (for ±5°/0.5 m)",
+        "after stage 4 (for ±2°/0.2 m)",
+        "after stage 5 (for ±1°/0.1 m)",
     ]
     assert [step.overlay for step in stages] == [entities.overlay_stage(number) for number in (3, 4, 5)]
     assert [step.milliseconds for step in (start, *stages)] == [FIRST_MS, STAGE_MS, STAGE_MS, LAST_MS]

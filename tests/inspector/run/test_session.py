@@ -31,15 +31,16 @@ sys.modules["fakes"] = fakes
 spec.loader.exec_module(fakes)
 from rich.console import Console
 from calibnet.geometry import MiscalibrationRange
-from inspector.cli.inspect import finish
+from inspector.cli.run import finish
 from inspector.record.contents import Contents, Detail
 from inspector.record.outputs import Outputs, has_display
 from inspector.record.recording import RunDescription
 from inspector.run.session import Session
 from inspector.run.start import Start
 outputs = Outputs(Path(sys.argv[2]))
-session = Session(fakes.FakeSequence(100_000), range(100_000), fakes.FakeCascade(), Start(MiscalibrationRange(5, 0.5)),
-                  outputs, RunDescription("fake/00", {"seed": 0}), Contents.of(Detail.FULL), Console(quiet=True))
+session = Session(sequence=fakes.FakeSequence(100_000), positions=range(100_000), cascade=fakes.FakeCascade(),
+                  start=Start(MiscalibrationRange(5, 0.5)), outputs=outputs, contents=Contents.of(Detail.FULL),
+                  description=RunDescription("fake/00", {"seed": 0}), console=Console(quiet=True))
 sys.exit(finish(session.run(), outputs, None))
 """
 

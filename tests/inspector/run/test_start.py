@@ -10,7 +10,7 @@ import pytest
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert, miscalibration, pose_error
 from inspector.run.start import Start
 
-BOUNDS = MiscalibrationRange(5.0, 0.5)
+RANGE = MiscalibrationRange(5.0, 0.5)
 
 
 def deltas(start: Start, fakes: ModuleType, count: int = 4) -> list[np.ndarray]:
@@ -19,7 +19,7 @@ def deltas(start: Start, fakes: ModuleType, count: int = 4) -> list[np.ndarray]:
 
 
 def test_one_draw_for_the_run_within_the_range(fakes: ModuleType) -> None:
-    first, *others = deltas(Start(BOUNDS, seed=3), fakes)
+    first, *others = deltas(Start(RANGE, seed=3), fakes)
     for other in others:
         np.testing.assert_allclose(other, first, atol=1e-12)
     assert np.degrees(np.abs(euler_xyz(first[:3, :3]))).max() <= 5.0
@@ -28,7 +28,7 @@ def test_one_draw_for_the_run_within_the_range(fakes: ModuleType) -> None:
 
 
 def test_per_frame_draws_depend_on_the_frame_not_on_the_order(fakes: ModuleType) -> None:
-    start = Start(BOUNDS, seed=3, per_frame=True)
+    start = Start(RANGE, seed=3, per_frame=True)
     drawn = deltas(start, fakes)
     assert not np.allclose(drawn[0], drawn[1])
     frame = fakes.make_frame(2, points=10)
@@ -36,12 +36,12 @@ def test_per_frame_draws_depend_on_the_frame_not_on_the_order(fakes: ModuleType)
 
 
 def test_another_seed_draws_another(fakes: ModuleType) -> None:
-    assert not np.allclose(deltas(Start(BOUNDS, seed=1), fakes)[0], deltas(Start(BOUNDS, seed=2), fakes)[0])
+    assert not np.allclose(deltas(Start(RANGE, seed=1), fakes)[0], deltas(Start(RANGE, seed=2), fakes)[0])
 
 
 def test_given_miscalibration_is_used_and_decides_the_stages(fakes: ModuleType) -> None:
     given = miscalibration([1.5, 0.0, 0.0], [0.0, 0.1, 0.0])
-    start = Start(BOUNDS, given=given)
+    start = Start(RANGE, given=given)
     np.testing.assert_allclose(deltas(start, fakes)[0], given, atol=1e-12)
     assert start.stages == (4, 5)
 
@@ -53,7 +53,7 @@ def test_stages_are_those_within_the_range(range_: tuple[float, float], stages: 
 
 def test_as_it_is_has_no_reference(fakes: ModuleType) -> None:
     frame = fakes.make_frame(0, points=10)
-    start = Start(BOUNDS, as_is=True)
+    start = Start(RANGE, as_is=True)
     np.testing.assert_array_equal(start.initial(frame), frame.camera_from_lidar)
     assert start.reference(frame) is None
-    np.testing.assert_array_equal(Start(BOUNDS).reference(frame), frame.camera_from_lidar)
+    np.testing.assert_array_equal(Start(RANGE).reference(frame), frame.camera_from_lidar)

@@ -12,17 +12,16 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic
-from calibnet.network.pose import prior_information
 from calibnet.trace import CascadeTrace, StageTrace
 
 
 class EdgeAlignment:
-    """A `calibnet.evaluation.runner.Calibrator` without weights."""
+    """A `Calibrator` without weights."""
 
     def __init__(self, range_: MiscalibrationRange) -> None:
-        """Expect errors of ``range_``."""
+        """Expect miscalibrations within ``range_``; farther ones are held back by it."""
         self.range = range_
-        self.covariance = np.diag(1 / prior_information(range_).double().numpy())
+        self.covariance = np.diag(1 / np.diag(range_.information))
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibnet.evaluation.edge_alignment import EdgeAlignment
 from calibnet.geometry import MiscalibrationRange, miscalibration, pose_error
+from calibnet.methods.edge_alignment import EdgeAlignment
 from tests.support.boxes import REFERENCE, boxes
 
 

@@ -1,0 +1,84 @@
+"""What a method promises: `check_method`."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from calibnet.conformance.requirement import require, require_definite, require_rigid
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import miscalibration
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator
+from calibnet.trace import CascadeTrace
+
+
+def check_method(calibrator: Calibrator, frame: Frame | None = None) -> None:
+    """Hold a method to the promises of `Calibrator` and, where it is one, of `DriveCalibrator`.
+
+    Whether it is any good is for `calibnet.evaluation.measure` to say.
+
+    Args:
+        calibrator: ready to use.
+        frame: one that it can calibrate from 1° and 5 cm off; a synthetic one by default.
+
+    Raises:
+        AssertionError: one of them is not kept; the sentence says which.
+    """
+    require(isinstance(calibrator, Calibrator), "A method has calibrate(frame, initial, detail=False).")
+    chosen = synthetic_frame() if frame is None else frame
+    initial = miscalibration([0.6, -0.6, 0.5], [0.03, -0.03, 0.03]) @ chosen.camera_from_lidar
+    before, start = copy.deepcopy(chosen), initial.copy()
+    trace = calibrator.calibrate(chosen, initial)
+    check_trace(trace, start)
+    untouched = np.array_equal(before.image, chosen.image) and np.array_equal(before.points, chosen.points)
+    require(untouched and np.array_equal(initial, start), "The method changes the frame or the extrinsic it is given.")
+    again = calibrator.calibrate(chosen, initial)
+    require(np.array_equal(trace.corrected, again.corrected), "The same frame and start give another result.")
+    blind = calibrator.calibrate(replace(chosen, camera_from_lidar=np.eye(4)), initial)
+    require(np.array_equal(trace.corrected, blind.corrected), "The method looks at the frame's own extrinsic.")
+    check_trace(calibrator.calibrate(chosen, initial, detail=True), start)
+    if isinstance(calibrator, DriveCalibrator):
+        _check_drive(calibrator, chosen, initial)
+
+
+def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
+    """Hold a trace to its own rules: it starts where it should, and each stage where the one before ended."""
+    require(np.array_equal(trace.initial, initial), "The trace does not start from the extrinsic that was given.")
+    require(len(trace.stages) > 0, "The trace has no stage; a method without stages has one.")
+    stages = (*trace.wider, *trace.stages)
+    numbers = [stage.number for stage in stages]
+    require(numbers == sorted(set(numbers)), f"The stages are numbered {numbers}; numbers rise.")
+    expected = initial
+    for stage in stages:
+        name = f"stage {stage.number}"
+        require(np.array_equal(stage.before, expected), f"{name} does not start where the one before it ended.")
+        require_rigid(stage.correction, f"the correction of {name}")
+        require(np.allclose(stage.after, stage.correction @ stage.before), f"{name}: after is not correction @ before.")
+        if stage.information is not None:
+            require_definite(stage.information, f"the information of {name}")
+        require(min(stage.milliseconds.values(), default=0.0) >= 0, f"{name} took less than no time.")
+        expected = stage.after
+    require_rigid(trace.corrected, "the corrected extrinsic")
+
+
+def _check_drive(calibrator: DriveCalibrator, frame: Frame, initial: Extrinsic) -> None:
+    """The same frame twice is a drive of two frames."""
+    told: list[tuple[int, int]] = []
+    frames = [frame, replace(frame, index=frame.index + 1)]
+    estimate = calibrator.calibrate_drive(frames, initial, lambda read, total: told.append((read, total)))
+    require_rigid(estimate.camera_from_lidar, "the drive's extrinsic")
+    require_definite(estimate.covariance, "the covariance of the drive's extrinsic")
+    require(0 < estimate.frames <= len(frames), f"The estimate is from {estimate.frames} of {len(frames)} frames.")
+    reads, totals = [read for read, _ in told], {total for _, total in told}
+    require(reads == list(range(len(reads))), f"The observer hears of {reads} frames read.")
+    require(totals == {len(reads)}, f"The observer hears of {totals} frames to read, and {len(reads)} were read.")
+
+
+def synthetic_frame() -> Frame:
+    """A frame of the synthetic world."""
+    from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
+
+    return SyntheticSequence(seed=0, length=1, rig=KITTI_LIKE)[0]

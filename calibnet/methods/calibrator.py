@@ -1,0 +1,52 @@
+"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive as well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.geometry.types import Extrinsic
+from calibnet.trace import CascadeTrace, DriveEstimate
+
+
+@runtime_checkable
+class Calibrator(Protocol):
+    """Corrects the extrinsic of one frame; `calibnet.cascade.cascade.Cascade` is one."""
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """Correct ``initial``.
+
+        Args:
+            frame: image, scan and camera; its own extrinsic must not be looked at.
+            initial: ``camera_from_lidar`` to start from, 4x4.
+            detail: keep intermediate results in each `StageTrace.detail`, where the method has any to show.
+
+        Returns:
+            What happened stage by stage; a method without stages has one.
+
+        Raises:
+            CalibrationError: this frame cannot be calibrated.
+        """
+        ...
+
+
+@runtime_checkable
+class DriveCalibrator(Calibrator, Protocol):
+    """Also solves the one extrinsic of a drive from all its frames."""
+
+    def calibrate_drive(
+        self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        """Correct ``initial``.
+
+        Args:
+            frames: of one camera and LiDAR on one mount, at least one.
+            initial: ``camera_from_lidar`` to start from, 4x4.
+            observer: called before each frame with the numbers of frames read and to be read; a frame may be read
+                more than once.
+
+        Raises:
+            CalibrationError: no frame could be calibrated.
+        """
+        ...

@@ -1,0 +1,95 @@
+"""What `evaluate` prints: tables of rotation, translation and success, and what the audit says, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from calibnet.evaluation.metrics import Metrics
+    from calibnet.evaluation.runner import Evaluation
+
+
+def print_evaluation(evaluation: Evaluation, console: Console) -> None:
+    """Print what was measured on, then tables of rotation, translation and success."""
+    runs = len(evaluation.runs)
+    console.print(
+        f"{', '.join(evaluation.sequences)} ({evaluation.rig}): {evaluation.frames} frames x {evaluation.repeats} = "
+        f"{runs} runs from {evaluation.range.label}, "
+        f"seed {evaluation.seed}"
+    )
+    rows = [("initial", evaluation.initial)]
+    rows += [(name, metrics) for name, metrics in evaluation.references.items() if metrics is not evaluation.initial]
+    rows += [(f"stage {stage.number} ({stage.range})", stage.metrics) for stage in evaluation.stages]
+    if evaluation.drives_networks is not None:
+        rows.append(("drive, networks", evaluation.drives_networks))
+    if evaluation.drives is not None:
+        rows.append(("drive", evaluation.drives))
+    rows += [(f"audit: {name}", metrics) for name, metrics in evaluation.audit.items()]
+    for title, key, decimals in (
+        ("Rotation error, degrees", "rotation_deg", 3),
+        ("Translation error, cm", "translation_cm", 2),
+    ):
+        console.print(error_table(title, [(name, metrics.as_dict()[key]) for name, metrics in rows], decimals))
+    console.print(success_table(rows))
+    if evaluation.audit:
+        console.print(audit_sentence(evaluation))
+    if evaluation.audit or evaluation.unconfirmed:
+        console.print(unconfirmed_sentence(evaluation))
+    if evaluation.failed:
+        console.print(
+            f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
+            style="yellow",
+        )
+
+
+def audit_sentence(evaluation: Evaluation) -> str:
+    """What is left of the initial rotation error with the true image and without it."""
+    initial = evaluation.initial.rotation_deg.median
+    left = {"the true image": evaluation.final, f"images of {evaluation.audit_images}": evaluation.audit["swapped"]}
+    left |= {"a grey image": evaluation.audit["grey"], "half the rings": evaluation.audit["thinned"]}
+    shares = ", ".join(f"{metrics.rotation_deg.median / initial:.0%} with {name}" for name, metrics in left.items())
+    return f"Of the initial rotation error (median) is left: {shares}."
+
+
+def unconfirmed_sentence(evaluation: Evaluation) -> str:
+    """In how many runs the picture did not confirm the result."""
+    with_audit = "".join(f", {count} with the audit's {name}" for name, count in evaluation.audit_unconfirmed.items())
+    return (
+        f"Picture and scan did not fit after the last stage, so the extrinsic was left as it was, in "
+        f"{evaluation.unconfirmed} of {len(evaluation.runs)} runs{with_audit}."
+    )
+
+
+def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:
+    """A row for each of ``rows``; per axis the mean absolute error."""
+    table = plain_table(title)
+    largest = max(max(figures.values()) for _, figures in rows)
+    decimals = min(decimals, max(0, 4 - len(f"{largest:.0f}")))  # numbers wider than that would not fit
+    for heading in rows[0][1]:
+        table.add_column(heading, justify="right")
+    for name, figures in rows:
+        table.add_row(name, *(f"{value:.{decimals}f}" for value in figures.values()))
+    return table
+
+
+def success_table(rows: list[tuple[str, Metrics]]) -> Table:
+    """The share of runs below both limits."""
+    table = plain_table("Success rate")
+    table.add_column("< 2° and < 5 cm", justify="right")
+    table.add_column("< 1° and < 2.5 cm", justify="right")
+    for name, metrics in rows:
+        table.add_row(name, f"{metrics.success_2deg_5cm:.1%}", f"{metrics.success_1deg_2_5cm:.1%}")
+    return table
+
+
+def plain_table(title: str) -> Table:
+    """An empty table that fits into 80 columns, its first column being the row's name."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column("after", no_wrap=True)
+    return table

@@ -1,0 +1,192 @@
+"""A calibration run from its options to its end: what `seq`, `raw`, `object`, `folder` and `demo` share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from inspector.cli.errors import ExitCode, fail
+from inspector.cli.options import COLORING, DETAIL, FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, STAGES
+from inspector.cli.viewing import saved_lines, viewing_options
+from inspector.run.options import DEFAULT_RANGE, OptionsError, RunOptions
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from calibnet.cascade.cascade import Cascade
+    from calibnet.datasets import Sequence
+    from inspector.cli.viewing import Viewing
+    from inspector.record.outputs import Outputs
+    from inspector.run.summary import Summary
+
+_OPTIONS: tuple[Callable[..., Any], ...] = (
+    click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
+    click.option(
+        "--range",
+        type=RANGE,
+        help=f"Draw the miscalibration from ± these degrees and metres.  [default: {DEFAULT_RANGE}]",
+    ),
+    click.option(
+        "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
+    ),
+    click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random."),
+    click.option(
+        "--drive",
+        is_flag=True,
+        help="After the frames, solve the extrinsic of the whole drive from all of them, and record how it converges.",
+    ),
+    click.option("--sequence-estimate", "drive", is_flag=True, hidden=True),  # its former name
+    click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
+    click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
+    click.option(
+        "--detail",
+        type=DETAIL,
+        help="full: some 6 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
+        "custom: what --log names.  [default: full]",
+    ),
+    click.option(
+        "--log",
+        "parts",
+        type=PARTS,
+        help="With --detail custom, parts of a frame to record: curves (errors), overlays (after every stage), volumes "
+        "(maps of the cost volumes), hourglass (activations), scene (3D), tensors (raw volumes, all slices). Image, "
+        "first and last overlay, extrinsics and table are always there.",
+    ),
+    click.option(
+        "--color",
+        type=COLORING,
+        default="depth",
+        show_default=True,
+        help="Of the points over the image; edge: those at depth edges stand out; error: pixels off the reference.",
+    ),
+    click.option(
+        "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
+    ),
+)
+
+
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command all options of a calibration run; it passes them on to `calibrate`, under the same names."""
+    command = viewing_options(command)
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **asked: Any) -> int:
+    """Run the cascade on a sequence; returns the exit code.
+
+    Args:
+        sequence: what to calibrate.
+        viewing: where the recording is shown and kept.
+        report: folder of the report to make.
+        **asked: fields of `RunOptions`.
+    """
+    try:
+        options = RunOptions(sequence=sequence, **asked)
+    except OptionsError as error:
+        raise click.UsageError(str(error)) from None
+    from rich.console import Console
+
+    from calibnet.cascade.cascade import Cascade
+    from inspector.record.recording import RunDescription
+    from inspector.record.stream import RecordingLostError
+    from inspector.run.session import Session
+
+    positions = options.positions
+    outputs = choose_outputs(options, viewing, report)
+    cascade = Cascade.load(options.preset, options.stages or options.start.stages, options.weights)
+    stages = [stage.number for stage in cascade.stages]
+    console = Console(stderr=True, highlight=False)
+    announce(console, options, cascade)
+    provenance = describe_provenance(options.preset, stages, options.weights)
+    session = Session(
+        sequence=sequence,
+        positions=positions,
+        cascade=cascade,
+        skipped=cascade.skipped,
+        start=options.start,
+        drive=options.drive,
+        outputs=outputs,
+        description=RunDescription(options.title, options.identity(stages), provenance),
+        contents=options.contents,
+        console=console,
+    )
+    try:
+        return finish(session.run(), outputs, report)
+    except RecordingLostError as error:
+        os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
+    finally:
+        outputs.close()
+
+
+def choose_outputs(options: RunOptions, viewing: Viewing, report: Path | None) -> Outputs:
+    """Where the recording goes, found out to work; a report keeps it, if nothing else does."""
+    if report is not None:
+        from inspector.report.write import RECORDING, check_folder
+
+        check_folder(report)
+        viewing = replace(viewing, save=viewing.save or report / RECORDING)
+    outputs = viewing.outputs(options.sequence.name)
+    outputs.check()
+    return outputs
+
+
+def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
+    """Say what is about to run, and which stages cannot."""
+    numbers = ", ".join(str(stage.number) for stage in cascade.stages)
+    what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}, stages {numbers}"
+    console.print(what, markup=False, soft_wrap=True)
+    for stage in cascade.skipped:
+        console.print(f"Skipped: {stage.reason}", style="yellow", markup=False, soft_wrap=True)
+
+
+def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:
+    """Versions, and as JSON the training record of every stage's weights by its number."""
+    import json
+    from importlib.metadata import version
+
+    from calibnet import __version__
+    from calibnet.geometry import RANGES
+    from calibnet.weights import read_record, weights_path
+
+    files = {number: weights_path(preset, RANGES[number - 1], folder) for number in stages}
+    records = {number: read_record(file) for number, file in files.items() if file.is_file()}
+    versions = {"torch": version("torch"), "rerun": version("rerun-sdk")}
+    return {"calib_inspect": __version__, **versions, "weights": json.dumps(records)}
+
+
+def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
+    """Print the result and where it is, make the report, and serve until Ctrl-C where that was asked for."""
+    for line in summary.lines():
+        click.echo(line)
+    if outputs.file is not None and summary.frames:
+        click.echo(size_line(outputs.file, summary.frames))
+        for line in saved_lines(outputs.file, summary.frames):
+            click.echo(line)
+        if report is not None:
+            from inspector.cli.report import write_report_of
+
+            write_report_of(outputs.file, report)
+    if summary.interrupted:
+        click.echo("Interrupted: the frames above are all that was recorded.", err=True)
+        return ExitCode.INTERRUPTED
+    if outputs.page is not None:
+        click.echo(f"Serving at {outputs.page} until Ctrl-C.")
+        outputs.wait_while_serving()
+    return ExitCode.OK
+
+
+def size_line(file: Path, frames: int) -> str:
+    """What a frame's bytes go to."""
+    from inspector.read.sizes import sizes_by_group
+
+    parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
+    return f"Kilobytes a frame: {', '.join(parts)}."

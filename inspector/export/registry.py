@@ -1,0 +1,39 @@
+"""The export formats by name; those of other packages register as ``calib_inspect.exports``.
+
+A format is a function from `inspector.export.exported.Exported` to the text of a file;
+`inspector.export.conformance.check_export_format` tests one. One of ours needs one line in `FORMATS`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from calibnet.runtime.plugins import Registry
+
+if TYPE_CHECKING:
+    from inspector.export.exported import Exported
+
+FORMATS = Registry(
+    "exports",
+    "export format",
+    {
+        "kitti": "inspector.export.formats:as_kitti",
+        "ros": "inspector.export.formats:as_ros",
+        "opencv": "inspector.export.formats:as_opencv",
+        "json": "inspector.export.formats:as_json",
+    },
+)
+
+
+def export_as(name: str, exported: Exported) -> str:
+    """A calibration as the text of a file.
+
+    Args:
+        name: of the format, one of ``FORMATS.names()``.
+        exported: what to write.
+
+    Raises:
+        ConfigError: there is no such format, or its package is broken.
+    """
+    text: str = FORMATS.load(name)(exported)
+    return text

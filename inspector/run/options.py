@@ -1,0 +1,137 @@
+"""What a user asks of a run, checked once and passed on whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from calibnet.datasets.frame import Sequence
+from calibnet.datasets.selection import select_frames
+from calibnet.errors import ConfigError
+from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.types import Transform
+from inspector.record.contents import Coloring, Contents, Detail, Part
+from inspector.run.start import Start
+
+DEFAULT_RANGE = MiscalibrationRange(5, 0.5)
+
+
+class OptionsError(ConfigError):
+    """Options that contradict each other, or the data."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """One calibration run, as it was asked for.
+
+    Attributes:
+        sequence: what to calibrate.
+        frames: positions in it, as `select_frames` reads them.
+        camera: which camera of the rig, where the dataset has several.
+        as_is: the sequence's extrinsic is what is to be corrected, and no reference.
+        range: to draw the miscalibration from; None for `DEFAULT_RANGE`.
+        miscalibration: this one, instead of drawing any.
+        per_frame: draw one for every frame, not one for the run.
+        seed: of everything random.
+        drive: after the frames, also solve the drive's extrinsic from all of them.
+        stages: to run; None for those within the miscalibration.
+        preset: network to use.
+        weights: folder of its weights; None for those of the package.
+        detail: how much of each frame is recorded; None for everything, or for what ``parts`` names.
+        parts: with `Detail.CUSTOM`, what is recorded.
+        color: of the points over the image.
+
+    Raises:
+        OptionsError: two of them contradict each other.
+    """
+
+    sequence: Sequence
+    frames: str = ":"
+    camera: int | None = None
+    as_is: bool = False
+    range: MiscalibrationRange | None = None
+    miscalibration: Transform | None = field(default=None, repr=False)
+    per_frame: bool = False
+    seed: int = 0
+    drive: bool = False
+    stages: tuple[int, ...] | None = None
+    preset: str = "compact"
+    weights: Path | None = None
+    detail: Detail | None = None
+    parts: frozenset[Part] | None = None
+    color: Coloring = Coloring.DEPTH
+
+    def __post_init__(self) -> None:
+        for wrong, sentence in (
+            (
+                self.range is not None and self.miscalibration is not None,
+                "Give --range or --miscalibrate, not both.",
+            ),
+            (
+                self.miscalibration is not None and self.per_frame,
+                "--per-frame draws from --range; --miscalibrate is the same for all frames.",
+            ),
+            (
+                self.drive and self.per_frame,
+                "--drive needs one mount for all frames; --per-frame moves it in each.",
+            ),
+            (
+                self.as_is and self.color is Coloring.ERROR,
+                f"--color error shows the distance to the reference, and {self.sequence.name} has none: give --range "
+                "or --miscalibrate to take its calibration for the reference, or choose another --color.",
+            ),
+            (
+                (self._level is Detail.CUSTOM) != (self.parts is not None),
+                "--detail custom and --log belong together: --log says which parts to record.",
+            ),
+        ):
+            if wrong:
+                raise OptionsError(sentence)
+
+    @property
+    def _level(self) -> Detail:
+        """The detail, or what ``parts`` alone means."""
+        return self.detail or (Detail.FULL if self.parts is None else Detail.CUSTOM)
+
+    @cached_property
+    def positions(self) -> list[int]:
+        """Of the frames to run.
+
+        Raises:
+            DatasetError: there are none.
+        """
+        return select_frames(self.sequence, self.frames)
+
+    @property
+    def start(self) -> Start:
+        """Where the calibrations start."""
+        return Start(self.range or DEFAULT_RANGE, self.seed, self.per_frame, self.miscalibration, self.as_is)
+
+    @property
+    def contents(self) -> Contents:
+        """What is recorded of each frame."""
+        return Contents.of(self._level, self.parts or frozenset(), self.color)
+
+    @property
+    def title(self) -> str:
+        """Of the recording."""
+        return f"{self.sequence.name}, {self.start}"
+
+    def identity(self, stages: list[int]) -> dict[str, Any]:
+        """Everything that changes the recorded data, as recordings keep it; ``stages`` are those that can run."""
+        return {
+            "sequence": self.sequence.name,
+            "rig": self.sequence.rig,
+            "frames": self.frames,
+            "camera": "" if self.camera is None else str(self.camera),
+            "start": str(self.start),
+            "seed": self.seed,
+            "stages": ",".join(map(str, stages)),
+            "preset": self.preset,
+            "detail": str(self.detail or Detail.FULL),
+            "parts": ",".join(sorted(self.contents.parts)),
+            "color": str(self.color),
+            "sequence_estimate": self.drive,
+        }

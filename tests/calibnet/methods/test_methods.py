@@ -1,0 +1,34 @@
+"""Every method keeps to the interface; one of another package is a method like ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from calibnet.conformance import check_method
+from calibnet.geometry import RANGES
+from calibnet.methods.calibrator import DriveCalibrator
+from calibnet.methods.registry import METHODS, open_method
+from tests.calibnet.cascade.test_cascade import cascade
+from tests.support.boxes import boxes
+from tests.support.scene import make_frame
+from tests.support.toy_package import install_toys
+
+
+@pytest.mark.parametrize("name", METHODS.own)
+def test_methods_keep_their_promises(name: str) -> None:
+    check_method(open_method(name, RANGES[4]), boxes())
+
+
+def test_the_cascade_keeps_them_too_and_those_of_drives() -> None:
+    ours = cascade((4, 5))
+    assert isinstance(ours, DriveCalibrator)
+    check_method(ours, make_frame())
+
+
+def test_a_method_of_another_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_toys(tmp_path, monkeypatch)
+    method = open_method("nothing", RANGES[2])
+    assert not isinstance(method, DriveCalibrator)
+    check_method(method, boxes())

@@ -1,0 +1,61 @@
+"""Other packages' datasets, heads, methods and formats on the command line, in a fresh process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.toy_package import install_toys
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def start(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command line as a user does who has installed what is in the folder."""
+    environment = {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "COLUMNS": "200"}
+    return subprocess.run(
+        [sys.executable, "-m", "inspector", *arguments],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        ("evaluate", ("folder|broken|toy", "edge-alignment|broken|nothing")),
+        ("folder", ("folder|broken|toy",)),
+        ("export", ("kitti|ros|opencv|json|broken|csv",)),
+        ("train", ("geometric|regression|broken|still",)),
+    ],
+)
+def test_help_lists_them_whatever_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, names: tuple[str, ...]
+) -> None:
+    install_toys(tmp_path, monkeypatch)
+    done = start(tmp_path, command, "--help")
+    assert done.returncode == 0, done.stderr
+    assert all(name in "".join(done.stdout.split()) for name in names)
+
+
+def test_a_broken_one_is_one_sentence_when_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_toys(tmp_path, monkeypatch)
+    done = start(tmp_path, "folder", str(tmp_path), "--dataset", "broken")
+    assert done.returncode == 3
+    assert done.stderr.startswith("calib-inspect: The dataset 'broken' of package broken_package cannot be imported (")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_dataset_of_another_package_is_calibrated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_toys(tmp_path, monkeypatch)
+    done = start(tmp_path, "folder", str(tmp_path), "--dataset", "toy", "--headless", "--frames", "9")
+    assert (done.returncode, done.stdout) == (3, "")
+    assert f"Frames '9' select nothing of toy/{tmp_path.name}, which has 2 frames" in done.stderr
