@@ -20,7 +20,7 @@ STEPS_PER_FRAME = 6
 RUN = "run"
 """Property: the options that identify the run."""
 PROVENANCE = "provenance"
-"""Property: what a reader needs besides, see `inspector.record.recording.Recording`."""
+"""Property: versions, records of the weights, and which stages the recording contains."""
 
 IMAGE = "image"
 TABLE = "table"
@@ -30,9 +30,12 @@ OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
 
 EXTRINSIC_INITIAL = "extrinsic/initial"
+"""Where the calibration of the frame began."""
 EXTRINSIC_CORRECTED = "extrinsic/corrected"
+"""The frame's result: that of the last stage or, where the picture did not confirm it, the initial one."""
 EXTRINSIC_REFERENCE = "extrinsic/reference"
 EXTRINSIC_DRIVE = "extrinsic/drive"
+"""The extrinsic that all frames up to this one agree on; the last row is the drive's."""
 CAMERA = "extrinsic/camera"
 """The frame's own camera: ``width``, ``height``, ``camera_matrix`` row by row, and ``source``, its image's name."""
 MATRIX = "camera_from_lidar"
@@ -47,6 +50,7 @@ LEGEND_CERTAINTY = "legend/certainty"
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"
+"""Below it the losses of a training run, and below the next its figures on held-out frames."""
 VALIDATION = "validation"
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
