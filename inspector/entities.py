@@ -22,6 +22,9 @@ RUN = "run"
 PROVENANCE = "provenance"
 """Property: versions, records of the weights, and which stages the recording contains."""
 
+SKIPPED = "skipped"
+"""A line of text at every frame that could not be used: why."""
+
 IMAGE = "image"
 TABLE = "table"
 

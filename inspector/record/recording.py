@@ -8,14 +8,14 @@ come, so that memory stays bounded and a killed run leaves what it had recorded.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import DriveEstimate
+from calibnet.trace import BadFrame, DriveEstimate
 from inspector import entities
 from inspector.record.frame import log_frame
 from inspector.record.observation import Layout, Observation
@@ -93,6 +93,12 @@ class Recording:
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
             self._unflushed = 0
             self._stream.flush()
+
+    def log_skipped(self, frames: Iterable[BadFrame]) -> None:
+        """Log which frames could not be used, and why; nothing else is there of them."""
+        for bad in frames:
+            self._rec.set_frame(bad.frame, self._seconds.get(bad.frame, 0.0))
+            self._rec.log(entities.SKIPPED, rr.TextLog(bad.why, level=rr.TextLogLevel.WARN))
 
     def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
         """Log what all frames together make of the extrinsic."""

@@ -106,7 +106,7 @@ def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial
     """The result for the terminal."""
     error = pose_error(estimate.camera_from_lidar, initial if reference is None else reference)
     what = "changed the calibration by" if reference is None else "off by"
-    skipped = f", {estimate.skipped} more could not be used" if estimate.skipped else ""
+    skipped = f", {len(estimate.skipped)} more could not be used" if estimate.skipped else ""
     result = (
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
         f"{error.translation_cm:.1f} cm; "

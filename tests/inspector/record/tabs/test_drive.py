@@ -11,7 +11,7 @@ from rerun.chunk import RrdReader
 
 from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
-from calibnet.trace import DriveEstimate, Estimate
+from calibnet.trace import BadFrame, DriveEstimate, Estimate
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive
@@ -35,7 +35,12 @@ def estimate(aligned: bool) -> DriveEstimate:
     last = DriveEstimate(late.camera_from_lidar, np.diag(SIGMA**2), 3)
     history = ((0, early), (2, Estimate(last.camera_from_lidar, last.covariance, 3)))
     return DriveEstimate(
-        last.camera_from_lidar, last.covariance, 3, history, skipped=1, networks=networks if aligned else None
+        last.camera_from_lidar,
+        last.covariance,
+        3,
+        history,
+        skipped=(BadFrame(1, "It is cut short."),),
+        networks=networks if aligned else None,
     )
 
 
