@@ -7,8 +7,9 @@ Two lines put a calibrated frame into a recording of one's own, with the layout 
     recording.send_blueprint(inspector.blueprint(frame, trace, frame.camera_from_lidar))
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from calibnet.runtime.lazy import lazy_names
 
 if TYPE_CHECKING:
     from inspector.record.contents import Coloring as Coloring
@@ -28,15 +29,4 @@ _MODULES = {
 }
 
 __all__ = sorted(_MODULES)
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name of the package at its first use."""
-    if name not in _MODULES:
-        raise AttributeError(f"module 'inspector' has no attribute {name!r}")
-    return getattr(import_module(_MODULES[name]), name)
-
-
-def __dir__() -> list[str]:
-    """The names, loaded or not."""
-    return list(__all__)
+__getattr__, __dir__ = lazy_names("inspector", _MODULES)
