@@ -1,4 +1,4 @@
-"""Names of a package that are loaded when they are first used, so that importing the package costs nothing (PEP 562)."""
+"""Names of a package that are loaded when they are first used, so that importing it costs nothing (PEP 562)."""
 
 from __future__ import annotations
 
