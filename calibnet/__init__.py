@@ -8,8 +8,9 @@ What a user needs is here by name and loaded when it is first used, so that impo
     trace = calibnet.Cascade.load().calibrate(drive[0], drive[0].camera_from_lidar)
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from calibnet.runtime.lazy import lazy_names
 
 if TYPE_CHECKING:
     from calibnet.cascade import Cascade as Cascade
@@ -43,15 +44,4 @@ _MODULES = {
 }
 
 __all__ = sorted(_MODULES)
-
-
-def __getattr__(name: str) -> Any:
-    """Load a name of the package at its first use."""
-    if name not in _MODULES:
-        raise AttributeError(f"module 'calibnet' has no attribute {name!r}")
-    return getattr(import_module(_MODULES[name]), name)
-
-
-def __dir__() -> list[str]:
-    """The names, loaded or not."""
-    return [*__all__, "__version__"]
+__getattr__, __dir__ = lazy_names("calibnet", _MODULES, "__version__")

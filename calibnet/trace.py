@@ -152,6 +152,19 @@ class CascadeTrace:
         return self.arrived if self.confirmed else self.initial
 
 
+@dataclass(frozen=True)
+class BadFrame:
+    """A frame that could not be used.
+
+    Attributes:
+        frame: its index or, where it could not even be read, its position in the sequence.
+        why: one sentence.
+    """
+
+    frame: int
+    why: str
+
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """The extrinsic that a number of frames agree on.
@@ -186,11 +199,11 @@ class DriveEstimate(Estimate):
     Attributes:
         history: the estimate after more and more frames of the last pass, with the index of the latest in its
             sequence; the last one is the estimate.
-        skipped: frames that could not be calibrated in that pass.
+        skipped: frames that could not be read, or calibrated in the last look.
         networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
             frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
     """
 
     history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
-    skipped: int = 0
+    skipped: tuple[BadFrame, ...] = ()
     networks: Estimate | None = field(repr=False, default=None)

@@ -1,14 +1,13 @@
-"""Every entity path and timeline of a recording, in one place.
+"""Timelines, properties and entity paths of a recording that several modules know: who writes them and who reads them.
 
-`stage_logging`, `frame_logging` and `scene_logging` write them, `blueprint` shows them, tests and
-scripts read them back. A new view starts with a path here.
+Paths that one tab alone logs and shows stand in its module in `inspector.record.tabs`.
 """
 
 from __future__ import annotations
 
 APPLICATION_ID = "calib-inspect"
 COMPARISON_APPLICATION_ID = "calib-inspect-compare"
-"""Of another layout, which viewers keep by application."""
+"""Another application than that of runs, since viewers keep one layout for each."""
 
 FRAME = "frame"
 """Timeline: the frame's number in its sequence."""
@@ -21,7 +20,10 @@ STEPS_PER_FRAME = 6
 RUN = "run"
 """Property: the options that identify the run."""
 PROVENANCE = "provenance"
-"""Property: what a reader needs besides, see `inspector.record.recording.Recording`."""
+"""Property: versions, records of the weights, and which stages the recording contains."""
+
+SKIPPED = "skipped"
+"""A line of text at every frame that could not be used: why."""
 
 IMAGE = "image"
 TABLE = "table"
@@ -29,20 +31,14 @@ TABLE = "table"
 OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
 OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
-OVERLAY_CURRENT = "overlay/current"
-
-WORLD = "world"
-CLOUD = "world/cloud"
-"""Positions, once a frame, and colours through every extrinsic: components of the archetype `COLORS_THROUGH`."""
-COLORS_THROUGH = "colors_through"
-LIDAR = "world/lidar"
-CAMERA_INITIAL = "world/camera/initial"
-CAMERA_REFERENCE = "world/camera/reference"
 
 EXTRINSIC_INITIAL = "extrinsic/initial"
+"""Where the calibration of the frame began."""
 EXTRINSIC_CORRECTED = "extrinsic/corrected"
+"""The frame's result: that of the last stage or, where the picture did not confirm it, the initial one."""
 EXTRINSIC_REFERENCE = "extrinsic/reference"
 EXTRINSIC_DRIVE = "extrinsic/drive"
+"""The extrinsic that all frames up to this one agree on; the last row is the drive's."""
 CAMERA = "extrinsic/camera"
 """The frame's own camera: ``width``, ``height``, ``camera_matrix`` row by row, and ``source``, its image's name."""
 MATRIX = "camera_from_lidar"
@@ -51,21 +47,17 @@ MATRIX = "camera_from_lidar"
 LEGEND_POINTS = "legend/points"
 """What the colours of the overlays' points stand for."""
 LEGEND_DISPLACEMENT = "legend/displacement"
+"""What the colours of displacements stand for."""
 LEGEND_CERTAINTY = "legend/certainty"
-LEGEND_WINDOW = "legend/window"
-LEGEND_STAGES = "legend/stages"
+"""What the brightness of probabilities and confidences stands for."""
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"
+"""Below it the losses of a training run, and below the next its figures on held-out frames."""
 VALIDATION = "validation"
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 """The error curves and their units."""
-
-
-FIT = "fit"
-FIT_LIMIT = "fit/limit"
-"""Up to which the last stage's answer is believed."""
 
 
 def overlay_stage(number: int) -> str:
@@ -76,21 +68,6 @@ def overlay_stage(number: int) -> str:
 def caption(overlay: str) -> str:
     """Which extrinsic an overlay shows and how far off it is, written into the picture."""
     return f"{overlay}/caption"
-
-
-def camera_stage(number: int) -> str:
-    """The camera's frustum in the LiDAR frame after a stage."""
-    return f"world/camera/stage_{number}"
-
-
-def drive_parameter(name: str) -> str:
-    """One parameter of the extrinsic estimated from the whole drive."""
-    return f"drive/{name}"
-
-
-def drive_curve(name: str, curve: str) -> str:
-    """Its curve after every frame: ``estimate``, or the ``upper`` or ``lower`` end of its uncertainty."""
-    return f"{drive_parameter(name)}/{curve}"
 
 
 def extrinsic_stage(number: int) -> str:
@@ -114,90 +91,10 @@ def error_corrected(kind: str) -> str:
 
 
 def error_limit(kind: str) -> str:
-    """The bound of the success rate, as a curve to hold the others against."""
+    """The limit of the success rate, as a curve to hold the others against."""
     return f"error/{kind}/success_limit"
 
 
-def fit_stage(number: int) -> str:
-    """Curve of the error that a stage expects of its matches, in pixels of the frame's image."""
-    return f"{FIT}/stage_{number}"
-
-
-def displacement(stage: int) -> str:
-    """Where the network moves the LiDAR cells, as a map of flow colours."""
-    return f"stage_{stage}/displacement"
-
-
-def displacement_arrows(stage: int) -> str:
-    """The same, as arrows in cells."""
-    return f"stage_{stage}/displacement/arrows"
-
-
-def confidence(stage: int) -> str:
-    """How sure the network is of each displacement."""
-    return f"stage_{stage}/confidence"
-
-
-def cost_volume(stage: int, stride: int) -> str:
-    """The matching scores as a tensor ``dy, dx, y, x``."""
-    return f"stage_{stage}/scale_{stride}/cost_volume"
-
-
-def probability(stage: int, stride: int) -> str:
-    """The aggregated volume, a softmax over the window, as a tensor ``dy, dx, y, x``."""
-    return f"stage_{stage}/scale_{stride}/probability"
-
-
-def best_match(stage: int, stride: int) -> str:
-    """Displacement of the most probable cell, as flow colours."""
-    return f"stage_{stage}/scale_{stride}/best_match"
-
-
-def true_match(stage: int, stride: int) -> str:
-    """Displacement to where the reference puts each cell's point, as flow colours."""
-    return f"stage_{stage}/scale_{stride}/true_match"
-
-
-def peak_probability(stage: int, stride: int) -> str:
-    """Probability of the best match: how sure each cell is."""
-    return f"stage_{stage}/scale_{stride}/peak_probability"
-
-
-def slices(stage: int, stride: int) -> str:
-    """All slices of the aggregated volume side by side, one for every displacement."""
-    return f"stage_{stage}/scale_{stride}/slices"
-
-
-def slice_marks(stage: int, stride: int) -> str:
-    """Frames around the slice that won most cells and the one that holds the true displacement; axis labels."""
-    return f"{slices(stage, stride)}/marks"
-
-
-def window(stage: int, stride: int) -> str:
-    """The search window of the chosen cell."""
-    return f"stage_{stage}/scale_{stride}/window"
-
-
-def window_cells(stage: int, stride: int) -> str:
-    """The cell where the point is now and the one where it was found, framed in that window."""
-    return f"{window(stage, stride)}/cells"
-
-
-def window_truth(stage: int, stride: int) -> str:
-    """Where the reference puts the point, in that window or, if outside, on its border."""
-    return f"{window(stage, stride)}/truth"
-
-
-def chosen_cell(stage: int, stride: int) -> str:
-    """A frame around the chosen cell, drawn over the maps."""
-    return f"stage_{stage}/scale_{stride}/chosen_cell"
-
-
-def hourglass_before(stage: int, stride: int) -> str:
-    """Activations entering the hourglass, channels side by side."""
-    return f"stage_{stage}/scale_{stride}/hourglass_before"
-
-
-def hourglass_after(stage: int, stride: int) -> str:
-    """Activations leaving the hourglass, channels side by side."""
-    return f"stage_{stage}/scale_{stride}/hourglass_after"
+def of_scale(stage: int, stride: int, name: str) -> str:
+    """What is logged of one scale of a stage's cost volumes, ``stride`` pixels of its image a cell."""
+    return f"stage_{stage}/scale_{stride}/{name}"

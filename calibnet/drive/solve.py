@@ -10,10 +10,10 @@ from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due, spread
-from calibnet.errors import CalibrationError
+from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.trace import DriveEstimate, Estimate, StageTrace
+from calibnet.trace import BadFrame, DriveEstimate, Estimate, StageTrace
 
 FRAMES_UNTIL_LAST_LOOK = 24
 """Frames, spread over the drive, that all looks but the last one see."""
@@ -68,6 +68,7 @@ def solve_drive(
 
     Raises:
         CalibrationError: no frame could be calibrated.
+        DatasetError: no frame could be read.
         ValueError: there are no frames.
     """
     if not len(frames):
@@ -97,7 +98,8 @@ def solve_drive(
             evidence.append(gather(frame, consensus.before))
         convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
 
-    consensus = agree(stages[-1], read, everything, extrinsic, taken_in)
+    skipped = list[BadFrame]()
+    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped)
     of_networks = consensus.estimate()
     final = estimate(consensus, of_networks, *convergence.latest)
     convergence.end(final)
@@ -106,7 +108,7 @@ def solve_drive(
         final.covariance,
         final.frames,
         tuple(convergence.points),
-        skipped=len(everything) - len(consensus),
+        skipped=tuple(skipped),
         networks=of_networks if aligns else None,
     )
 
@@ -117,6 +119,7 @@ def agree(
     positions: list[int],
     extrinsic: Extrinsic,
     taken_in: Callable[[int, Frame, Consensus], None] | None = None,
+    skipped: list[BadFrame] | None = None,
 ) -> Consensus:
     """What one look of a stage at each of some frames of a drive comes to.
 
@@ -126,18 +129,24 @@ def agree(
         positions: of the frames.
         extrinsic: under which it looks.
         taken_in: called after each frame that could be calibrated, with its position and the consensus so far.
+        skipped: takes in the frames that could not be read or calibrated.
 
     Raises:
         CalibrationError: none of the frames could be calibrated.
+        DatasetError: none could be read.
     """
-    failure = None
+    failure: CalibnetError | None = None
     consensus = Consensus(extrinsic, stage.range.information)
     for position in positions:
-        frame = read(position)
+        index = position
         try:
+            frame = read(position)
+            index = frame.index
             look = believed(stage.look(frame, stage.view(frame), extrinsic), stage.match_error_limit_px, frame)
-        except CalibrationError as error:
+        except (CalibrationError, DatasetError) as error:
             failure = error
+            if skipped is not None:
+                skipped.append(BadFrame(index, str(error)))
             continue
         consensus.add(look.correction, look.information)
         if taken_in is not None:

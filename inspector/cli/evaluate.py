@@ -88,7 +88,7 @@ def evaluate(
     from calibnet.geometry import stages_within
     from inspector.cli.evaluation_tables import print_evaluation
 
-    cascade = Cascade.load(preset, stages or stages_within(range_), weights)
+    cascade = Cascade.load(preset, stages or stages_within(range_), weights, wider=stages is None)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
     references = measuring.classical(range_) if classical else {}

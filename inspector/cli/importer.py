@@ -76,7 +76,7 @@ def import_folder(found: Recognised) -> None:
     sequence: Sequence = open_sequence(found.dataset, found.root, **found.options)
     positions = spread(len(sequence), MOST_FRAMES)
     start = Start(MiscalibrationRange.parse(RANGE), as_is=found.as_is)
-    cascade = Cascade.load(stages=start.stages)
+    cascade = Cascade.load(stages=start.stages, wider=True)
     title = f"{sequence.name}, {len(positions)} of {len(sequence)} frames"
     identity = {"sequence": sequence.name, "rig": sequence.rig, "detail": str(Detail.OVERVIEW)}
     Session(

@@ -42,6 +42,13 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         help="After the frames, solve the extrinsic of the whole drive from all of them, and record how it converges.",
     ),
     click.option("--sequence-estimate", "drive", is_flag=True, hidden=True),  # its former name
+    click.option(
+        "--on-bad-frame",
+        type=click.Choice(["skip", "stop"]),
+        default="skip",
+        show_default=True,
+        help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
+    ),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
@@ -102,7 +109,9 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
 
     positions = options.positions
     outputs = choose_outputs(options, viewing, report)
-    cascade = Cascade.load(options.preset, options.stages or options.start.stages, options.weights)
+    cascade = Cascade.load(
+        options.preset, options.stages or options.start.stages, options.weights, wider=options.stages is None
+    )
     stages = [stage.number for stage in cascade.stages]
     console = Console(stderr=True, highlight=False)
     announce(console, options, cascade)
@@ -114,6 +123,7 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
         skipped=cascade.skipped,
         start=options.start,
         drive=options.drive,
+        stop_on_bad_frame=options.on_bad_frame == "stop",
         outputs=outputs,
         description=RunDescription(options.title, options.identity(stages), provenance),
         contents=options.contents,

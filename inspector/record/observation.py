@@ -16,8 +16,8 @@ from calibnet.geometry.types import Extrinsic, Vector3
 from calibnet.trace import CascadeTrace, StageTrace
 from inspector.record.contents import Contents
 
-Place = tuple[float, float, float]
-"""``(x, y, z)`` in metres, or a direction; unlike an array, it can be compared."""
+Xyz = tuple[float, float, float]
+"""A position in metres, or a direction, in the LiDAR frame; a tuple, so that layouts can be compared."""
 
 
 class Skipped(Protocol):
@@ -49,6 +49,11 @@ class Observation:
     trace: CascadeTrace
     reference: Extrinsic | None = field(default=None, repr=False)
     skipped: tuple[Skipped, ...] = ()
+
+    @property
+    def start(self) -> str:
+        """What the extrinsic before the first stage is called in captions and tables."""
+        return "as given" if self.reference is None else "miscalibrated"
 
     def projected(self, camera_from_lidar: Extrinsic) -> Projection:
         """The scan in the frame's image, rows far to near; each extrinsic of the run is projected once."""
@@ -127,24 +132,29 @@ class Layout:
         image: width and height of the first frame's image, in pixels.
         position: of the camera in the LiDAR frame, metres.
         forward: its viewing direction there, of unit length.
-        as_one: whether an estimate from the whole drive follows the frames.
+        with_drive: whether an estimate from the whole drive follows the frames.
     """
 
     stages: tuple[StageLayout, ...]
     has_reference: bool
     contents: Contents
     image: tuple[int, int] = (1242, 375)
-    position: Place = (0.0, 0.0, 0.0)
-    forward: Place = (1.0, 0.0, 0.0)
-    as_one: bool = False
+    position: Xyz = (0.0, 0.0, 0.0)
+    forward: Xyz = (1.0, 0.0, 0.0)
+    with_drive: bool = False
 
     @property
     def start(self) -> str:
-        """What the extrinsic before the first stage is called."""
+        """What the extrinsic before the first stage is called in names of views."""
         return "Miscalibrated" if self.has_reference else "As given"
 
+    @property
+    def stages_with_volumes(self) -> tuple[StageLayout, ...]:
+        """The stages whose cost volumes are shown: all, or none where the run kept no details."""
+        return tuple(stage for stage in self.stages if stage.grids)
+
     @classmethod
-    def of(cls, observation: Observation, contents: Contents, as_one: bool = False) -> Layout:
+    def of(cls, observation: Observation, contents: Contents, with_drive: bool = False) -> Layout:
         """The layout of a recording that starts with this observation."""
         stages = tuple(
             StageLayout(
@@ -161,12 +171,12 @@ class Layout:
             observation.reference is not None,
             contents,
             (camera.width, camera.height),
-            _place(lidar_from_camera[:3, 3]),
-            _place(lidar_from_camera[:3, 2]),
-            as_one,
+            _xyz(lidar_from_camera[:3, 3]),
+            _xyz(lidar_from_camera[:3, 2]),
+            with_drive,
         )
 
 
-def _place(values: Vector3) -> Place:
+def _xyz(values: Vector3) -> Xyz:
     x, y, z = values.tolist()
     return x, y, z

@@ -8,24 +8,22 @@ come, so that memory stays bounded and a killed run leaves what it had recorded.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import DriveEstimate
+from calibnet.trace import BadFrame, DriveEstimate
 from inspector import entities
-from inspector.record.contents import Part
+from inspector.record.frame import log_frame
 from inspector.record.observation import Layout, Observation
-from inspector.record.pictures.legends import log_legends
 from inspector.record.stream import Stream
+from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive
-from inspector.record.tabs.frame import log_curve_styles, log_frame
-from inspector.record.tabs.scene import log_scene, log_scene_frame
-from inspector.record.tabs.stage import log_stages
+from inspector.record.tabs.registry import wanted_tabs
 
 FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
 """Fewest and most frames between two flushes; a kill loses at most these.
@@ -62,43 +60,45 @@ class Recording:
     """Logs observations to files and viewers; a context manager that closes properly."""
 
     def __init__(self, sinks: Sequence[Any], description: RunDescription, layout: Layout) -> None:
-        """Open the sinks and log what is said once: names, blueprint, legends, curve styles.
+        """Open the sinks and log what holds for the whole recording: title, properties, layout, legends.
 
         Args:
-            sinks: Rerun sinks, see `inspector.sinks`.
+            sinks: Rerun sinks, see `inspector.record.outputs`.
             description: identifies the run.
             layout: what the recording will contain.
         """
         self._contents = layout.contents
+        self._tabs = wanted_tabs(layout)
         self._frames = self._unflushed = 0
         self._seconds: dict[int, float] = {}
-        self._stream = Stream(
-            entities.APPLICATION_ID, description.recording_id, description.title, sinks, make_blueprint(layout)
-        )
-        self._rec = self._stream.rec
-        self._rec.send_property(entities.RUN, rr.AnyValues(**description.options))
-        self._rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance, **_described(layout)))
-        if Part.SCENE in layout.contents.parts:
-            log_scene_frame(self._rec)
-        log_legends(self._rec, layout)
-        log_curve_styles(self._rec, layout)
+        blueprint = make_blueprint(layout, self._tabs)
+        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, blueprint)
+        self._stream.rec.send_property(entities.RUN, rr.AnyValues(**description.options))
+        provenance = rr.AnyValues(**description.provenance, **_described(layout))
+        self._stream.rec.send_property(entities.PROVENANCE, provenance)
+        self._rec = Subtree(self._stream.rec)
+        for tab in self._tabs:
+            tab.log_once(self._rec, layout)
         self._stream.flush()  # a recording that is cut off anywhere later can still be read
 
     def log(self, observation: Observation) -> None:
         """Log everything about one frame and hand it to the sinks."""
-        frame = observation.frame
-        self._rec.set_time(entities.FRAME, sequence=frame.index)
-        self._rec.set_time(entities.TIME, duration=frame.timestamp)
-        self._seconds[frame.index] = frame.timestamp
+        self._seconds[observation.frame.index] = observation.frame.timestamp
         log_frame(self._rec, observation, self._contents)
-        log_stages(self._rec, observation, self._contents)
-        log_scene(self._rec, observation, self._contents)
+        for tab in self._tabs:
+            tab.log(self._rec, observation, self._contents)
         self._frames += 1
         self._unflushed += 1
         fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
             self._unflushed = 0
             self._stream.flush()
+
+    def log_skipped(self, frames: Iterable[BadFrame]) -> None:
+        """Log which frames could not be used, and why; nothing else is there of them."""
+        for bad in frames:
+            self._rec.set_frame(bad.frame, self._seconds.get(bad.frame, 0.0))
+            self._rec.log(entities.SKIPPED, rr.TextLog(bad.why, level=rr.TextLogLevel.WARN))
 
     def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
         """Log what all frames together make of the extrinsic."""

@@ -21,11 +21,11 @@ class RecordingLostError(CalibnetError):
 
 
 class ViewerClosedError(CalibnetError):
-    """The only place the recording went to has gone."""
+    """The viewer that the recording went to has closed, and there is no file to go on with."""
 
 
 class Stream:
-    """Rerun's stream with all that makes its recordings equal and its failures sentences.
+    """A stream of Rerun's whose recordings are equal for equal data, and whose failures are errors with one sentence.
 
     Attributes:
         rec: what to log to. Chunks are cut by `flush` alone, and there is no wall-clock timeline.
@@ -43,7 +43,7 @@ class Stream:
             sinks: Rerun sinks, see `inspector.record.outputs`; without any, everything goes to stdout.
             blueprint: the layout.
         """
-        rr.set_strict_mode(True)
+        rr.set_strict_mode(True)  # what cannot be logged must be an error, not a gap in the recording and a warning
         self._sinks_gone = False
         self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
         self.rec = rr.RecordingStream(

@@ -36,6 +36,7 @@ class RunOptions:
         per_frame: draw one for every frame, not one for the run.
         seed: of everything random.
         drive: after the frames, also solve the drive's extrinsic from all of them.
+        on_bad_frame: ``"skip"`` a frame that cannot be used, or ``"stop"`` there.
         stages: to run; None for those within the miscalibration.
         preset: network to use.
         weights: folder of its weights; None for those of the package.
@@ -56,6 +57,7 @@ class RunOptions:
     per_frame: bool = False
     seed: int = 0
     drive: bool = False
+    on_bad_frame: str = "skip"
     stages: tuple[int, ...] | None = None
     preset: str = "compact"
     weights: Path | None = None

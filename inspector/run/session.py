@@ -19,9 +19,11 @@ from rich.text import Text
 
 from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import PickedFrames
-from calibnet.errors import CalibnetError
+from calibnet.errors import CalibnetError, CalibrationError, DatasetError
+from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
+from calibnet.trace import BadFrame
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
@@ -48,6 +50,7 @@ class Session:
         contents: what is logged of each frame.
         console: where progress is shown.
         drive: after the frames, also solve the drive's extrinsic from all of them.
+        stop_on_bad_frame: end at the first frame that cannot be used, instead of going on with the next.
     """
 
     sequence: Sequence
@@ -60,16 +63,17 @@ class Session:
     contents: Contents
     console: Console
     drive: bool = False
+    stop_on_bad_frame: bool = False
 
     def run(self) -> Summary:
-        """Calibrate and record every frame; stop at the first that cannot be read.
+        """Calibrate and record every frame that can be used.
 
         Returns:
             The summary; `Summary.interrupted` after Ctrl-C or SIGTERM.
 
         Raises:
-            CalibnetError: a frame cannot be read or calibrated, or the disk is full. What was
-                recorded before is closed properly, and the message says so.
+            CalibnetError: half of the frames or more cannot be used, one cannot and ``stop_on_bad_frame`` is set, or
+                the disk is full. What was recorded is closed properly, and the message says so.
         """
         summary = Summary()
         recording: Recording | None = None
@@ -79,15 +83,21 @@ class Session:
                     if stop.requested:
                         summary.interrupted = True
                         break
-                    observation = self._observe(position)
+                    observation = self._observe(position, summary)
+                    if observation is None:
+                        continue
                     if recording is None:
                         layout = Layout.of(observation, self.contents, self.drive)
                         recording = Recording(self.outputs.open(), self.description, layout)
+                        initial, reference = observation.trace.initial, observation.reference
                     self.outputs.check_space()
                     recording.log(observation)
                     summary.add(observation)
-                if self.drive and recording is not None and not summary.interrupted:
-                    summary.drive = self._solve_drive(recording, progress, stop)
+                summary.check_enough()
+                if recording is not None:
+                    recording.log_skipped(summary.skipped)
+                    if self.drive and not summary.interrupted:
+                        summary.drive = self._solve_drive(recording, initial, reference, progress, stop)
         except KeyboardInterrupt:
             summary.interrupted = True
         except CalibnetError as error:
@@ -97,16 +107,29 @@ class Session:
                 recording.close()
         return summary
 
-    def _observe(self, position: int) -> Observation:
-        frame = self.sequence[position]
-        trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
+    def _observe(self, position: int, summary: Summary) -> Observation | None:
+        """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
+        try:
+            frame = self.sequence[position]
+            trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
+        except (CalibrationError, DatasetError) as error:
+            if self.stop_on_bad_frame or len(self.positions) == 1:
+                raise
+            summary.skipped.append(BadFrame(position, str(error)))
+            self.console.print(f"Skipped: {error}", style="yellow", markup=False, soft_wrap=True)
+            return None
         return Observation(frame, trace, self.start.reference(frame), tuple(self.skipped))
 
-    def _solve_drive(self, recording: Recording, progress: Progress, stop: StopRequest) -> str:
+    def _solve_drive(
+        self,
+        recording: Recording,
+        initial: Extrinsic,
+        reference: Extrinsic | None,
+        progress: Progress,
+        stop: StopRequest,
+    ) -> str:
         """Solve the drive's extrinsic from all frames and log how it converges; returns the result in words."""
         frames = PickedFrames(self.sequence, self.positions)
-        first = frames[0]
-        initial, reference = self.start.initial(first), self.start.reference(first)
         task = progress.add_task("whole drive", total=None)
 
         def advance(read: int, total: int) -> None:

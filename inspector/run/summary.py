@@ -7,7 +7,9 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from statistics import median
 
+from calibnet.errors import DatasetError
 from calibnet.geometry import PoseError, pose_error
+from calibnet.trace import BadFrame
 from inspector.record.observation import Observation
 
 
@@ -17,6 +19,7 @@ class Summary:
 
     frames: int = 0
     unconfirmed: int = 0
+    skipped: list[BadFrame] = field(default_factory=list)
     interrupted: bool = False
     drive: str = ""
     started: float = field(default_factory=time.monotonic)
@@ -39,6 +42,13 @@ class Summary:
         for stage in trace.stages:
             self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
 
+    def check_enough(self) -> None:
+        """Raise `DatasetError` where half of the frames or more could not be used."""
+        bad, tried = self.skipped, self.frames + len(self.skipped)
+        if bad and 2 * len(bad) >= tried:
+            each = " ".join(f"Frame {one.frame}: {one.why}" for one in bad)
+            raise DatasetError(f"{len(bad)} of {tried} frames cannot be used, which is half or more. {each}")
+
     def lines(self) -> list[str]:
         """Sentences for the end of a run."""
         if self.frames == 0:
@@ -55,6 +65,9 @@ class Summary:
             lines.append(
                 f"{_frames(self.unconfirmed)} left as given: picture and scan do not fit together after the last stage."
             )
+        if self.skipped:
+            numbers = ", ".join(str(bad.frame) for bad in self.skipped)
+            lines.append(f"{_frames(len(self.skipped))} skipped, which could not be used: {numbers}.")
         if self.drive:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())

@@ -40,6 +40,7 @@ def record() -> Callable[..., None]:
         sequence: Any = None,
         per_frame: bool = False,
         provenance: dict[str, Any] | None = None,
+        stop_on_bad_frame: bool = False,
         **cascade: Any,
     ) -> Any:
         session = Session(
@@ -52,6 +53,7 @@ def record() -> Callable[..., None]:
             description=RunDescription("fake/00", {"seed": seed, "detail": detail}, provenance or {}),
             contents=Contents.of(Detail(detail), frozenset(map(Part, parts)), Coloring(color)),
             console=Console(quiet=True),
+            stop_on_bad_frame=stop_on_bad_frame,
         )
         return session.run()
 

@@ -1,1 +1,1 @@
-"""The pictures that tabs show: overlays, painted points, matches, grids of channels, legends."""
+"""The pictures that tabs show: overlays, maps, search windows, slices, activations, the cloud and legends."""

@@ -1,7 +1,8 @@
-"""Static legends: what the colours of points, maps and frustums stand for."""
+"""Legends, which are logged once: what the colours of points and maps stand for, and names in their colours."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,13 +10,13 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from inspector import colors, entities
-from inspector.record.contents import Coloring, Part
-from inspector.record.observation import Layout
+from inspector.record.contents import Coloring
+from inspector.record.subtree import Subtree
 
 BAR_WIDTH, BAR_HEIGHT = 1200, 12
 WHEEL_RADIUS = 40
 LEGEND_SPACING = 120.0
-"""Between two names of the frustum legend, in its own units."""
+"""Between two names in a row, in units of the legend's view."""
 LABELLED_DEPTHS_M = (3, 5, 10, 20, 40, 80)
 LABELLED_CERTAINTIES = (0.0, 0.05, 0.2, 0.5, 1.0)
 
@@ -27,17 +28,22 @@ class Bar(NamedTuple):
     labels: dict[float, str]
 
 
-def log_legends(rec: rr.RecordingStream, layout: Layout) -> None:
-    """Log all legends that something in the recording needs, once for the recording."""
-    _log_bar(rec, entities.LEGEND_POINTS, point_bar(layout.contents.color))
-    if Part.VOLUMES in layout.contents.parts:
-        _log_displacement_wheel(rec)
-        certainty = colors.certainty_colors(np.linspace(0.0, 1.0, BAR_WIDTH) ** 2)
-        _log_bar(rec, entities.LEGEND_CERTAINTY, Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES}))
-        marks = {"now": colors.INITIAL, "won": colors.FOUND}
-        _log_names(rec, entities.LEGEND_WINDOW, marks | ({"true": colors.REFERENCE} if layout.has_reference else {}))
-    if Part.SCENE in layout.contents.parts:
-        _log_camera_names(rec, layout)
+def log_point_legend(rec: Subtree, coloring: Coloring) -> None:
+    """What the colours of an overlay's points stand for, at `entities.LEGEND_POINTS`."""
+    _log_bar(rec, entities.LEGEND_POINTS, point_bar(coloring))
+
+
+def log_map_legends(rec: Subtree) -> None:
+    """What the colours of maps stand for, at `entities.LEGEND_DISPLACEMENT` and `entities.LEGEND_CERTAINTY`."""
+    rec.log_once(entities.LEGEND_DISPLACEMENT, rr.Image(displacement_wheel()))
+    certainty = colors.certainty_colors(np.linspace(0.0, 1.0, BAR_WIDTH) ** 2)
+    _log_bar(rec, entities.LEGEND_CERTAINTY, Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES}))
+
+
+def log_names(rec: Subtree, path: str, names: Mapping[str, colors.Rgb]) -> None:
+    """Names in their colours, in a row."""
+    positions = [(LEGEND_SPACING * position, 0.0) for position in range(len(names))]
+    rec.log_once(path, _labels(positions, list(names), list(names.values())))
 
 
 def point_bar(coloring: Coloring) -> Bar:
@@ -60,43 +66,20 @@ def point_bar(coloring: Coloring) -> Bar:
     return Bar(strip, dict(zip(places.tolist(), (f"{metres} m" for metres in LABELLED_DEPTHS_M), strict=True)))
 
 
-def _log_bar(rec: rr.RecordingStream, path: str, bar: Bar) -> None:
-    rec.log(path, rr.Image(np.tile(bar.strip, (BAR_HEIGHT, 1, 1))), static=True)
-    positions = [(BAR_WIDTH * place, 0.0) for place in bar.labels]
-    _log_labels(rec, f"{path}/labels", positions, list(bar.labels.values()), [colors.REFERENCE] * len(positions))
-
-
-def _log_displacement_wheel(rec: rr.RecordingStream) -> None:
+def displacement_wheel() -> NDArray[np.uint8]:
+    """``[H, W, 3]``: the colour of every direction and length of a displacement."""
     offsets = np.arange(-WHEEL_RADIUS, WHEEL_RADIUS + 1)
     dx, dy = np.meshgrid(offsets, offsets)
     wheel = colors.flow_colors(np.stack([dx, dy], axis=-1), WHEEL_RADIUS)
     wheel[np.hypot(dx, dy) > WHEEL_RADIUS] = colors.EMPTY
-    rec.log(entities.LEGEND_DISPLACEMENT, rr.Image(wheel), static=True)
+    return wheel
 
 
-def _log_camera_names(rec: rr.RecordingStream, layout: Layout) -> None:
-    names = {layout.start.lower(): colors.INITIAL}
-    names |= {f"after stage {stage.number}": colors.STAGES[stage.number] for stage in layout.stages}
-    if layout.has_reference:
-        names["reference"] = colors.REFERENCE
-    _log_names(rec, entities.LEGEND_STAGES, names)
+def _log_bar(rec: Subtree, path: str, bar: Bar) -> None:
+    rec.log_once(path, rr.Image(np.tile(bar.strip, (BAR_HEIGHT, 1, 1))))
+    positions = [(BAR_WIDTH * place, 0.0) for place in bar.labels]
+    rec.log_once(f"{path}/labels", _labels(positions, list(bar.labels.values()), [colors.REFERENCE] * len(positions)))
 
 
-def _log_names(rec: rr.RecordingStream, path: str, names: dict[str, colors.Rgb]) -> None:
-    """Names in their colours, in a row."""
-    positions = [(LEGEND_SPACING * position, 0.0) for position in range(len(names))]
-    _log_labels(rec, path, positions, list(names), list(names.values()))
-
-
-def _log_labels(
-    rec: rr.RecordingStream,
-    path: str,
-    positions: list[tuple[float, float]],
-    labels: list[str],
-    label_colors: list[colors.Rgb],
-) -> None:
-    rec.log(
-        path,
-        rr.Points2D(positions, labels=labels, colors=label_colors, radii=rr.Radius.ui_points(5.0), show_labels=True),
-        static=True,
-    )
+def _labels(positions: list[tuple[float, float]], labels: list[str], label_colors: list[colors.Rgb]) -> rr.Points2D:
+    return rr.Points2D(positions, labels=labels, colors=label_colors, radii=rr.Radius.ui_points(5.0), show_labels=True)

@@ -1,6 +1,11 @@
-"""One estimate from the whole drive: how each of its six parameters converges, with its uncertainty band."""
+"""Tab *Whole drive as one*: how each of the six parameters converges that are estimated from all frames of a drive.
+
+Each curve has its uncertainty band. It is there where `Layout.with_drive` says so, whatever else is recorded.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 import rerun as rr
@@ -10,21 +15,51 @@ from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate, Estimate
 from inspector import colors, entities
+from inspector.record.contents import Contents
+from inspector.record.observation import Layout, Observation
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import View, curve_view
+
+NAME = "Whole drive as one"
 
 BAND = 2.0
 """Standard deviations on either side of the estimate: 95 % of the errors, if it is right about itself."""
 PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
 """Of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
-CURVES = {"estimate": colors.FOUND, "upper": (150, 150, 150), "lower": (150, 150, 150)}
+CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT}
+"""Of every parameter, with their colours."""
 
 
-def log_drive(
-    rec: rr.RecordingStream,
-    estimate: DriveEstimate,
-    reference: Extrinsic | None,
-    seconds: dict[int, float],
-) -> None:
+def parameter(name: str) -> str:
+    """One parameter of the extrinsic estimated from the whole drive."""
+    return f"drive/{name}"
+
+
+def curve(name: str, kind: str) -> str:
+    """A parameter's curve: ``estimate``, or the ``upper`` or ``lower`` end of its uncertainty."""
+    return f"{parameter(name)}/{kind}"
+
+
+def wanted(layout: Layout) -> bool:
+    """Where an estimate from the whole drive follows the frames."""
+    return layout.with_drive
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log the names and colours of the curves."""
+    for name in PARAMETERS:
+        for kind, color in CURVES.items():
+            label = {"upper": f"+{BAND:g} σ", "lower": f"-{BAND:g} σ"}.get(kind, kind)
+            width = 2.5 if kind == "estimate" else 1.0
+            rec.log_once(curve(name, kind), rr.SeriesLines(names=label, colors=color, widths=width))
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log nothing of a single frame: the estimate needs all of them, see `log_drive`."""
+
+
+def log_drive(rec: Subtree, estimate: DriveEstimate, reference: Extrinsic | None, seconds: Mapping[int, float]) -> None:
     """Log the estimate after each frame of its history, on the frames' own times.
 
     Args:
@@ -34,55 +69,44 @@ def log_drive(
         seconds: time of every recorded frame by its index.
     """
     origin = estimate.camera_from_lidar if reference is None else reference
-    for name in PARAMETERS:
-        for curve, color in CURVES.items():
-            label = {"upper": f"+{BAND:g} σ", "lower": f"-{BAND:g} σ"}.get(curve, curve)
-            style = rr.SeriesLines(names=label, colors=color, widths=2.5 if curve == "estimate" else 1.0)
-            rec.log(entities.drive_curve(name, curve), style, static=True)
     for frame, current in estimate.history:
-        rec.set_time(entities.FRAME, sequence=frame)
-        rec.set_time(entities.TIME, duration=seconds.get(frame, 0.0))
-        rec.set_time(entities.STEP, sequence=frame * entities.STEPS_PER_FRAME)
+        rec.set_frame(frame, seconds.get(frame, 0.0))
         rec.log(entities.EXTRINSIC_DRIVE, rr.AnyValues(camera_from_lidar=current.camera_from_lidar.flatten()))
-        offsets = pose_error(current.camera_from_lidar, origin)
+        error = pose_error(current.camera_from_lidar, origin)
         for name in PARAMETERS:
-            value, band = offset(offsets, name), BAND * deviation(current, name)
-            for curve, level in (("estimate", value), ("upper", value + band), ("lower", value - band)):
-                rec.log(entities.drive_curve(name, curve), rr.Scalars(level))
+            value, band = offset(error, name), BAND * deviation(current, name)
+            for kind, level in (("estimate", value), ("upper", value + band), ("lower", value - band)):
+                rec.log(curve(name, kind), rr.Scalars(level))
 
 
-def offset(error: PoseError, parameter: str) -> float:
+def view(layout: Layout) -> View:
+    """Six plots: a good calibration runs into zero, inside its band."""
+    zero = "the reference" if layout.has_reference else "the estimate from all frames"
+    views = [
+        curve_view(f"{name.capitalize()} off {zero} [{unit}]", f"/{parameter(name)}")
+        for name, unit in PARAMETERS.items()
+    ]
+    return rrb.Grid(*views, grid_columns=3, name=NAME)
+
+
+def offset(error: PoseError, name: str) -> float:
     """One parameter of an error, in degrees or centimetres."""
-    value: float = getattr(error, f"{parameter}_{PARAMETERS[parameter]}")
+    value: float = getattr(error, f"{name}_{PARAMETERS[name]}")
     return value
 
 
-def deviation(estimate: Estimate, parameter: str) -> float:
+def deviation(estimate: Estimate, name: str) -> float:
     """Standard deviation of one parameter, in degrees or centimetres."""
-    row = COVARIANCE_ROWS[parameter]
+    row = COVARIANCE_ROWS[name]
     sigma = float(np.sqrt(estimate.covariance[row, row]))
-    return float(np.degrees(sigma)) if PARAMETERS[parameter] == "deg" else 100 * sigma
-
-
-def drive_tab(has_reference: bool) -> rrb.Container:
-    """Six curves: a good calibration runs into zero, inside its band."""
-    zero = "the reference" if has_reference else "the estimate from all frames"
-    views = [
-        rrb.TimeSeriesView(
-            origin=f"/{entities.drive_parameter(name)}",
-            name=f"{name.capitalize()} off {zero} [{unit}]",
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-        )
-        for name, unit in PARAMETERS.items()
-    ]
-    return rrb.Grid(*views, grid_columns=3, name="Whole drive as one")
+    return float(np.degrees(sigma)) if PARAMETERS[name] == "deg" else 100 * sigma
 
 
 def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial: Extrinsic) -> str:
     """The result for the terminal."""
     error = pose_error(estimate.camera_from_lidar, initial if reference is None else reference)
     what = "changed the calibration by" if reference is None else "off by"
-    skipped = f", {estimate.skipped} more could not be used" if estimate.skipped else ""
+    skipped = f", {len(estimate.skipped)} more could not be used" if estimate.skipped else ""
     result = (
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
         f"{error.translation_cm:.1f} cm; "

@@ -1,4 +1,4 @@
-"""The 3D scene: the scan coloured by the image, and the camera where every stage believes it is.
+"""Tab *3D*: the scan coloured by the image, and the camera where every stage believes it is.
 
 The world is the LiDAR's own frame (x forward, y left, z up). The scan therefore stands still and
 the cameras move; what the extrinsic changes about the scan is which pixel colours which point.
@@ -6,92 +6,111 @@ the cameras move; what the extrinsic changes about the scan is which pixel colou
 
 from __future__ import annotations
 
-import numpy as np
-import rerun as rr
-from numpy.typing import NDArray
+import math
 
-from calibnet.datasets.frame import Frame
-from calibnet.geometry import PinholeCamera, invert, project
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
+
+from calibnet.geometry import PinholeCamera, invert
 from calibnet.geometry.types import Extrinsic
-from inspector import colors, entities
+from inspector import colors
 from inspector.record.contents import Contents, Part
-from inspector.record.observation import Observation
+from inspector.record.observation import Layout, Observation, Xyz
+from inspector.record.pictures.cloud import seen_colors, subsample
+from inspector.record.pictures.legends import log_names
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import View, names_legend, uncapitalized, with_legend
+
+NAME = "3D"
+
+WORLD = "world"
+CLOUD = "world/cloud"
+"""Positions, once a frame, and colours through every extrinsic: components of the archetype `COLORS_THROUGH`."""
+COLORS_THROUGH = "colors_through"
+LIDAR = "world/lidar"
+CAMERA_INITIAL = "world/camera/initial"
+CAMERA_REFERENCE = "world/camera/reference"
+LEGEND_CAMERAS = "legend/stages"
+"""The names of the frustums in their colours."""
 
 SPARSE, DENSE = 5_000, 30_000
-SEEN_SHARE = 0.8
-OUTSIDE = (70, 72, 80)
-"""Points that the camera does not see."""
+"""Points of the cloud at most."""
 POINT_SIZE = 1.6
 FRUSTUM_LENGTH_M = 1.2
-RANGE_M = 80.0
+BACKGROUND = (44, 47, 54)
+"""Grey enough that dark points of the picture stay visible."""
 
 
-def log_scene_frame(rec: rr.RecordingStream) -> None:
-    """Declare the world's axes and mark the LiDAR, once for the recording."""
-    rec.log(entities.WORLD, rr.ViewCoordinates.FLU, static=True)
-    rec.log(entities.LIDAR, rr.TransformAxes3D(0.5), rr.Transform3D(), static=True)
+def camera_stage(number: int) -> str:
+    """The camera's frustum in the LiDAR frame after a stage."""
+    return f"world/camera/stage_{number}"
 
 
-def log_scene(rec: rr.RecordingStream, observation: Observation, contents: Contents) -> None:
-    """Log the cloud, its colours through every extrinsic, and all frustums of one frame."""
+def wanted(layout: Layout) -> bool:
+    """Where it is recorded."""
+    return Part.SCENE in layout.contents.parts
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log the world's axes, the LiDAR and the names of the cameras in their colours."""
+    rec.log_once(WORLD, rr.ViewCoordinates.FLU)
+    rec.log_once(LIDAR, rr.TransformAxes3D(0.5), rr.Transform3D())
+    names = {layout.start.lower(): colors.INITIAL}
+    names |= {f"after stage {stage.number}": colors.STAGES[stage.number] for stage in layout.stages}
+    log_names(rec, LEGEND_CAMERAS, names | ({"reference": colors.REFERENCE} if layout.has_reference else {}))
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log the cloud of a frame, its colours through every extrinsic, and a camera for each."""
     if Part.SCENE not in contents.parts:
         return
     frame, trace = observation.frame, observation.trace
-    extrinsics = {"initial": (entities.CAMERA_INITIAL, trace.initial, colors.INITIAL)}
+    extrinsics = {"initial": (CAMERA_INITIAL, trace.initial, colors.INITIAL)}
     for stage in trace.stages:
-        path = entities.camera_stage(stage.number)
-        extrinsics[f"stage_{stage.number}"] = (path, stage.after, colors.STAGES[stage.number])
+        extrinsics[f"stage_{stage.number}"] = (camera_stage(stage.number), stage.after, colors.STAGES[stage.number])
     if observation.reference is not None:
-        extrinsics["reference"] = (entities.CAMERA_REFERENCE, observation.reference, colors.REFERENCE)
-    points = _subsample(observation, DENSE if contents.dense else SPARSE)
-    rec.log(entities.CLOUD, rr.Points3D(points[:, :3], radii=rr.Radius.ui_points(POINT_SIZE)))
+        extrinsics["reference"] = (CAMERA_REFERENCE, observation.reference, colors.REFERENCE)
+    points = subsample(observation, DENSE if contents.dense else SPARSE)
+    rec.log(CLOUD, rr.Points3D(points[:, :3], radii=rr.Radius.ui_points(POINT_SIZE)))
     through = {
-        name: rr.components.ColorBatch(_seen_colors(frame, points, camera_from_lidar))
+        name: rr.components.ColorBatch(seen_colors(frame, points, camera_from_lidar))
         for name, (_, camera_from_lidar, _) in extrinsics.items()
     }
-    rec.log(entities.CLOUD, rr.DynamicArchetype(archetype=entities.COLORS_THROUGH, components=through))
+    rec.log(CLOUD, rr.DynamicArchetype(archetype=COLORS_THROUGH, components=through))
     for path, camera_from_lidar, color in extrinsics.values():
-        _log_camera(rec, path, camera_from_lidar, frame.camera, color)
+        rec.log(path, *_frustum(camera_from_lidar, frame.camera, color))
 
 
-def _subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
-    """At most ``limit`` points ``[M, 4]``, most of them such as the camera sees before or after."""
-    frame = observation.frame
-    near = np.square(frame.points[:, :3]).sum(axis=1) < RANGE_M**2
-    seen = np.zeros(len(frame.points), dtype=np.bool_)
-    for camera_from_lidar in (observation.trace.initial, observation.trace.corrected):
-        seen[observation.projected(camera_from_lidar).index] = True
-    parts = [
-        _evenly(np.flatnonzero(near & seen), round(SEEN_SHARE * limit)),
-        _evenly(np.flatnonzero(near & ~seen), round((1.0 - SEEN_SHARE) * limit)),
+def view(layout: Layout) -> View:
+    """A page with the cloud coloured through start, result and reference, and a page for every extrinsic."""
+    seen = {layout.start: ("initial", CAMERA_INITIAL)}
+    seen |= {stage.title: (f"stage_{stage.number}", camera_stage(stage.number)) for stage in layout.stages}
+    last, (through, _) = list(seen.items())[-1]
+    if layout.has_reference:
+        seen["Reference (truth)"] = ("reference", CAMERA_REFERENCE)
+    truth = [CAMERA_REFERENCE] if layout.has_reference else []
+    cameras = [camera for _, camera in seen.values()]
+    compared = {uncapitalized(layout.start): "initial"}
+    if layout.stages:
+        compared[f"after {uncapitalized(last)}"] = through
+    if layout.has_reference:
+        compared["reference"] = "reference"
+    views = [_scene_view(f"Coloured through: {name}", part, cameras, layout) for name, part in compared.items()]
+    pages = [
+        _scene_view(name, through, list(dict.fromkeys([camera, *truth])), layout)
+        for name, (through, camera) in seen.items()
     ]
-    return frame.points[np.concatenate(parts)]
+    legend = names_legend("Cameras", LEGEND_CAMERAS, len(layout.stages) + (2 if layout.has_reference else 1))
+    return rrb.Tabs(with_legend(rrb.Horizontal(*views), legend, "Side by side"), *pages, name=NAME)
 
 
-def _evenly(rows: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
-    return rows[:: max(1, -(-len(rows) // limit))]
-
-
-def _seen_colors(frame: Frame, points: NDArray[np.float32], camera_from_lidar: Extrinsic) -> NDArray[np.uint8]:
-    """``[M, 3]``: the colour of the pixel that each point falls on, grey where it falls on none."""
-    projection = project(points, camera_from_lidar, frame.camera)
-    rgb = np.full((len(points), 3), OUTSIDE, dtype=np.uint8)
-    u, v = np.rint(projection.pixels).astype(np.intp).T
-    height, width = frame.image.shape[:2]
-    rgb[projection.index] = frame.image[np.minimum(v, height - 1), np.minimum(u, width - 1)]
-    return rgb
-
-
-def _log_camera(
-    rec: rr.RecordingStream,
-    path: str,
-    camera_from_lidar: Extrinsic,
-    camera: PinholeCamera,
-    color: colors.Rgb,
-) -> None:
+def _frustum(
+    camera_from_lidar: Extrinsic, camera: PinholeCamera, color: colors.Rgb
+) -> tuple[rr.Transform3D, rr.Pinhole]:
+    """The camera's place in the LiDAR frame, and its field of view."""
     lidar_from_camera = invert(camera_from_lidar)
-    rec.log(
-        path,
+    return (
         rr.Transform3D(translation=lidar_from_camera[:3, 3], mat3x3=lidar_from_camera[:3, :3]),
         rr.Pinhole(
             image_from_camera=camera.matrix,
@@ -102,3 +121,41 @@ def _log_camera(
             line_width=-1.5,
         ),
     )
+
+
+def _scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> rrb.Spatial3DView:
+    """The cloud seen over the camera's shoulder.
+
+    Args:
+        name: of the view.
+        through: whose colours the cloud has: a component of `COLORS_THROUGH`.
+        cameras: entities of the frustums to draw.
+        layout: says where the camera is.
+    """
+    mapping = VisualizerComponentMapping(
+        target="Points3D:colors",
+        source_kind=ComponentSourceKind.SourceComponent,
+        source_component=f"{COLORS_THROUGH}:{through}",
+    )
+    return rrb.Spatial3DView(
+        origin=f"/{WORLD}",
+        contents=[f"/{path}/**" for path in (CLOUD, LIDAR, *cameras)],
+        name=name,
+        overrides={f"/{CLOUD}": [rr.Points3D.from_fields().visualizer(mappings=[mapping])]},
+        eye_controls=rrb.EyeControls3D(
+            position=_seen_from(layout, ahead=-5.0, left=1.5, up=2.8),
+            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-1.8),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+        line_grid=rrb.LineGrid3D(visible=False),
+        background=BACKGROUND,
+        defaults=[rr.TransformAxes3D(0.0)],
+    )
+
+
+def _seen_from(layout: Layout, ahead: float, left: float, up: float) -> Xyz:
+    """A position in the LiDAR frame, given in metres from the camera along its heading."""
+    (x, y, z), (dx, dy, _) = layout.position, layout.forward
+    length = math.hypot(dx, dy) or 1.0
+    dx, dy = dx / length, dy / length
+    return x + ahead * dx - left * dy, y + ahead * dy + left * dx, z + up

@@ -7,6 +7,7 @@ equal. The command line prints them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from calibnet.geometry import RANGES, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
@@ -20,18 +21,19 @@ READING_AID = (
 )
 
 
-def stage_table(observation: Observation, linked: bool = True) -> str:
+def stage_table(observation: Observation, path: Callable[[str], str] | None = None) -> str:
     """The table of one frame, with the stages that did not run and why.
 
     Args:
         observation: the frame and what was done to it.
-        linked: whether the overlays are there that the stages' names link to.
+        path: gives the full path of an entity, so that the stages' names link to their overlays; None where these are
+            not recorded.
     """
     lines = [
         f"### {_headline(observation)}",
         "",
         *_confirmation(observation),
-        *_stages(observation, linked),
+        *_stages(observation, path),
         "",
         *_axes(observation),
         "",
@@ -74,22 +76,22 @@ def _confirmation(observation: Observation) -> list[str]:
     ]
 
 
-def _stages(observation: Observation, linked: bool) -> list[str]:
+def _stages(observation: Observation, path: Callable[[str], str] | None) -> list[str]:
     trace = observation.trace
     with_errors = observation.reference is not None
     skipped = {stage.number for stage in observation.skipped}
     ran = {stage.number: stage for stage in trace.stages}
     header = ["after", "trained for", *(["rotation error", "translation error"] if with_errors else []), "moved by"]
-    rows = [
-        ["miscalibrated" if with_errors else "as given", NOTHING, *_error(observation.error(trace.initial)), NOTHING]
-    ]
+    rows = [[observation.start, NOTHING, *_error(observation.error(trace.initial)), NOTHING]]
     for number, range_ in enumerate(RANGES, start=1):
         trained_for = f"±{range_.rotation_deg:g}° / {range_.translation_m:g} m"
         if number in ran:
             stage = ran[number]
             motion = pose_error(stage.after, stage.before)
             change = f"{motion.rotation_deg:.2f}° / {motion.translation_cm:.1f} cm"
-            name = f"[stage {number}](recording://{entities.overlay_stage(number)})" if linked else f"stage {number}"
+            name = f"stage {number}"
+            if path is not None:
+                name = f"[{name}](recording://{path(entities.overlay_stage(number))})"
             rows.append([name, trained_for, *_error(observation.error(stage.after)), change])
         elif number in skipped:
             empty = [NOTHING, NOTHING] if with_errors else []

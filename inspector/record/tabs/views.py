@@ -1,24 +1,24 @@
-"""The views that tabs are made of: one function a kind."""
+"""The views that several tabs are made of: one function for each kind of view and of legend."""
 
 from __future__ import annotations
 
-import math
-
 import rerun as rr
 import rerun.blueprint as rrb
-from rerun.blueprint.encodings import ComponentSourceKind, VisualizerComponentMapping
 
 from inspector import entities
 from inspector.record.contents import Coloring
-from inspector.record.observation import Grid, Layout, Place
+from inspector.record.observation import Grid, Layout
 from inspector.record.pictures.legends import LEGEND_SPACING
 
-SCREEN_WIDTH, SCREEN_HEIGHT, LEGEND_HEIGHT = 1920.0, 980.0, 64.0
-TITLE_HEIGHT = 36.0
+SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
+"""Pixels that tabs are laid out for."""
+LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
+LARGEST_OVERLAY = 390.0
+"""Height in pixels beyond which what lies below the overlays would have too little room."""
+LEGEND_SHARE = 0.06
+"""Of a page's height that its legend takes."""
 DIMMED = 0.65
 """Opacity of the image under points, so that these stand out."""
-SCENE_BACKGROUND = (44, 47, 54)
-"""Grey enough that dark points of the picture stay visible."""
 COLORED_BY = {
     Coloring.DEPTH: "Depth of the points",
     Coloring.INTENSITY: "Intensity of the points",
@@ -66,26 +66,28 @@ def names_legend(name: str, path: str, count: int) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds, titlebar=False)
 
 
-def frustum_legend(layout: Layout) -> rrb.Spatial2DView:
-    """The names of the frustums in their colours."""
-    return names_legend("Cameras", entities.LEGEND_STAGES, len(layout.stages) + (2 if layout.has_reference else 1))
-
-
-def curve_view(kind: str, unit: str) -> rrb.TimeSeriesView:
-    """The error of every stage over the frames."""
-    return rrb.TimeSeriesView(
-        origin=f"error/{kind}",
-        contents=["$origin/**", f"- /{entities.error_corrected(kind)}"],
-        name=f"{kind.capitalize()} error [{unit}]",
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+def map_legends(*more: View) -> View:
+    """What the colours of displacements and of certainties stand for, and what else a page needs, in one row."""
+    return rrb.Horizontal(
+        rrb.Spatial2DView(
+            origin=f"/{entities.LEGEND_DISPLACEMENT}", name="Displacement: hue = direction, white = none"
+        ),
+        rrb.Spatial2DView(origin=f"/{entities.LEGEND_CERTAINTY}", name="Probability, confidence"),
+        *more,
     )
 
 
-def fit_view() -> rrb.TimeSeriesView:
-    """How far off every stage expects its matches to be, over the frames."""
+def with_legend(view: View, below: View, name: str) -> View:
+    """A page with a legend at its lower edge."""
+    return rrb.Vertical(view, below, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=name)
+
+
+def curve_view(name: str, origin: str, *contents: str) -> rrb.TimeSeriesView:
+    """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose."""
     return rrb.TimeSeriesView(
-        origin=entities.FIT,
-        name="Fit of picture and scan: matches expected to be off by [px]",
+        origin=origin,
+        contents=list(contents) or "$origin/**",
+        name=name,
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
 
@@ -101,39 +103,6 @@ def tensor_view(name: str, path: str) -> rrb.TensorView:
     )
 
 
-def scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> rrb.Spatial3DView:
-    """The cloud seen over the camera's shoulder.
-
-    Args:
-        name: of the view.
-        through: whose colours the cloud has: a component of `entities.COLORS_THROUGH`.
-        cameras: entities of the frustums to draw.
-        layout: says where the camera is.
-    """
-    colors = VisualizerComponentMapping(
-        target="Points3D:colors",
-        source_kind=ComponentSourceKind.SourceComponent,
-        source_component=f"{entities.COLORS_THROUGH}:{through}",
-    )
-    return rrb.Spatial3DView(
-        origin=f"/{entities.WORLD}",
-        contents=[f"/{path}/**" for path in (entities.CLOUD, entities.LIDAR, *cameras)],
-        name=name,
-        overrides={f"/{entities.CLOUD}": [rr.Points3D.from_fields().visualizer(mappings=[colors])]},
-        eye_controls=rrb.EyeControls3D(
-            position=_seen_from(layout, ahead=-5.0, left=1.5, up=2.8),
-            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-1.8),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-        line_grid=rrb.LineGrid3D(visible=False),
-        background=SCENE_BACKGROUND,
-        defaults=[rr.TransformAxes3D(0.0)],
-    )
-
-
-def _seen_from(layout: Layout, ahead: float, left: float, up: float) -> Place:
-    """A place in the LiDAR frame, given in metres from the camera along its heading."""
-    (x, y, z), (dx, dy, _) = layout.position, layout.forward
-    length = math.hypot(dx, dy) or 1.0
-    dx, dy = dx / length, dy / length
-    return x + ahead * dx - left * dy, y + ahead * dy + left * dx, z + up
+def uncapitalized(title: str) -> str:
+    """A title within another, for instance ``"stage 3 (±5°/0.5 m)"``."""
+    return title[0].lower() + title[1:]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -32,7 +31,9 @@ class KnownCascade:
     skipped = (SimpleNamespace(reason="Stage 1 has no weights."),)
 
     @classmethod
-    def load(cls, preset: str, stages: tuple[int, ...] | None = None, folder: Path | None = None) -> KnownCascade:
+    def load(
+        cls, preset: str, stages: tuple[int, ...] | None = None, folder: Path | None = None, wider: bool = False
+    ) -> KnownCascade:
         cascade = cls()
         cls.loaded = {"preset": preset, "stages": stages}
         return cascade
@@ -55,10 +56,7 @@ class KnownCascade:
 
 @pytest.fixture(autouse=True)
 def known_cascade(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = ModuleType("calibnet.cascade.cascade")
-    module.Cascade = KnownCascade  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "calibnet.cascade.cascade", module)
-    monkeypatch.setattr("calibnet.cascade.cascade", module, raising=False)
+    monkeypatch.setattr("calibnet.cascade.cascade.Cascade", KnownCascade)
 
 
 @pytest.fixture

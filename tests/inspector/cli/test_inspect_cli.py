@@ -26,7 +26,7 @@ def invoke(
     """``invoke("seq", "04", ...)`` in an empty folder without a display, with the fake cascade."""
     from calibnet.cascade.cascade import Cascade
 
-    def load(preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Any = None) -> Any:
+    def load(preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Any = None, **_: Any) -> Any:
         return fakes.FakeCascade(stages or (1, 2, 3, 4, 5))
 
     monkeypatch.setattr(Cascade, "load", staticmethod(load))
@@ -138,7 +138,7 @@ def test_options_that_cannot_be_met(invoke: Invoke, own_folder: Path, options: t
 def test_a_broken_second_scan_keeps_the_first_frame(invoke: Invoke, own_folder: Path, read: Any) -> None:
     scan = own_folder / "clouds" / "0001.bin"
     scan.write_bytes(scan.read_bytes()[:-7])
-    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd")
+    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd", "--on-bad-frame", "stop")
     assert code == 3
     assert "0001.bin" in err
     assert "1 of 2 frames" in err

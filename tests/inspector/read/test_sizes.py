@@ -8,6 +8,7 @@ import pytest
 
 from inspector import entities
 from inspector.read.sizes import group_of, sizes_by_group
+from inspector.record.tabs import cascade, cost_volumes, hourglass
 
 
 def test_the_groups_add_up_to_the_file(full_recording: Path) -> None:
@@ -22,10 +23,10 @@ def test_the_groups_add_up_to_the_file(full_recording: Path) -> None:
 @pytest.mark.parametrize(
     ("entity", "group"),
     [
-        (entities.slice_marks(3, 8), "raw volumes"),
-        (entities.window_truth(3, 8), "cost-volume maps"),
-        (entities.displacement_arrows(3), "cost-volume maps"),
-        (entities.hourglass_after(3, 8), "hourglass"),
+        (entities.of_scale(3, 8, cost_volumes.SLICE_MARKS), "raw volumes"),
+        (entities.of_scale(3, 8, cost_volumes.WINDOW_TRUTH), "cost-volume maps"),
+        (cascade.displacement_arrows(3), "cost-volume maps"),
+        (entities.of_scale(3, 8, hourglass.AFTER), "hourglass"),
         (entities.TABLE, "figures and legends"),
     ],
 )

@@ -1,6 +1,6 @@
 """Record a sequence as long as KITTI's longest at overview detail, and print memory, size and speed on the way.
 
-    python -m tests.inspector.long_run [--frames 4541] [--detail overview] [--out FILE.rrd]
+    python -m tests.inspector.record.long_run [--frames 4541] [--detail overview] [--out FILE.rrd]
 
 A few fake frames of KITTI's size are calibrated once and recorded again and again under rising
 numbers, so that the figures are those of the recording alone.

@@ -15,13 +15,14 @@ from rerun.chunk import RrdReader
 
 from inspector import entities
 from inspector.record.outputs import rerun_binary
+from inspector.record.tabs import cascade, cost_volumes
 
 STAGES, STRIDES, FRAMES = (3, 4, 5), (8, 16, 32), [0, 1, 2]
 Read = Callable[..., list[tuple[Any, Any]]]
 
 
 def expected_streams() -> dict[str, str]:
-    """Every entity that issue and design promise, and the component that carries it."""
+    """Entities of a full recording of a frame, and the component that carries each."""
     points, image, encoded = "Points2D:positions", "Image:buffer", "EncodedImage:blob"
     streams = {
         "image": encoded,
@@ -239,7 +240,8 @@ def test_recording_passes_verification(full_recording: Path) -> None:
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
-def test_entities_are_those_of_the_module() -> None:
-    """The names written out above are what `entities` makes: scripts may rely on either."""
-    assert entities.window_truth(3, 8) == "stage_3/scale_8/window/truth"
+def test_entities_are_those_of_the_modules() -> None:
+    """The names written out above are what the code calls them: scripts may rely on either."""
+    assert entities.of_scale(3, 8, cost_volumes.WINDOW_TRUTH) == "stage_3/scale_8/window/truth"
+    assert cascade.displacement_arrows(3) == "stage_3/displacement/arrows"
     assert entities.error_stage("rotation", 4) == "error/rotation/stage_4"

@@ -91,14 +91,14 @@ class BrokenSequence:
 
     name, rig = "fake/broken", "a fake car"
 
-    def __init__(self, inner: Any, bad: int) -> None:
-        self.inner, self.bad = inner, bad
+    def __init__(self, inner: Any, bad: int | tuple[int, ...]) -> None:
+        self.inner, self.bad = inner, (bad,) if isinstance(bad, int) else bad
 
     def __len__(self) -> int:
         return len(self.inner)
 
     def __getitem__(self, position: int) -> Any:
-        if position == self.bad:
+        if position in self.bad:
             raise DatasetError("velodyne/000002.bin is cut short; copy it again.")
         return self.inner[position]
 
@@ -108,9 +108,27 @@ def test_a_bad_frame_keeps_those_before_it(
 ) -> None:
     file = tmp_path / "run.rrd"
     with pytest.raises(DatasetError, match=r"000002\.bin is cut short.* \(2 of 4 frames\)") as failure:
-        record(file, length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=2))
+        record(file, length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=2), stop_on_bad_frame=True)
     assert str(file) in str(failure.value)
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [0, 1]
+
+
+def test_bad_frames_are_skipped_named_and_counted(
+    record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
+) -> None:
+    file = tmp_path / "run.rrd"
+    summary = record(file, length=5, sequence=BrokenSequence(fakes.FakeSequence(5), bad=(0, 2)))
+    assert summary.frames == 3 and [bad.frame for bad in summary.skipped] == [0, 2]
+    assert "2 frames skipped, which could not be used: 0, 2." in summary.lines()
+    assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 3, 4]
+    told = read(file, "skipped", "TextLog:text")
+    assert [frame for frame, _ in told] == [0, 2] and "cut short" in told[1][1].as_py()[0]
+
+
+def test_half_of_the_frames_are_too_many_to_skip(record: Callable[..., Any], tmp_path: Path, fakes: ModuleType) -> None:
+    with pytest.raises(DatasetError, match=r"2 of 4 frames cannot be used.*Frame 1: .*Frame 3: .*cut short") as failure:
+        record(tmp_path / "run.rrd", length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=(1, 3)))
+    assert "(2 of 4 frames) is in" in str(failure.value)
 
 
 def test_a_bad_first_frame_leaves_an_older_file_alone(
@@ -119,7 +137,7 @@ def test_a_bad_first_frame_leaves_an_older_file_alone(
     file = tmp_path / "run.rrd"
     file.write_bytes(b"an older recording")
     with pytest.raises(DatasetError):
-        record(file, length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=0))
+        record(file, length=1, sequence=BrokenSequence(fakes.FakeSequence(1), bad=0))
     assert file.read_bytes() == b"an older recording"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -35,9 +36,18 @@ def names(blueprint: rrb.Blueprint) -> list[str]:
     return [str(part.name) for part in walk(tabs(blueprint)) if isinstance(part, rrb.View)]
 
 
-def test_tabs_are_those_of_the_design() -> None:
-    parts = tabs(make_blueprint(layout())).contents
-    assert [str(part.name) for part in parts] == ["Overview", "Cascade", "Cost volumes", "Hourglass", "3D"]
+@pytest.mark.parametrize("with_drive", [False, True])
+def test_tabs_are_in_their_order_and_a_drive_has_one_more(with_drive: bool) -> None:
+    parts = tabs(make_blueprint(replace(layout(), with_drive=with_drive))).contents
+    expected = [
+        "Overview",
+        "Cascade",
+        "Cost volumes",
+        "Hourglass",
+        "3D",
+        *(["Whole drive as one"] if with_drive else []),
+    ]
+    assert [str(part.name) for part in parts] == expected
 
 
 def test_every_stage_and_scale_has_its_views() -> None:
@@ -73,3 +83,23 @@ def test_the_legend_is_that_of_the_colours(coloring: Coloring) -> None:
     views = names(make_blueprint(layout(contents=Contents.of(Detail.FULL, color=coloring))))
     assert COLORED_BY[coloring] in views
     assert not [COLORED_BY[other] for other in Coloring if other is not coloring and COLORED_BY[other] in views]
+
+
+def test_below_a_prefix_every_path_of_every_view_has_it() -> None:
+    plain, moved = (
+        tabs(make_blueprint(replace(layout(), with_drive=True), prefix=prefix)) for prefix in ("", "/car/left")
+    )
+    assert (plain.name, moved.name) == (None, "car/left")
+    pairs = list(zip(walk(plain), walk(moved), strict=True))
+    views = [(one, other) for one, other in pairs if isinstance(one, rrb.View)]
+    assert len(views) > 30
+    for one, other in views:
+        assert other.origin == f"/car/left/{one.origin.lstrip('/')}".rstrip("/")
+        assert set(other.visualizer_overrides) == {f"/car/left{path}" for path in one.visualizer_overrides}
+    assert queries(moved, "Rotation error [deg]") == ["$origin/**", "- /car/left/error/rotation/corrected"]
+    assert queries(moved, "Corrected") == ["/car/left/image", "/car/left/overlay/corrected/**"]
+    assert queries(moved, "Yaw off the reference [deg]") == ["$origin/**"]
+
+
+def queries(root: Any, name: str) -> list[str]:
+    return next(list(part.contents) for part in walk(root) if part.name == name)

@@ -11,10 +11,10 @@ from rerun.chunk import RrdReader
 
 from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
-from calibnet.trace import DriveEstimate, Estimate
-from inspector import entities
+from calibnet.trace import BadFrame, DriveEstimate, Estimate
 from inspector.read.run import read_run
-from inspector.record.tabs.drive import deviation, drive_sentence, log_drive
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive
 
 REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.0, -0.1, -0.2])
 SIGMA = np.array([0.02, 0.03, 0.06, *np.radians([0.1, 0.2, 0.2])])
@@ -35,7 +35,12 @@ def estimate(aligned: bool) -> DriveEstimate:
     last = DriveEstimate(late.camera_from_lidar, np.diag(SIGMA**2), 3)
     history = ((0, early), (2, Estimate(last.camera_from_lidar, last.covariance, 3)))
     return DriveEstimate(
-        last.camera_from_lidar, last.covariance, 3, history, skipped=1, networks=networks if aligned else None
+        last.camera_from_lidar,
+        last.covariance,
+        3,
+        history,
+        skipped=(BadFrame(1, "It is cut short."),),
+        networks=networks if aligned else None,
     )
 
 
@@ -63,14 +68,14 @@ def test_curves_and_the_result_are_recorded(tmp_path: Path, full_recording: Path
     rec = rr.RecordingStream("calib-inspect")
     rec.save(tmp_path / "drive.rrd")
     rr.send_chunks(RrdReader(full_recording).store().stream(), recording=rec)
-    log_drive(rec, estimate(aligned=True), REFERENCE, {0: 0.0, 2: 0.2})
+    log_drive(Subtree(rec), estimate(aligned=True), REFERENCE, {0: 0.0, 2: 0.2})
     rec.disconnect()
     np.testing.assert_array_equal(read_run(tmp_path / "drive.rrd").drive, found(0.5, 0.0))
     curves: dict[str, list[float]] = {}
     for chunk in RrdReader(tmp_path / "drive.rrd").store().stream():
         batch = chunk.to_record_batch()
         for name in ("estimate", "upper", "lower"):
-            if chunk.entity_path == f"/{entities.drive_curve('yaw', name)}" and "Scalars:scalars" in batch.schema.names:
+            if chunk.entity_path == f"/{curve('yaw', name)}" and "Scalars:scalars" in batch.schema.names:
                 curves.setdefault(name, []).extend(v[0] for v in batch.column("Scalars:scalars").to_pylist() if v)
     assert sorted(curves["estimate"]) == pytest.approx([0.5, 2.0])
     assert sorted(curves["upper"]) == pytest.approx([0.5 + 0.4, 2.0 + 0.8])

@@ -1,0 +1,50 @@
+"""What is recorded of every frame, whichever tabs are shown: image, table, extrinsics and camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from inspector import entities
+from inspector.record.contents import Contents, Part
+from inspector.record.observation import Observation
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.table import stage_table
+
+JPEG_QUALITY = 85
+
+
+def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Set the timelines to a frame, and log what every recording has of it."""
+    frame = observation.frame
+    rec.set_frame(frame.index, frame.timestamp)
+    rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
+    table = stage_table(observation, rec.path if Part.OVERLAYS in contents.parts else None)
+    rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
+    _log_extrinsics(rec, observation)
+    _log_camera(rec, observation)
+
+
+def _log_extrinsics(rec: Subtree, observation: Observation) -> None:
+    """Every extrinsic as numbers in full precision, which reports and exports read."""
+    trace = observation.trace
+    extrinsics = {entities.EXTRINSIC_INITIAL: trace.initial, entities.EXTRINSIC_CORRECTED: trace.corrected}
+    extrinsics |= {entities.extrinsic_stage(stage.number): stage.after for stage in trace.stages}
+    if observation.reference is not None:
+        extrinsics[entities.EXTRINSIC_REFERENCE] = observation.reference
+    for path, camera_from_lidar in extrinsics.items():
+        rec.log(path, rr.AnyValues(camera_from_lidar=camera_from_lidar.astype(np.float64).ravel()))
+
+
+def _log_camera(rec: Subtree, observation: Observation) -> None:
+    """The camera at the image's full size, and the image's file name without its folder."""
+    frame = observation.frame
+    camera = rr.AnyValues(
+        width=frame.camera.width,
+        height=frame.camera.height,
+        camera_matrix=frame.camera.matrix.astype(np.float64).ravel(),
+        source=Path(frame.source).name,
+    )
+    rec.log(entities.CAMERA, camera)

@@ -1,0 +1,59 @@
+"""The overlays of one frame: its points under every extrinsic of the run, and a caption in each that says which."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import rerun as rr
+
+from calibnet.geometry.types import Extrinsic
+from inspector import colors, entities
+from inspector.record.contents import Contents
+from inspector.record.observation import Observation
+from inspector.record.pictures.overlay import Overlay, Thinning, make_overlay
+from inspector.record.pictures.painting import make_painter
+from inspector.record.subtree import Subtree
+
+SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=180, pixel=0.25)
+"""Sparse keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
+
+
+class FrameOverlays:
+    """Draws the overlay of each extrinsic once, however many entities show it."""
+
+    def __init__(self, observation: Observation, contents: Contents) -> None:
+        """Draw points of an observation in the density and the colours that the contents ask for."""
+        self._observation = observation
+        self._thinning = DENSE if contents.dense else SPARSE
+        self._paint = make_painter(observation, contents.color)
+        self._drawn: dict[bytes, Overlay] = {}
+
+    def log(self, rec: Subtree, entity: str, name: str, camera_from_lidar: Extrinsic) -> None:
+        """Log the points under an extrinsic and, above them, its name and how far off it is."""
+        rec.log(entity, self._under(camera_from_lidar).archetype())
+        error = self._observation.error(camera_from_lidar)
+        figures = "" if error is None else f": {error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
+        self._log_caption(rec, entity, name + figures)
+
+    def log_reference(self, rec: Subtree, entity: str, reference: Extrinsic) -> None:
+        """Log the points under the reference, whose caption is its name alone."""
+        rec.log(entity, self._under(reference).archetype())
+        self._log_caption(rec, entity, "reference")
+
+    def _under(self, camera_from_lidar: Extrinsic) -> Overlay:
+        key = camera_from_lidar.tobytes()
+        if key not in self._drawn:
+            projection = self._observation.projected(camera_from_lidar)
+            self._drawn[key] = make_overlay(projection, self._observation.frame.camera, self._thinning, self._paint)
+        return self._drawn[key]
+
+    def _log_caption(self, rec: Subtree, entity: str, text: str) -> None:
+        middle = [self._observation.frame.camera.width / 2, 0.0]
+        caption = rr.Points2D([middle], labels=text, colors=colors.REFERENCE, radii=0.0, show_labels=True)
+        rec.log(entities.caption(entity), caption)
+
+
+@lru_cache(maxsize=1)
+def frame_overlays(observation: Observation, contents: Contents) -> FrameOverlays:
+    """The overlays of an observation; the same object for every tab that asks while its frame is logged."""
+    return FrameOverlays(observation, contents)

@@ -1,0 +1,59 @@
+"""An aggregated cost volume as one picture: a tile for every displacement, and which tiles matter."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from calibnet.trace import ScaleTrace
+from inspector import colors
+from inspector.record.pictures.channel_grid import palette_png, slice_grid
+
+BRIGHTEST_PERCENTILE = 90.0
+"""Of the cells' peak probabilities: what is as probable is drawn brightest."""
+
+
+def slices_picture(scale: ScaleTrace) -> rr.EncodedImage:
+    """All slices of the volume, ``dx`` to the right and ``dy`` down."""
+    peak = scale.probability.max(axis=(0, 1))[scale.occupied]
+    high = float(np.percentile(peak, BRIGHTEST_PERCENTILE)) if len(peak) else 1.0
+    grid = slice_grid(scale.probability, scale.occupied, high)
+    return rr.EncodedImage(contents=palette_png(grid), media_type="image/png")
+
+
+def slice_marks(scale: ScaleTrace, true: NDArray[np.float32] | None) -> rr.Boxes2D:
+    """Frames around the tile without displacement, the one that won most cells and the truly right one.
+
+    Args:
+        scale: the volume.
+        true: ``[h, w, 2]`` pixels, the true displacement of each cell, whose median is marked; None if unknown.
+    """
+    down, across, height, width = scale.probability.shape
+    middle = np.array([across // 2, down // 2])
+    marked = [("now", np.zeros(2, dtype=int), colors.INITIAL)]
+    marked.append(("won most cells", _most_common(scale.best[scale.occupied]), colors.FOUND))
+    if true is not None and scale.occupied.any():
+        typical = np.rint(np.median(true[scale.occupied], axis=0) / scale.stride).astype(int)
+        marked.append(("true", np.clip(typical, -middle, middle), colors.REFERENCE))
+    names: dict[tuple[int, ...], tuple[str, colors.Rgb]] = {}
+    for name, cell, color in marked:  # one frame a tile: names that share one are joined
+        known = names.get(tuple(cell))
+        names[tuple(cell)] = (f"{known[0]}, {name}" if known else name, color)
+    tile = np.array([width + 1, height + 1])
+    return rr.Boxes2D(
+        mins=[(middle + cell) * tile for cell in names],
+        sizes=[tile for _ in names],
+        colors=[color for _, color in names.values()],
+        labels=[name for name, _ in names.values()],
+        radii=rr.Radius.ui_points(2.0),
+        show_labels=True,
+    )
+
+
+def _most_common(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The displacement ``(dx, dy)`` that most of ``[N, 2]`` share; none of no cells."""
+    if not len(cells):
+        return np.zeros(2, dtype=np.int64)
+    found, counts = np.unique(cells, axis=0, return_counts=True)
+    return np.asarray(found[counts.argmax()])

@@ -1,0 +1,151 @@
+"""Tab *Cascade*: the overlay after every stage, and where each stage moves the points and how sure it is of it.
+
+Overlays belong to `Part.OVERLAYS`; on the timeline `entities.STEP` one of them walks through the stages of a frame.
+A stage's displacements and confidences belong to `Part.VOLUMES`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from calibnet.trace import StageDetail
+from inspector import entities
+from inspector.record.contents import Contents, Part
+from inspector.record.observation import Layout, Observation, StageLayout
+from inspector.record.pictures.frame_overlays import frame_overlays
+from inspector.record.pictures.legends import log_map_legends, log_point_legend
+from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import (
+    View,
+    image_view,
+    map_legends,
+    overlay_view,
+    point_legend,
+    uncapitalized,
+    with_legend,
+)
+
+NAME = "Cascade"
+
+OVERLAY_CURRENT = "overlay/current"
+"""Points over the image, one row a stage on `entities.STEP`; on the other timelines the last stage's."""
+ARROW_SPACING = (2, 3)
+"""Fewest and most cells between two arrows of the displacement field: long arrows stand farther apart."""
+ARROW_COLOR = (20, 20, 20)
+
+
+def displacement(stage: int) -> str:
+    """Where the network moves the LiDAR cells, as a map of flow colours."""
+    return f"stage_{stage}/displacement"
+
+
+def displacement_arrows(stage: int) -> str:
+    """The same, as arrows in cells."""
+    return f"{displacement(stage)}/arrows"
+
+
+def confidence(stage: int) -> str:
+    """How sure the network is of each displacement."""
+    return f"stage_{stage}/confidence"
+
+
+def wanted(layout: Layout) -> bool:
+    """Where stages ran, and their overlays or maps are recorded."""
+    return bool(layout.stages and layout.contents.parts & {Part.OVERLAYS, Part.VOLUMES})
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log what the colours of points and maps stand for."""
+    log_point_legend(rec, layout.contents.color)
+    if Part.VOLUMES in layout.contents.parts:
+        log_map_legends(rec)
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log the overlay after every stage, and every stage's displacements."""
+    if Part.OVERLAYS in contents.parts:
+        _log_overlays(rec, observation, contents)
+    if Part.VOLUMES in contents.parts:
+        for stage in observation.trace.stages:
+            if stage.detail is not None:
+                _log_displacement(rec, stage.number, stage.detail)
+
+
+def view(layout: Layout) -> View:
+    """A page with all overlays, one with the overlay that walks through the stages, and one for every stage."""
+    pages: list[View] = []
+    if Part.OVERLAYS in layout.contents.parts:
+        overlays = [overlay_view(f"Start: {layout.start.lower()}", entities.OVERLAY_MISCALIBRATED, layout.image)]
+        overlays += [
+            overlay_view(f"After {uncapitalized(stage.title)}", entities.overlay_stage(stage.number), layout.image)
+            for stage in layout.stages
+        ]
+        columns = 2 if len(overlays) > 1 else 1
+        current = overlay_view(
+            "Choose the timeline “step” below and play: start, then every stage", OVERLAY_CURRENT, layout.image
+        )
+        pages = [
+            with_legend(rrb.Grid(*overlays, grid_columns=columns), point_legend(layout), "All stages"),
+            with_legend(current, point_legend(layout), "Step by step"),
+        ]
+    if Part.VOLUMES in layout.contents.parts:
+        pages += [_stage_page(stage, layout) for stage in layout.stages if stage.grids]
+    return rrb.Tabs(*pages, name=NAME)
+
+
+def _stage_page(stage: StageLayout, layout: Layout) -> View:
+    """Overlays before and after one stage, its displacements and its confidences."""
+    grid = stage.grids[0]
+    maps = [
+        image_view(
+            f"Displacement found: colour and arrow point to where the image fits (cells of {grid.stride} px)",
+            displacement(stage.number),
+            grid,
+        ),
+        image_view("Confidence, 0 unsure to 1 a pixel or better", confidence(stage.number), grid),
+    ]
+    rows: list[View] = [rrb.Horizontal(*maps)]
+    if Part.OVERLAYS in layout.contents.parts:
+        earlier = layout.stages[: layout.stages.index(stage)]
+        name = f"Before: after stage {earlier[-1].number}" if earlier else f"Before: {layout.start.lower()}"
+        path = entities.overlay_stage(earlier[-1].number) if earlier else entities.OVERLAY_MISCALIBRATED
+        after = overlay_view("After: " + uncapitalized(stage.title), entities.overlay_stage(stage.number), layout.image)
+        rows.insert(0, rrb.Horizontal(overlay_view(name, path, layout.image), after))
+    return rrb.Vertical(*rows, map_legends(), row_shares=[1.0] * len(rows) + [0.25], name=stage.title)
+
+
+def _log_overlays(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    frame, trace = observation.frame, observation.trace
+    overlays = frame_overlays(observation, contents)
+    overlays.log(rec, OVERLAY_CURRENT, observation.start, trace.initial)
+    for stage in trace.stages:
+        name = f"after stage {stage.number}"
+        overlays.log(rec, entities.overlay_stage(stage.number), name, stage.after)
+        rec.set_step(frame.index, stage.number)
+        overlays.log(rec, OVERLAY_CURRENT, name, stage.after)
+        rec.set_step(frame.index, 0)
+
+
+def _log_displacement(rec: Subtree, number: int, results: StageDetail) -> None:
+    """The displacement field as flow colours with arrows, and its confidence."""
+    finest = results.scales[0]
+    seen = results.confidence > 0
+    rec.log(displacement(number), flow_image(results.displacement, reach_px(finest), seen))
+    rows, columns = np.nonzero(seen)
+    lengths = np.linalg.norm(results.displacement[seen], axis=1) / finest.stride
+    every = int(np.clip(np.median(lengths), *ARROW_SPACING)) if len(lengths) else 1
+    drawn = (rows % every == 0) & (columns % every == 0)
+    rows, columns = rows[drawn], columns[drawn]
+    rec.log(
+        displacement_arrows(number),
+        rr.Arrows2D(
+            origins=np.stack([columns + 0.5, rows + 0.5], axis=1),
+            vectors=results.displacement[rows, columns] / finest.stride,
+            colors=ARROW_COLOR,
+            radii=rr.Radius.ui_points(0.7),
+        ),
+    )
+    rec.log(confidence(number), certainty_image(results.confidence, seen))

@@ -1,0 +1,177 @@
+"""Tab *Cost volumes*: which displacement won in every cell, which is true, and what the volumes themselves hold.
+
+The maps and the search window of one cell belong to `Part.VOLUMES`, the raw volumes and all their slices to
+`Part.TENSORS`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from calibnet.trace import ScaleTrace, StageDetail, StageTrace
+from inspector import colors, entities
+from inspector.record.contents import Contents, Part
+from inspector.record.observation import Grid, Layout, Observation, StageLayout
+from inspector.record.pictures.legends import log_map_legends, log_names
+from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
+from inspector.record.pictures.matches import StartingPoints, chosen_match
+from inspector.record.pictures.search_window import SearchWindow
+from inspector.record.pictures.slices import slice_marks, slices_picture
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import View, image_view, map_legends, names_legend, tensor_view
+
+NAME = "Cost volumes"
+
+# entities of every scale of every stage, see `entities.of_scale`
+COST_VOLUME = "cost_volume"
+"""The matching scores as a tensor ``dy, dx, y, x``."""
+PROBABILITY = "probability"
+"""The aggregated volume, a softmax over the window, as a tensor ``dy, dx, y, x``."""
+BEST_MATCH = "best_match"
+"""Displacement of the most probable cell, as flow colours."""
+TRUE_MATCH = "true_match"
+"""Displacement to where the reference puts each cell's point, as flow colours."""
+PEAK_PROBABILITY = "peak_probability"
+"""Probability of the best match: how sure each cell is."""
+SLICES = "slices"
+"""All slices of the aggregated volume side by side, one for every displacement."""
+SLICE_MARKS = f"{SLICES}/marks"
+"""Frames around the slice that won most cells and the one that holds the true displacement."""
+WINDOW = "window"
+"""The search window of the chosen cell."""
+WINDOW_CELLS = f"{WINDOW}/cells"
+"""The cell where the point is now and the one where it was found, framed in that window."""
+WINDOW_TRUTH = f"{WINDOW}/truth"
+"""Where the reference puts the point, in that window or, if outside, on its border."""
+CHOSEN_CELL = "chosen_cell"
+"""A frame around the chosen cell, drawn over the maps."""
+
+LEGEND_WINDOW = "legend/window"
+"""What the marks in the search window stand for."""
+TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
+
+
+def wanted(layout: Layout) -> bool:
+    """Where the run kept cost volumes, and their maps or the volumes are recorded."""
+    return bool(layout.stages_with_volumes and layout.contents.parts & {Part.VOLUMES, Part.TENSORS})
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log what the colours of the maps and the marks in the window stand for."""
+    if Part.VOLUMES not in layout.contents.parts:
+        return
+    log_map_legends(rec)
+    marks = {"now": colors.INITIAL, "won": colors.FOUND}
+    log_names(rec, LEGEND_WINDOW, marks | ({"true": colors.REFERENCE} if layout.has_reference else {}))
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log the volumes of every stage that kept them."""
+    if not contents.parts & {Part.VOLUMES, Part.TENSORS}:
+        return
+    for stage in observation.trace.stages:
+        if stage.detail is not None:
+            _log_stage(rec, observation, stage, stage.detail, contents)
+
+
+def view(layout: Layout) -> View:
+    """A page for every stage."""
+    return rrb.Tabs(*(_stage_page(stage, layout) for stage in layout.stages_with_volumes), name=NAME)
+
+
+def _stage_page(stage: StageLayout, layout: Layout) -> View:
+    """A row for every scale: maps and the window of one cell on one page, slices and raw volumes on another."""
+    parts = layout.contents.parts
+    pages: list[View] = []
+    if Part.VOLUMES in parts:
+        name = "Which displacement won" if Part.TENSORS in parts else stage.title
+        pages.append(_maps_page(stage, layout, name))
+    if Part.TENSORS in parts:
+        pages.append(rrb.Vertical(*(_slice_row(stage.number, grid) for grid in stage.grids), name="All displacements"))
+        return rrb.Tabs(*pages, name=stage.title)
+    return pages[0]
+
+
+def _maps_page(stage: StageLayout, layout: Layout, name: str) -> View:
+    legends = map_legends(names_legend("Marks in the window", LEGEND_WINDOW, 3 if layout.has_reference else 2))
+    rows = [_map_row(stage.number, grid, layout) for grid in stage.grids]
+    return rrb.Vertical(*rows, legends, row_shares=[1.0] * len(rows) + [0.35], name=name)
+
+
+def _map_row(number: int, grid: Grid, layout: Layout) -> View:
+    def path(name: str) -> str:
+        return entities.of_scale(number, grid.stride, name)
+
+    scale, cell = f"1/{grid.stride}", path(CHOSEN_CELL)
+    views: list[View] = [image_view(f"{scale}: displacement that won", path(BEST_MATCH), grid, cell)]
+    if layout.has_reference:
+        views.append(image_view(f"{scale}: true displacement", path(TRUE_MATCH), grid, cell))
+    views += [
+        image_view(f"{scale}: how surely (peak probability)", path(PEAK_PROBABILITY), grid, cell),
+        image_view(f"{scale}: window of the pink cell", path(WINDOW)),
+    ]
+    return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])
+
+
+def _slice_row(number: int, grid: Grid) -> View:
+    def path(name: str) -> str:
+        return entities.of_scale(number, grid.stride, name)
+
+    scale = f"1/{grid.stride}"
+    every = f"{scale}: a tile for every displacement, dx → dy ↓, steps of {grid.stride} px; bright = probable"
+    return rrb.Horizontal(
+        image_view(every, path(SLICES)),
+        tensor_view(f"{scale}: raw scores, sliders dy dx", path(COST_VOLUME)),
+        tensor_view(f"{scale}: probability, sliders dy dx", path(PROBABILITY)),
+        column_shares=[2.0, 1.0, 1.0],
+    )
+
+
+def _log_stage(
+    rec: Subtree, observation: Observation, stage: StageTrace, results: StageDetail, contents: Contents
+) -> None:
+    points = StartingPoints.of(observation, stage)
+    match = chosen_match(points, results)
+    for scale in contents.scales(results):
+        true = points.true_field(scale.stride)
+        if Part.VOLUMES in contents.parts:
+            _log_maps(rec, stage.number, scale, true)
+            if match is not None:
+                _log_window(rec, stage.number, scale, SearchWindow(scale, match))
+        if Part.TENSORS in contents.parts:
+            _log_tensors(rec, stage.number, scale)
+            rec.log(entities.of_scale(stage.number, scale.stride, SLICES), slices_picture(scale))
+            rec.log(entities.of_scale(stage.number, scale.stride, SLICE_MARKS), slice_marks(scale, true))
+
+
+def _log_maps(rec: Subtree, number: int, scale: ScaleTrace, true: NDArray[np.float32] | None) -> None:
+    """Which displacement won in every cell, how surely, and which is the true one."""
+    stride, reach = scale.stride, reach_px(scale)
+    best = flow_image(scale.best * stride, reach, scale.occupied)
+    rec.log(entities.of_scale(number, stride, BEST_MATCH), best)
+    peak = certainty_image(scale.probability.max(axis=(0, 1)), scale.occupied)
+    rec.log(entities.of_scale(number, stride, PEAK_PROBABILITY), peak)
+    if true is not None:
+        rec.log(entities.of_scale(number, stride, TRUE_MATCH), flow_image(true, reach, scale.occupied))
+
+
+def _log_window(rec: Subtree, number: int, scale: ScaleTrace, window: SearchWindow) -> None:
+    """The search window of the chosen cell, and that cell on the maps."""
+    rec.log(entities.of_scale(number, scale.stride, CHOSEN_CELL), window.frame())
+    rec.log(entities.of_scale(number, scale.stride, WINDOW), window.scores())
+    rec.log(entities.of_scale(number, scale.stride, WINDOW_CELLS), window.cells())
+    truth = window.truth()
+    if truth is not None:
+        rec.log(entities.of_scale(number, scale.stride, WINDOW_TRUTH), truth)
+
+
+def _log_tensors(rec: Subtree, number: int, scale: ScaleTrace) -> None:
+    """The volume before and after aggregation as it is."""
+    low, high = colors.robust_limits(scale.volume)
+    raw = rr.Tensor(scale.volume, dim_names=TENSOR_DIMENSIONS, value_range=(low, max(high, low + 1e-3)))
+    rec.log(entities.of_scale(number, scale.stride, COST_VOLUME), raw)
+    aggregated = rr.Tensor(scale.probability, dim_names=TENSOR_DIMENSIONS)
+    rec.log(entities.of_scale(number, scale.stride, PROBABILITY), aggregated)

@@ -1,0 +1,143 @@
+"""Tab *Overview*: the start, the result and the reference over the image, error curves over the frames, the table.
+
+Its overlays are in every recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from inspector import colors, entities
+from inspector.record.contents import Contents, Part
+from inspector.record.observation import Layout, Observation
+from inspector.record.pictures.frame_overlays import frame_overlays
+from inspector.record.pictures.legends import log_point_legend
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import (
+    LARGEST_OVERLAY,
+    LEGEND_HEIGHT,
+    SCREEN_HEIGHT,
+    SCREEN_WIDTH,
+    TITLE_HEIGHT,
+    View,
+    curve_view,
+    overlay_view,
+    point_legend,
+)
+
+NAME = "Overview"
+
+FIT = "fit"
+"""Curves of the error in pixels of the frame's image that the stages expect of their matches."""
+FIT_LIMIT = f"{FIT}/limit"
+"""The match error up to which the last stage's result is believed."""
+SUCCESS = {"rotation": 1.0, "translation": 2.5}
+"""Limits of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
+
+
+def fit_stage(number: int) -> str:
+    """Curve of the match error of one stage."""
+    return f"{FIT}/stage_{number}"
+
+
+def wanted(layout: Layout) -> bool:
+    """In every recording."""
+    return True
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log what the points' colours stand for, and the curves' names and colours."""
+    log_point_legend(rec, layout.contents.color)
+    if Part.CURVES in layout.contents.parts:
+        _log_curve_styles(rec, layout)
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log the three overlays of a frame and a point of every curve."""
+    trace, reference = observation.trace, observation.reference
+    overlays = frame_overlays(observation, contents)
+    overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
+    result = "corrected" if trace.confirmed else "left as it was: picture and scan do not fit"
+    overlays.log(rec, entities.OVERLAY_CORRECTED, result, trace.corrected)
+    if reference is not None:
+        overlays.log_reference(rec, entities.OVERLAY_REFERENCE, reference)
+    if Part.CURVES in contents.parts:
+        _log_errors(rec, observation)
+        _log_fit(rec, observation)
+
+
+def view(layout: Layout) -> View:
+    """Overlays side by side, their legend, and below them curves beside the table."""
+    overlays = [
+        overlay_view(layout.start, entities.OVERLAY_MISCALIBRATED, layout.image),
+        overlay_view("Corrected", entities.OVERLAY_CORRECTED, layout.image),
+    ]
+    if layout.has_reference:
+        overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE, layout.image))
+    below: View = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
+    if layout.stages and Part.CURVES in layout.contents.parts:
+        below = rrb.Horizontal(rrb.Vertical(*_curve_views(layout)), below, column_shares=[1.0, 1.0])
+    width, height = layout.image
+    overlay = min(SCREEN_WIDTH / len(overlays) * height / width + TITLE_HEIGHT, LARGEST_OVERLAY)
+    return rrb.Vertical(
+        rrb.Horizontal(*overlays),
+        point_legend(layout),
+        below,
+        row_shares=[overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay],
+        name=NAME,
+    )
+
+
+def _curve_views(layout: Layout) -> list[View]:
+    """The errors of every stage over the frames, where they are known, and the match errors that stages expect."""
+    kinds = entities.ERROR_KINDS.items() if layout.has_reference else ()
+    errors = [
+        curve_view(
+            f"{kind.capitalize()} error [{unit}]", f"error/{kind}", "$origin/**", f"- /{entities.error_corrected(kind)}"
+        )
+        for kind, unit in kinds
+    ]
+    return [*errors, curve_view("Fit of picture and scan: matches expected to be off by [px]", FIT)]
+
+
+def _log_errors(rec: Subtree, observation: Observation) -> None:
+    """Rotation in degrees and translation in centimetres, at the start, after every stage and of the result."""
+    trace = observation.trace
+    if observation.reference is None:
+        return
+    for kind in entities.ERROR_KINDS:
+        rec.log(entities.error_limit(kind), rr.Scalars(SUCCESS[kind]))
+        curves = {entities.error_initial(kind): trace.initial, entities.error_corrected(kind): trace.corrected}
+        curves |= {entities.error_stage(kind, stage.number): stage.after for stage in trace.stages}
+        for curve, camera_from_lidar in curves.items():
+            error = observation.error(camera_from_lidar)
+            if error is not None:
+                rec.log(curve, rr.Scalars(error.rotation_deg if kind == "rotation" else error.translation_cm))
+
+
+def _log_fit(rec: Subtree, observation: Observation) -> None:
+    """The match error that every stage expects, which needs no reference, and the limit of the last one's."""
+    trace = observation.trace
+    for stage in trace.stages:
+        rec.log(fit_stage(stage.number), rr.Scalars(observation.image_px(stage, stage.match_error_px)))
+    if trace.stages and math.isfinite(trace.match_error_limit_px):
+        limit = observation.image_px(trace.stages[-1], trace.match_error_limit_px)
+        rec.log(FIT_LIMIT, rr.Scalars(limit))
+
+
+def _log_curve_styles(rec: Subtree, layout: Layout) -> None:
+    looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
+    curves = {fit_stage(number): look for number, look in looks.items()}
+    limits = {FIT_LIMIT: "believed: below"}
+    for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():
+        curves[entities.error_initial(kind)] = ("miscalibrated", colors.INITIAL)
+        curves |= {entities.error_stage(kind, number): look for number, look in looks.items()}
+        limits[entities.error_limit(kind)] = f"success: below {SUCCESS[kind]:g} {unit}"
+    for path, name in limits.items():
+        rec.log_once(path, rr.SeriesLines(names=name, colors=colors.LIMIT, widths=1.5))
+    for path, (name, color) in curves.items():
+        line = rr.SeriesLines(names=name, colors=color, widths=2.0)
+        rec.log_once(path, line, rr.SeriesPoints(names=name, colors=color, marker_sizes=3.0))
