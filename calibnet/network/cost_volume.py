@@ -2,7 +2,7 @@
 
 Stereo searches one-sided horizontal disparities. A miscalibration moves points along both axes
 and in both directions, so each LiDAR cell is compared with a window of ``(2r+1) x (2r+1)`` image
-cells around it; the window, row by row, becomes the depth ``D`` of the 3-D convolutions.
+cells around it, and a volume is ``[B, Dy, Dx, h, w, C]``.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
         groups: number of channel groups, each summed on its own.
 
     Returns:
-        ``[B, D, h, w, groups]`` with zeros where the window leaves the image.
+        ``[B, Dy, Dx, h, w, groups]`` with zeros where the window leaves the image.
     """
     batch, _, height, width = lidar.shape
     window, runs = 2 * radius + 1, -(-width // RUN)
@@ -56,7 +56,7 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     products = cells.permute(0, 2, 3, 4, 1) @ rows.permute(0, 2, 3, 1, 4, 5).flatten(4)
     index = band_index(RUN, radius).to(lidar.device).expand(*products.shape[:4], -1)
     volume = products.gather(4, index).flatten(2, 3)[:, :, :width]  # [B*G, h, w, D]
-    return volume.unflatten(0, (batch, groups)).permute(0, 4, 2, 3, 1)
+    return volume.unflatten(3, (window, window)).unflatten(0, (batch, groups)).permute(0, 4, 5, 2, 3, 1)
 
 
 @lru_cache(maxsize=32)
@@ -78,7 +78,7 @@ def pairs(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
 
 def matching_score(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
     """Cosine ``[B, D, h, w]`` of every LiDAR cell with its window, from features ``[B, C, h, w]``."""
-    return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups=1)[..., 0]
+    return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups=1)[..., 0].flatten(1, 2)
 
 
 class CostVolume(nn.Module):
@@ -94,13 +94,12 @@ class CostVolume(nn.Module):
         """Compare features ``[B, C, h, w]`` of both branches.
 
         Returns:
-            The volume ``[B, G + 2Cc, D, h, w]`` and the matching score ``[B, D, h, w]``, the cosine
+            The volume ``[B, Dy, Dx, h, w, G + 2Cc]`` and the matching score ``[B, D, h, w]``, the cosine
             of the two features (the sum over the groups, since the whole vector has unit norm).
         """
         groups = correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), self.radius, self.groups)
-        score = groups.sum(-1) if self.groups > 1 else groups[..., 0]
+        score = (groups.sum(-1) if self.groups > 1 else groups[..., 0]).flatten(1, 2)
         fixed, moved = pairs(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
         # a group's share of the cosine is about 1/G: scaled so that all channels start alike
-        shares = (groups * self.groups if self.groups > 1 else groups).unflatten(1, moved.shape[1:3])
-        volume = torch.cat([shares, fixed.to(groups.dtype), moved.to(groups.dtype)], dim=-1).flatten(1, 2)
-        return volume.permute(0, 4, 1, 2, 3), score
+        shares = groups * self.groups if self.groups > 1 else groups
+        return torch.cat([shares, fixed.to(groups.dtype), moved.to(groups.dtype)], dim=-1), score

@@ -97,4 +97,10 @@ class CalibrationNetwork(nn.Module):
         clock("displacement")
         pose = self.pose(field, inputs.cells[0], inputs.intrinsics)
         clock("pose")
-        return NetworkOutput(pose, field, scores, logits, Activations(before, after) if keep_activations else None)
+        activations = Activations(channels_first(before), channels_first(after)) if keep_activations else None
+        return NetworkOutput(pose, field, scores, logits, activations)
+
+
+def channels_first(volumes: list[Tensor]) -> list[Tensor]:
+    """Volumes ``[B, Dy, Dx, h, w, C]`` as ``[B, C, D, h, w]``."""
+    return [volume.flatten(1, 2).movedim(-1, 1) for volume in volumes]

@@ -5,32 +5,44 @@ from dataclasses import replace
 import pytest
 import torch
 import torch.nn.functional as F
-from torch import Tensor
+from torch import Tensor, nn
 
 from calibnet.network.aggregation import (
     Aggregation,
+    Down,
+    Fusion,
     Hourglass,
+    Pointwise,
     WindowConv,
-    centre_in_window,
-    every_second,
-    pointwise_each,
+    double,
     refine_window,
 )
+from calibnet.network.convolution import HAS_ONEDNN, pack
 from calibnet.network.cost_volume import TEMPERATURE
 from tests.support.tiny import TINY
 
 
 def linear_window(radius: int, slope_y: float, slope_x: float) -> Tensor:
-    """``[1, 1, D, 1, 1]``: a linear function of the displacement in cells, row by row."""
-    values = [slope_y * dy + slope_x * dx for dy in range(-radius, radius + 1) for dx in range(-radius, radius + 1)]
-    return torch.tensor(values, dtype=torch.float64).reshape(1, 1, -1, 1, 1)
+    """``[1, Dy, Dx, 1, 1, 1]``: a linear function of the displacement in cells."""
+    axis = torch.arange(-radius, radius + 1, dtype=torch.float64)
+    return (slope_y * axis[:, None] + slope_x * axis)[None, :, :, None, None, None]
+
+
+def passing(down: Down) -> Down:
+    """The same layer with weights that hand every other cell on, channel by channel."""
+    nn.init.dirac_(down.weight)
+    assert down.bias is not None
+    nn.init.zeros_(down.bias)
+    return down
+
+
+def noise(*shape: int) -> Tensor:
+    return torch.randn(*shape, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
 
 
 @pytest.mark.parametrize("radius", [2, 4, 6])
 def test_coarsening_keeps_displacements_in_pixels(radius: int) -> None:
-    window = 2 * radius + 1
-    picked = every_second(linear_window(radius, 3.0, -5.0), window)
-    coarse = centre_in_window(picked, window).reshape(window, window)
+    coarse = passing(Down(1, 1).double())(linear_window(radius, 3.0, -5.0)).squeeze()
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):
             covered = 2 * abs(dy) <= radius and 2 * abs(dx) <= radius
@@ -40,35 +52,93 @@ def test_coarsening_keeps_displacements_in_pixels(radius: int) -> None:
 
 @pytest.mark.parametrize("radius", [2, 4, 6])
 def test_refining_keeps_displacements_in_pixels(radius: int) -> None:
-    fine = refine_window(linear_window(radius, 3.0, -5.0), 2 * radius + 1)
+    fine = refine_window(linear_window(radius, 3.0, -5.0))
     torch.testing.assert_close(fine, linear_window(radius, 1.5, -2.5))
 
 
+@pytest.mark.parametrize("radius", [2, 4])
+def test_refining_is_bilinear_interpolation_of_the_centre(radius: int) -> None:
+    volume = noise(2, 2 * radius + 1, 2 * radius + 1, 2, 3, 4)
+    fine = refine_window(volume)
+    for dy in range(-radius, radius + 1):
+        for dx in range(-radius, radius + 1):
+            expected = torch.zeros_like(fine[:, 0, 0])
+            for y, x in {
+                (dy // 2, dx // 2),
+                (-(-dy // 2), dx // 2),
+                (dy // 2, -(-dx // 2)),
+                (-(-dy // 2), -(-dx // 2)),
+            }:
+                share = (1 - abs(dy / 2 - y)) * (1 - abs(dx / 2 - x))
+                expected += share * volume[:, y + radius, x + radius]
+            torch.testing.assert_close(fine[:, dy + radius, dx + radius], expected)
+
+
 def test_windows_change_neither_cells_nor_channels() -> None:
-    volume = torch.zeros(2, 3, 25, 4, 5)
-    volume[1, 2, 12, 3, 1] = 1.0  # no displacement, one cell
-    for moved in (centre_in_window(every_second(volume, 5), 5), refine_window(volume, 5)):
-        assert moved[1, 2, 12, 3, 1] == 1.0
-        assert moved.amax(2).sum() == 1.0
+    volume = torch.zeros(2, 5, 5, 4, 6, 3)
+    volume[1, 2, 2, 2, 4, 2] = 1.0  # no displacement, one cell
+    refined, coarse = refine_window(volume), passing(Down(3, 3))(volume)
+    assert refined[1, 2, 2, 2, 4, 2] == refined.amax((1, 2)).sum() == 1.0
+    assert coarse[1, 2, 2, 1, 2, 2] == coarse.sum() == 1.0
+
+
+def test_doubling_repeats_cells_and_nothing_else() -> None:
+    volume = noise(2, 3, 3, 2, 3, 4)
+    doubled = double(volume)
+    assert doubled.shape == (2, 3, 3, 4, 6, 4)
+    for y in range(4):
+        for x in range(6):
+            assert torch.equal(doubled[:, :, :, y, x], volume[:, :, :, y // 2, x // 2])
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_window_convolution_leaves_the_rows_of_the_window_apart(axis: str) -> None:
-    torch.manual_seed(0)
-    layer = WindowConv(3, 5, axis).double()
-    volume = torch.randn(2, 3, 25, 4, 6, dtype=torch.float64)
-    window = volume.unflatten(2, (5, 5))  # [B, C, Dy, Dx, h, w]
-    along = 2 if axis == "x" else 3  # the axis that is not convolved
-    expected = torch.stack(
-        [F.conv3d(part, layer.conv.weight, layer.conv.bias, padding=1) for part in window.unbind(along)], dim=along
-    )
-    torch.testing.assert_close(layer(volume), expected.flatten(2, 3))
+    layer, volume = WindowConv(3, axis).double(), noise(2, 5, 5, 4, 6, 3)
+    along = 1 if axis == "x" else 2  # the axis that is not convolved
+    rows = [part.movedim(-1, 1) for part in volume.unbind(along)]  # [B, C, D, h, w]
+    convolved = [F.conv3d(row, layer.conv.weight, layer.conv.bias, padding=1).movedim(1, -1) for row in rows]
+    torch.testing.assert_close(layer(volume), torch.stack(convolved, dim=along))
+
+
+def test_going_down_is_a_convolution_of_every_image_of_shared_displacements() -> None:
+    layer, volume = Down(3, 4).double(), noise(2, 5, 5, 4, 6, 3)
+    coarse = layer(volume)
+    assert coarse.shape == (2, 5, 5, 2, 3, 4)
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            expected = torch.zeros(2, 2, 3, 4, dtype=torch.float64)
+            if abs(dy) < 2 and abs(dx) < 2:
+                image = volume[:, 2 + 2 * dy, 2 + 2 * dx].permute(0, 3, 1, 2)
+                expected = F.conv2d(image, layer.weight[:, :, 0], layer.bias, 2, 1).permute(0, 2, 3, 1)
+            torch.testing.assert_close(coarse[:, dy + 2, dx + 2], expected)
+
+
+def test_a_fused_volume_is_read_as_if_it_were_made() -> None:
+    fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), Pointwise(3, 2).double()
+    interpolated = refine_window(double(fusion.coarser))
+    torch.testing.assert_close(fusion.volume(), fusion.own + interpolated)
+    made = torch.einsum("...c,kc->...k", fusion.own + interpolated, head.weight.flatten(1)) + head.bias
+    torch.testing.assert_close(fusion.read(head), made)
+    torch.testing.assert_close(Fusion(fusion.own).read(head), head(fusion.own))
+
+
+@pytest.mark.skipif(not HAS_ONEDNN, reason="this machine has no oneDNN for x86")
+@pytest.mark.parametrize("activation", [None, "relu"])
+def test_pointwise_convolution_says_the_same_packed(activation: str | None) -> None:
+    layer, volume = Pointwise(3, 4, activation).eval(), noise(2, 5, 5, 4, 6, 3).float()
+    with torch.no_grad():
+        plain = layer(volume)
+        expected = torch.einsum("...c,kc->...k", volume, layer.weight.flatten(1)) + layer.bias
+        torch.testing.assert_close(plain, expected.relu() if activation else expected)
+        pack(layer, torch.float32)
+        assert layer.packed is not None
+        torch.testing.assert_close(layer(volume), plain)
 
 
 def volumes_of(channels: tuple[int, ...], window: int) -> list[Tensor]:
     torch.manual_seed(0)
     return [
-        torch.randn(1, width, window**2, 8 >> scale, 12 >> scale, requires_grad=True)
+        torch.randn(1, window, window, 8 >> scale, 12 >> scale, width, requires_grad=True)
         for scale, width in enumerate(channels)
     ]
 
@@ -79,7 +149,7 @@ def test_hourglass_fuses_scales_only_when_asked(scales: tuple[int, ...], fuse: b
     channels = (4, 6, 8)[: len(scales)]
     config = replace(TINY, scales=scales, volume_channels=channels, hierarchical_fusion=fuse)
     volumes = volumes_of(channels, config.window)
-    left = Hourglass(config, blocks=1)(volumes)
+    left = [fusion.volume() for fusion in Hourglass(config, blocks=1)(volumes)]
     assert [volume.shape for volume in left] == [volume.shape for volume in volumes]
     for scale, output in enumerate(left):
         gradients = torch.autograd.grad(output.sum(), volumes, retain_graph=True, allow_unused=True)
@@ -87,31 +157,35 @@ def test_hourglass_fuses_scales_only_when_asked(scales: tuple[int, ...], fuse: b
         assert reached == [fuse or scale == other for other in range(len(scales))]
 
 
-@pytest.mark.parametrize("scales", [(8,), (8, 16), (8, 16, 32)])
-@pytest.mark.parametrize("fuse", [True, False])
 @pytest.mark.parametrize("convolve_finest", [True, False])
-def test_volumes_are_read_as_if_they_were_made(scales: tuple[int, ...], fuse: bool, convolve_finest: bool) -> None:
-    channels = (4, 6, 8)[: len(scales)]
-    config = replace(
-        TINY, scales=scales, volume_channels=channels, hierarchical_fusion=fuse, convolve_finest=convolve_finest
-    )
-    hourglass, volumes = Hourglass(config, blocks=1), volumes_of(channels, config.window)
-    heads = torch.nn.ModuleList(torch.nn.Conv3d(width, 2, 1) for width in channels)
-    found, expected = hourglass.read(hourglass.descend(volumes), heads), pointwise_each(heads, hourglass(volumes))
-    for volume, other in zip(found, expected, strict=True):
-        torch.testing.assert_close(volume, other)
+def test_hourglass_is_that_of_the_figure(convolve_finest: bool) -> None:
+    """Down with a sum at every scale, up with another, and a block after each but at the finest scale."""
+    config = replace(TINY, scales=(8, 16), volume_channels=(4, 6), convolve_finest=convolve_finest)
+    hourglass, (fine, coarse) = Hourglass(config, blocks=1), volumes_of((4, 6), config.window)
+    coarse = hourglass.up_blocks[1](hourglass.down_blocks[1](coarse + hourglass.down[0](fine)))
+    fine = fine + double(refine_window(hourglass.up[0](coarse)))
+    if convolve_finest:
+        block = hourglass.up_blocks[0][0]
+        fine = (fine + block.y(block.x(fine))).relu()
+    for found, expected in zip(hourglass(volumes_of((4, 6), config.window)), (fine, coarse), strict=True):
+        torch.testing.assert_close(found.volume(), expected)
 
 
-def test_aggregation_scores_every_displacement_of_every_scale() -> None:
+@pytest.mark.parametrize("convolve_finest", [True, False])
+@pytest.mark.parametrize("fuse", [True, False])
+def test_aggregation_scores_every_displacement_of_every_scale(convolve_finest: bool, fuse: bool) -> None:
     inputs = TINY.groups + 2 * TINY.concat_channels
     raw = [torch.randn(1, 25, 8 >> scale, 12 >> scale) for scale in range(3)]
-    aggregation = Aggregation(TINY)
+    aggregation = Aggregation(replace(TINY, convolve_finest=convolve_finest, hierarchical_fusion=fuse))
     before, after, logits = aggregation(volumes_of((inputs,) * 3, TINY.window), raw, keep_activations=True)
-    assert [tuple(volume.shape[:3]) for volume in before] == [(1, 4, 25), (1, 6, 25), (1, 8, 25)]
+    assert [tuple(volume.shape) for volume in before] == [
+        (1, 5, 5, 8, 12, 4), (1, 5, 5, 4, 6, 6), (1, 5, 5, 2, 3, 8),
+    ]  # fmt: skip
     assert [volume.shape for volume in after] == [volume.shape for volume in before]
     assert [tuple(scores.shape) for scores in logits] == [(1, 25, 8, 12), (1, 25, 4, 6), (1, 25, 2, 3)]
     for scale, (scores, scale_logits) in enumerate(zip(raw, logits, strict=True)):
-        added = aggregation.score[scale](after[scale])[:, 0]
+        head = aggregation.score[scale]
+        added = F.conv3d(after[scale].flatten(1, 2).movedim(-1, 1), head.weight, head.bias)[:, 0]
         torch.testing.assert_close(scale_logits, TEMPERATURE * scores + added)
     nothing, same = aggregation(volumes_of((inputs,) * 3, TINY.window), raw)[1:]
     assert nothing == []

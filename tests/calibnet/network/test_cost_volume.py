@@ -29,7 +29,7 @@ def correlation_by_loop(lidar: Tensor, image: Tensor, radius: int, groups: int) 
         for dx in range(-radius, radius + 1):
             product = lidar * shifted(image, dy, dx)
             volume.append(product.unflatten(1, (groups, -1)).sum(2).permute(0, 2, 3, 1))
-    return torch.stack(volume, dim=1)
+    return torch.stack(volume, dim=1).unflatten(1, (2 * radius + 1, 2 * radius + 1))
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_correlation_equals_a_loop_of_shifted_products(radius: int, groups: int,
     torch.manual_seed(0)
     lidar, image = torch.randn(2, 2, 6, *size, dtype=torch.float64).requires_grad_().unbind()
     fast, slow = correlate(lidar, image, radius, groups), correlation_by_loop(lidar, image, radius, groups)
-    assert fast.shape == (2, (2 * radius + 1) ** 2, *size, groups)
+    assert fast.shape == (2, 2 * radius + 1, 2 * radius + 1, *size, groups)
     torch.testing.assert_close(fast, slow)
     weights = torch.randn_like(fast)
     mine = torch.autograd.grad((fast * weights).sum(), (lidar, image))
@@ -51,8 +51,8 @@ def test_the_lowest_rows_see_the_image_above_them() -> None:
     generator = torch.Generator().manual_seed(1)
     lidar, image = torch.randn(2, 2, 6, 5, 7, generator=generator)
     low = lidar[:, :, 3:]
-    torch.testing.assert_close(correlate(low, image, 2, 3), correlate(lidar, image, 2, 3)[:, :, 3:])
-    for part, whole in zip(pairs(low, image, 2), pairs(lidar, image, 2), strict=True):
+    wholes = (correlate(lidar, image, 2, 3), *pairs(lidar, image, 2))
+    for part, whole in zip((correlate(low, image, 2, 3), *pairs(low, image, 2)), wholes, strict=True):
         torch.testing.assert_close(part, whole[:, :, :, 3:])
 
 
@@ -67,25 +67,26 @@ def test_best_match_names_where_the_image_has_the_lidar_cell() -> None:
     image = torch.randn(1, 32, 9, 9)
     dy, dx = -2, 1
     lidar = shifted(image, dy, dx)  # lidar cell (y, x) looks like image cell (y - 2, x + 1)
-    score = correlate(lidar, image, 2, 4).sum(-1)[0, :, 4, 4]
+    score = correlate(lidar, image, 2, 4).sum(-1)[0, :, :, 4, 4]
     assert window_offsets(2, 8)[score.argmax()].tolist() == [8 * dx, 8 * dy]
 
 
 def test_pairs_equal_a_loop() -> None:
     torch.manual_seed(0)
     lidar, image = torch.randn(2, 2, 3, 4, 5, dtype=torch.float64)
-    volume = torch.cat(pairs(lidar, image, 2), dim=-1).flatten(1, 2)
-    assert volume.shape == (2, 25, 4, 5, 6)
-    for depth, (dy, dx) in enumerate((dy, dx) for dy in range(-2, 3) for dx in range(-2, 3)):
-        expected = torch.cat([lidar, shifted(image, dy, dx)], dim=1).permute(0, 2, 3, 1)
-        torch.testing.assert_close(volume[:, depth], expected)
+    volume = torch.cat(pairs(lidar, image, 2), dim=-1)
+    assert volume.shape == (2, 5, 5, 4, 5, 6)
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            expected = torch.cat([lidar, shifted(image, dy, dx)], dim=1).permute(0, 2, 3, 1)
+            torch.testing.assert_close(volume[:, dy + 2, dx + 2], expected)
 
 
 def test_score_is_a_cosine_whatever_the_features_length() -> None:
     torch.manual_seed(0)
     features = 30.0 * torch.randn(1, TINY.feature_channels, 4, 6)
     volume, score = CostVolume(TINY)(features, features)
-    assert volume.shape == (1, TINY.groups + 2 * TINY.concat_channels, 25, 4, 6)
+    assert volume.shape == (1, 5, 5, 4, 6, TINY.groups + 2 * TINY.concat_channels)
     assert score.abs().max() <= 1 + 1e-5
     torch.testing.assert_close(score[:, 12], torch.ones(1, 4, 6))  # the centre of the window: itself
 
