@@ -33,9 +33,9 @@ class SampleRecipe:
     hiding_px: int = 4
     """Side of the squares of pixels in whose nearest LiDAR point a farther one may be hidden from the camera."""
     hidden_factor: float = 1.2
-    """A point is hidden if it is farther than so many times the nearest one's depth,"""
+    """A point is hidden if its depth is this factor times the nearest one's, plus `hidden_margin_m`, or more."""
     hidden_margin_m: float = 1.0
-    """and so many metres."""
+    """See `hidden_factor`; metres."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class DrawRecipe:
     eased_share: float = 0.3
     """Share of the uniform draws made smaller, as a stage must also know when to stop."""
     eased_least: float = 0.03
-    """Factor by which rotation and translation, each on its own, are made smaller at most; 1 leaves them."""
+    """Least factor on the rotation and on the translation of such a draw; each is drawn between it and 1."""
     residuals: int = 200
     """Training frames on which residuals are measured when a run starts."""
     residual_stretch: tuple[float, float] = (0.7, 1.8)
@@ -98,7 +98,7 @@ class FeatureRecipe:
     warm_up_most: float = 1 / 3
     """Share of a budget in samples that the warm-up takes at most."""
     warm_up_variety: float = 0.5
-    """Share of scans and pictures augmented, and of synthetic draws kept, when the warm-up starts; 1 when it ends."""
+    """Share of scans and pictures augmented, and of synthetic draws kept, as the warm-up begins; 1 as it ends."""
     warm_up_shift_px: float = 40.0
     """Displacement of the LiDAR image in x and in y, at most, in the warm-up."""
     shift_px: float = 24.0
@@ -120,9 +120,9 @@ class LossRecipe:
     displacement: float = 0.3
     """Weight of the displacements' negative log-likelihood (of errors in pixels)."""
     pose: float = 2.0
-    """Weight of the translation's error, a metre."""
+    """Weight of the translation's error, per metre."""
     quaternion: float = 15.0
-    """Weight of the rotation's error, a radian."""
+    """Weight of the rotation's error, per radian."""
     points: float = 0.5
     """Weight of the logarithm of 1 + the points' mean error in metres."""
     linear_m: float = 1.0

@@ -181,7 +181,7 @@ def train(
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False)
-    steps = all_stages(options) if every_stage else [options]
+    steps = all_stages(options, RECIPE) if every_stage else [options]
     if not steps:
         console.print(f"All five stages have their weights in {output}; remove those to train again.")
     for number, step in enumerate(steps, start=1):
@@ -200,7 +200,7 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
         from inspector.record.training import TrainingLog
 
         observers.append(TrainingLog(save, f"{options.preset} ±{options.range}"))
-    path = Trainer(build(options), Observers(observers), resume).run()
+    path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
     console.print(f"Weights with their training record: {path}")
 
 
