@@ -68,7 +68,8 @@ def recipe_sentence(training: Training, samples: int) -> str:
     """From what a run started, on what and how long it trained; folders of this machine are left out."""
     options, config, draws = training.options, training.stage.network.config, training.samples.draws
     if options.initialize:
-        start = Path(options.initialize).name
+        path, output = Path(options.initialize), Path(options.output)
+        start = str(path.relative_to(output) if path.is_relative_to(output) else path.name)
         if config.share_image_branch:
             start += f", image branch {'trained' if options.train_image_branch else 'frozen'}"
     else:

@@ -93,6 +93,10 @@ def test_a_recipe_of_one_s_own_is_in_the_record() -> None:
             {"train_image_branch": True, "synthetic": 0.0, "data": ["folder:rigs"]},
             "from compact-10deg-1m.safetensors, image branch trained; 24,000 samples of folder:rigs",
         ),
+        (
+            {"initialize": "/home/alice/runs/features/five.safetensors", "data": []},
+            "from features/five.safetensors, image branch frozen; 24,000 samples of synthetic scenes",
+        ),
         ({"initialize": None, "data": []}, "from random weights; 24,000 samples of synthetic scenes"),
     ],
 )
