@@ -1,1 +1,1 @@
-"""Training: samples, losses and the loop."""
+"""Training: `build` opens data and network as the recipe says, `Trainer` is the loop."""

@@ -1,21 +1,19 @@
-"""Endless batches for the loop: which samples, from which processes, at which precision."""
+"""Endless batches for the loop: which samples, from which processes."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
-from typing import Any
+from typing import cast
 
-import torch
-from lightning_fabric.plugins.precision import MixedPrecision
-from torch.utils.data import Sampler
+from lightning_fabric import Fabric
+from torch.utils.data import DataLoader, Sampler
 
 from calibnet.errors import CalibnetError
 from calibnet.network.batch import NetworkInputs
 from calibnet.runtime.interruption import SIGNALS
-from calibnet.runtime.precision import autocast
 from calibnet.training.losses import Target
+from calibnet.training.samples import TrainingSamples, collate
 
 Batch = tuple[NetworkInputs, Target]
 
@@ -33,19 +31,17 @@ class BatchNumbers(Sampler[list[int]]):
             number += self.world
 
 
-class FloatInputs(MixedPrecision):
-    """bf16 autocast where it is faster; it leaves the inputs alone, as rounded points would be off by decimetres."""
-
-    def __init__(self) -> None:
-        super().__init__("bf16-mixed", device="cuda" if torch.cuda.is_available() else "cpu")
-
-    def forward_context(self) -> AbstractContextManager[Any]:
-        """Bf16 only where the hardware has it."""
-        return autocast(torch.device(self.device))
-
-    def convert_input(self, data: Any) -> Any:
-        """Keep the inputs as they are."""
-        return data
+def open_batches(fabric: Fabric, samples: TrainingSamples, first: int, batch: int, workers: int) -> Iterator[Batch]:
+    """All batches from number ``first`` on, prepared by so many other processes, on the fabric's device."""
+    loader = DataLoader(
+        samples,
+        batch_sampler=BatchNumbers(first, batch, fabric.global_rank, fabric.world_size),
+        collate_fn=collate,
+        num_workers=workers,
+        worker_init_fn=leave_signals_to_main,
+        prefetch_factor=4 if workers else None,
+    )
+    return cast(Iterator[Batch], iter(fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
 
 
 def next_batch(batches: Iterator[Batch]) -> Batch:

@@ -2,20 +2,58 @@
 
 from __future__ import annotations
 
-import io
-import tempfile
-from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
-from calibnet.datasets import Frame, Sequence, dataset_names
+from calibnet.datasets import Sequence, dataset_names
 from calibnet.datasets.discovery import find_sequences
 from calibnet.errors import ConfigError, DatasetError
-from calibnet.geometry import PinholeCamera
-from calibnet.runtime.whole_file import write_whole
-from calibnet.training.samples import Source
+from calibnet.training.options import TrainingOptions
+from calibnet.training.synthetic_pool import SyntheticPool
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where training frames come from.
+
+    Attributes:
+        sequence: the frames.
+        weight: how often one of them is drawn, relative to the other sources.
+        synthetic: whether they are of the synthetic world, whose rigs differ most; its frames are on disk already, and
+            far too many to be kept in memory as real ones are.
+    """
+
+    sequence: Sequence
+    weight: float
+    synthetic: bool = False
+
+
+def training_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]]:
+    """Sources of training samples and the validation sequences, which training never draws from.
+
+    A real sequence is drawn with the square root of its length: single frames of rare sensors count
+    more than the hundredth of one street. Together they have ``1 - options.synthetic``.
+
+    Raises:
+        ConfigError: there is nothing to train on.
+    """
+    validation = [sequence for spec in options.validate for sequence in open_data(spec)]
+    held_out = {sequence.name for sequence in validation}
+    real = [sequence for spec in options.data for sequence in open_data(spec) if sequence.name not in held_out]
+    sources: list[Source] = []
+    if real and options.synthetic < 1:
+        roots = np.sqrt([len(sequence) for sequence in real])
+        weights = (1 - options.synthetic) * roots / roots.sum()
+        sources = [Source(sequence, float(weight)) for sequence, weight in zip(real, weights, strict=True)]
+    if options.synthetic > 0:
+        cache = Path(options.scene_cache) if options.scene_cache else None
+        pool = SyntheticPool(options.scenes, options.seed, cache)
+        sources.append(Source(pool, options.synthetic, synthetic=True))
+    if not sources:
+        raise ConfigError("There is nothing to train on: give --data, or a --synthetic share above 0.")
+    return sources, validation
 
 
 def open_data(spec: str) -> list[Sequence]:
@@ -44,79 +82,3 @@ def open_data(spec: str) -> list[Sequence]:
             f"Nothing of dataset {dataset} is found for {spec!r}; check the folder and the sequence's name."
         )
     return found
-
-
-class SyntheticPool:
-    """A ``Sequence`` of unrelated synthetic scenes, each rendered once and then read from disk."""
-
-    caches = True
-
-    def __init__(self, size: int, seed: int, folder: Path | None = None) -> None:
-        self.size, self.seed = size, seed
-        self.folder = folder or Path(tempfile.gettempdir()) / "calib-inspect-scenes"
-        self.name, self.rig = f"synthetic/{seed}", "synthetic world, random rigs"
-
-    def __len__(self) -> int:
-        return self.size
-
-    def __iter__(self) -> Iterator[Frame]:
-        return (self[position] for position in range(self.size))
-
-    def __getitem__(self, position: int) -> Frame:
-        """Scene ``position``; rendered if no earlier run left it in the folder."""
-        path = self.folder / f"{self.seed}-{position:06d}.npz"
-        if path.exists():
-            try:
-                return _unpack(path)
-            except (ValueError, OSError, KeyError, EOFError, BadZipFile):  # cut short: draw it again
-                path.unlink(missing_ok=True)
-        from calibnet.datasets.synthetic import sample_frame
-
-        frame = sample_frame(self.seed * 1_000_000 + position)
-        write_whole(path, _pack(frame))
-        return frame
-
-
-def _pack(frame: Frame) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        image=frame.image,
-        points=frame.points,
-        matrix=frame.camera.matrix,
-        camera_from_lidar=frame.camera_from_lidar,
-    )
-    return buffer.getvalue()
-
-
-def _unpack(path: Path) -> Frame:
-    with np.load(path, allow_pickle=False) as file:
-        image = file["image"]
-        camera = PinholeCamera(image.shape[1], image.shape[0], file["matrix"])
-        return Frame(0, 0.0, image, file["points"], camera, file["camera_from_lidar"], str(path))
-
-
-def training_sources(
-    data: list[str], validate: list[str], synthetic_share: float, scenes: int, seed: int, cache: Path | None
-) -> tuple[list[Source], list[Sequence]]:
-    """Sources of training samples and the validation sequences, which training never draws from.
-
-    A real sequence is drawn with the square root of its length: single frames of rare sensors count
-    more than the hundredth of one street. Together they have ``1 - synthetic_share``.
-
-    Raises:
-        ConfigError: there is nothing to train on.
-    """
-    validation = [sequence for spec in validate for sequence in open_data(spec)]
-    held_out = {sequence.name for sequence in validation}
-    real = [sequence for spec in data for sequence in open_data(spec) if sequence.name not in held_out]
-    sources: list[Source] = []
-    if real and synthetic_share < 1:
-        roots = np.sqrt([len(sequence) for sequence in real])
-        weights = (1 - synthetic_share) * roots / roots.sum()
-        sources = [Source(sequence, float(weight)) for sequence, weight in zip(real, weights, strict=True)]
-    if synthetic_share > 0:
-        sources.append(Source(SyntheticPool(scenes, seed, cache), synthetic_share))
-    if not sources:
-        raise ConfigError("There is nothing to train on: give --data, or a --synthetic share above 0.")
-    return sources, validation

@@ -1,52 +1,49 @@
 """Which miscalibrations a stage is trained on: what decides which errors it learns to see.
 
-Errors that look alike compete for the same evidence: sideways with yaw, height with pitch. A stage trained
-on ±1°/0.1 m finds the turn in both of them, and next to no shift; drawn much wider in translation than in rotation, it
+Errors that look alike compete for the same evidence: sideways with yaw, height with pitch. A stage trained on
+±1°/0.1 m finds the turn in both of them, and next to no shift; drawn much wider in translation than in rotation, it
 learns to tell them apart by the ground near the car, where a shift moves the picture most.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from calibnet.geometry import RANGES, MiscalibrationRange, sample_miscalibration
+from calibnet.geometry import MiscalibrationRange, sample_miscalibration, scaled
 from calibnet.geometry.types import Transform
+from calibnet.training.recipe import DrawRecipe
 
 
 @dataclass(frozen=True)
 class Draws:
-    """What is drawn for one stage.
+    """Draws the miscalibrations of one stage: uniform ones, and residuals.
 
     Attributes:
-        range: of the miscalibrations drawn uniformly.
-        residual_share: share of those drawn instead from what the stages before leave, where that is known.
+        range: of the uniform ones.
+        recipe: how often and how much they are changed.
+        residuals: 4x4 each, what earlier looks left of a miscalibration (`calibnet.training.residuals`); may be none.
+        residual_share: share of the draws that are one of them.
     """
 
     range: MiscalibrationRange
-    residual_share: float
+    recipe: DrawRecipe
+    residuals: Sequence[Transform] = ()
+    residual_share: float = 0.0
 
-    EASED_SHARE = 0.3  # of the uniform draws: a stage must also know when to stop
-    LEAST = 0.03  # part of the range that an eased draw keeps at least
+    def draw(self, generator: np.random.Generator) -> Transform:
+        """A miscalibration, 4x4."""
+        if self.residuals and generator.random() < self.residual_share:
+            residual = self.residuals[int(generator.integers(len(self.residuals)))]
+            return scaled(residual, generator.uniform(*self.recipe.residual_stretch))
+        return self.uniform(generator)
 
     def uniform(self, generator: np.random.Generator) -> Transform:
         """A miscalibration anywhere in the range, sometimes a small one; 4x4."""
         rotation = translation = 1.0
-        if generator.random() < self.EASED_SHARE:  # each on its own: small turns come with large shifts, too
-            rotation, translation = generator.uniform(self.LEAST, 1.0, 2)
+        if generator.random() < self.recipe.eased_share:  # each on its own: small turns come with large shifts, too
+            rotation, translation = generator.uniform(self.recipe.eased_least, 1.0, 2)
         eased = MiscalibrationRange(self.range.rotation_deg * rotation, self.range.translation_m * translation)
         return sample_miscalibration(eased, generator)
-
-
-WIDER = {
-    RANGES[2]: Draws(MiscalibrationRange(5.0, 0.9), 0.4),
-    RANGES[3]: Draws(MiscalibrationRange(2.0, 0.5), 0.4),
-    RANGES[4]: Draws(MiscalibrationRange(1.5, 0.35), 0.4),
-}
-"""Stages 3 to 5, which end with what the stages before leave: some three metres for every ten degrees."""
-
-
-def draws_of(range_: MiscalibrationRange) -> Draws:
-    """What is drawn for the stage of ``range_``."""
-    return WIDER.get(range_, Draws(range_, 0.7))

@@ -13,6 +13,7 @@ from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import TEMPERATURE
 from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import project_points
+from calibnet.training.recipe import LossRecipe
 
 
 class Target(NamedTuple):
@@ -47,12 +48,6 @@ class Losses(NamedTuple):
     rotation_deg: Tensor
     translation_cm: Tensor
 
-    @classmethod
-    def of_features(cls, matching: Tensor) -> Losses:
-        """The matching loss alone; there is no pose yet whose error could be told."""
-        zero, unknown = torch.zeros_like(matching), torch.full_like(matching.detach(), torch.nan)
-        return cls(2.0 * matching, zero, zero, zero, zero, unknown, unknown)
-
     @property
     def total(self) -> Tensor:
         """What is minimised."""
@@ -71,36 +66,28 @@ def true_displacement(cells: Tensor, correction: Tensor, intrinsics: Tensor) -> 
     return offset.transpose(1, 2).unflatten(2, cells.shape[2:])
 
 
-DEPTH_BANDS = (6.0, 9.0, 13.0, 20.0, 35.0)
-"""Metres between bands of depth that count alike in the matching loss, however many cells each of them holds.
-
-Shifts show in near cells, which are few; where all cells count alike, features learn to match far ones.
-"""
-RAREST_BAND = 0.02
-"""Share of the cells below which a band counts less than the others: few cells would be heard too loud."""
-
-
-def balanced(depth: Tensor, counted: Tensor, strength: float = 1.0) -> Tensor:
+def balanced(depth: Tensor, counted: Tensor, recipe: LossRecipe, strength: float = 1.0) -> Tensor:
     """Weights under which all bands of depth count alike.
 
     Args:
         depth: ``[...]`` metres.
         counted: ``[...]`` bool: the cells that are weighted.
+        recipe: which bands there are.
         strength: 1 balances, 0 leaves all cells alike, between them a mixture.
 
     Returns:
         ``[...]`` weights: mean 1 over the cells that count, 0 for the others.
     """
-    band = torch.bucketize(depth.contiguous(), depth.new_tensor(DEPTH_BANDS), right=True)
-    cells = torch.bincount(band[counted], minlength=len(DEPTH_BANDS) + 1)
+    band = torch.bucketize(depth.contiguous(), depth.new_tensor(recipe.depth_bands_m), right=True)
+    cells = torch.bincount(band[counted], minlength=len(recipe.depth_bands_m) + 1)
     total = cells.sum().clamp(min=1)
-    weight = counted / (cells / total).clamp(min=RAREST_BAND)[band]
+    weight = counted / (cells / total).clamp(min=recipe.rarest_band)[band]
     weight = weight * (total / weight.sum().clamp(min=1e-6))
     return strength * weight + (1 - strength) * counted
 
 
 def matching_loss(
-    logits: Tensor, displacement: Tensor, visible: Tensor, depth: Tensor, stride: int, radius: int
+    logits: Tensor, displacement: Tensor, visible: Tensor, depth: Tensor, stride: int, radius: int, recipe: LossRecipe
 ) -> Tensor:
     """Cross-entropy over the window against the true displacement, spread over its four nearest cells.
 
@@ -113,6 +100,7 @@ def matching_loss(
         depth: ``[B, h, w]`` of the cells' points, metres.
         stride: pixels a cell.
         radius: of the window, in cells.
+        recipe: which bands there are.
     """
     window = 2 * radius + 1
     position = displacement / stride + radius
@@ -127,10 +115,12 @@ def matching_loss(
             wy = fraction[:, 1] if dy else 1 - fraction[:, 1]
             index = ((corner[:, 1] + dy) * window + corner[:, 0] + dx).long()
             loss = loss - wx * wy * log_probability.gather(1, index[:, None])[:, 0]
-    return (loss * balanced(depth, inside)).sum() / inside.sum().clamp(min=1)
+    return (loss * balanced(depth, inside, recipe)).sum() / inside.sum().clamp(min=1)
 
 
-def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Tensor:
+def scores_loss(
+    logits: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
+) -> Tensor:
     """The matching loss of one set of logits ``[B, D, h_s, w_s]``, mean over the scales."""
     losses = [
         matching_loss(
@@ -140,6 +130,7 @@ def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, con
             cells[:, 2],
             stride,
             config.radius,
+            recipe,
         )
         for scale_logits, cells, visible, stride in zip(
             logits, inputs.cells, target.visible, config.volume_scales, strict=False
@@ -148,19 +139,29 @@ def scores_loss(logits: list[Tensor], inputs: NetworkInputs, target: Target, con
     return torch.stack(losses).mean()
 
 
-def feature_loss(scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig) -> Tensor:
-    """What the features alone are trained with at first: their cosines ``[B, D, h_s, w_s]`` as logits."""
-    return scores_loss([TEMPERATURE * score for score in scores], inputs, target, config)
+def cosines_loss(
+    scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
+) -> Tensor:
+    """The matching loss of the features' cosines ``[B, D, h_s, w_s]``, as logits."""
+    return scores_loss([TEMPERATURE * score for score in scores], inputs, target, config, recipe)
 
 
-def displacement_loss(output: NetworkOutput, displacement: Tensor, visible: Tensor, depth: Tensor) -> Tensor:
-    """Laplace negative log-likelihood of the field, per axis, in units of pixels.
+def feature_losses(
+    scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
+) -> Losses:
+    """The terms of a batch that trains features alone; it has no pose whose error could be told."""
+    matching = cosines_loss(scores, inputs, target, config, recipe)
+    zero, unknown = torch.zeros_like(matching), torch.full_like(matching.detach(), torch.nan)
+    return Losses(recipe.matching * matching, zero, zero, zero, zero, unknown, unknown)
 
-    Half balanced over depth, as the pose is solved from all cells together.
-    """
+
+def displacement_loss(
+    output: NetworkOutput, displacement: Tensor, visible: Tensor, depth: Tensor, recipe: LossRecipe
+) -> Tensor:
+    """Laplace negative log-likelihood of the field, per axis, in units of pixels; partly balanced over depth."""
     error = (output.field.displacement - displacement).abs()
     likelihood = error * torch.exp(-output.field.log_scale) + output.field.log_scale
-    weight = balanced(depth, visible, strength=0.5)
+    weight = balanced(depth, visible, recipe, recipe.displacement_balance)
     return (likelihood * weight[:, None]).sum() / (2 * visible.sum().clamp(min=1))
 
 
@@ -173,7 +174,12 @@ def quaternion_angle(rotation: Tensor) -> Tensor:
 
 
 def hybrid_loss(
-    output: NetworkOutput, inputs: NetworkInputs, target: Target, config: NetworkConfig, pose_share: float = 1.0
+    output: NetworkOutput,
+    inputs: NetworkInputs,
+    target: Target,
+    config: NetworkConfig,
+    recipe: LossRecipe,
+    pose_share: float = 1.0,
 ) -> Losses:
     """All terms of one batch; only the pose's without ``config.hybrid_loss`` (the paper's ablation).
 
@@ -187,22 +193,26 @@ def hybrid_loss(
     zero = angle.new_zeros(())
     matching, field, points = zero, zero, zero
     if config.hybrid_loss:
-        matching = 0.5 * feature_loss(output.scores, inputs, target, config)
-        matching = matching + 0.5 * scores_loss(output.logits, inputs, target, config)
+        of_features = cosines_loss(output.scores, inputs, target, config, recipe)
+        of_volumes = scores_loss(output.logits, inputs, target, config, recipe)
+        matching = recipe.feature_share * of_features + (1 - recipe.feature_share) * of_volumes
         truth_here = true_displacement(inputs.cells[0], truth, inputs.intrinsics)
-        field = displacement_loss(output, truth_here, target.visible[0], inputs.cells[0][:, 2])
+        field = displacement_loss(output, truth_here, target.visible[0], inputs.cells[0][:, 2], recipe)
         cloud = inputs.cells[-1].flatten(2).transpose(1, 2)
         occupied = cloud[..., 2] > 0
         distance = (move(estimate, cloud) - move(truth, cloud)).norm(dim=-1) * occupied
         points = distance.sum() / occupied.sum().clamp(min=1)
-    # a few hopeless samples of a batch must not drown the rest
-    offset_cost = torch.where(offset < 1, offset, 1 + (offset.clamp(min=1)).log())
     return Losses(
-        matching=2.0 * matching,
-        displacement=0.3 * field,
-        pose=2.0 * pose_share * offset_cost.mean(),
-        quaternion=15.0 * pose_share * angle.mean(),
-        points=0.5 * pose_share * torch.log1p(points),
+        matching=recipe.matching * matching,
+        displacement=recipe.displacement * field,
+        pose=recipe.pose * pose_share * offset_cost(offset, recipe.linear_m).mean(),
+        quaternion=recipe.quaternion * pose_share * angle.mean(),
+        points=recipe.points * pose_share * torch.log1p(points),
         rotation_deg=torch.rad2deg(angle.detach()).mean(),
         translation_cm=100 * offset.detach().mean(),
     )
+
+
+def offset_cost(offset: Tensor, linear: float) -> Tensor:
+    """The offset itself up to ``linear`` metres, and its logarithm, smoothly, beyond."""
+    return torch.where(offset < linear, offset, linear * (1 + (offset / linear).clamp(min=1).log()))

@@ -1,4 +1,4 @@
-"""What decides a training run."""
+"""What one training run is given: what is trained, on what, for how long."""
 
 from __future__ import annotations
 
@@ -9,24 +9,47 @@ from calibnet.network.config import Head
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """Everything that decides a run; stored in its checkpoints and in the weights' record."""
+    """The options of a run, as they stand in its checkpoints and in the weights' record; paths and ranges are texts.
+
+    How a stage is trained, the same in all runs, is in `calibnet.training.recipe`.
+    """
 
     preset: str
+    """Name of the network's preset."""
     range: str
-    output: str  # folder of checkpoint and weights
+    """Stage to train, as degrees and metres: ``5/0.5``."""
+    output: str
+    """Folder of checkpoint, weights and manifest."""
     data: list[str] = field(default_factory=list)
+    """Real frames to train on, each ``DATASET:FOLDER[:SEQUENCE]``."""
     validate: list[str] = field(default_factory=list)
-    synthetic: float = 0.4  # share of the samples that come from the synthetic world
-    scenes: int = 4000  # synthetic scenes, each rendered once
-    minutes: float | None = None  # budget: of training time, over all resumed runs
-    samples: int | None = None  # budget: of samples; a run with it is exactly repeatable
+    """Held-out frames of that form, never trained on."""
+    synthetic: float = 0.4
+    """Share of the samples that come from the synthetic world, 0..1."""
+    scenes: int = 4000
+    """Synthetic scenes, each rendered once."""
+    minutes: float | None = None
+    """Budget of training time, over all resumed runs."""
+    samples: int | None = None
+    """Budget of samples; a run with it is exactly repeatable."""
     batch: int = 8
+    """Samples a step, in each process."""
     learning_rate: float = 1e-3
+    """Peak of the learning rate."""
     seed: int = 0
+    """Of everything random."""
     workers: int = 1
-    initialize: str | None = None  # weights file of a neighbouring stage
-    train_image_branch: bool = False  # of an initialised stage; frozen, all stages share it, computed once a frame
-    after: str | None = None  # folder of the stages before, whose errors are most of the miscalibrations drawn
+    """Other processes that prepare samples."""
+    initialize: str | None = None
+    """Weights file of a stage to start from."""
+    train_image_branch: bool = False
+    """Whether an initialised stage trains the image branch; frozen, all stages share it, and it is computed once a
+    frame."""
+    after: str | None = None
+    """Folder of the stages before, whose errors are then many of the miscalibrations."""
     scene_cache: str | None = None
-    head: Head | None = None  # of the pose, instead of the preset's
-    warm_up: int | None = None  # samples that first train the features alone; by default none for an initialised stage
+    """Folder of the rendered scenes; by default one in the temporary folder."""
+    head: Head | None = None
+    """Pose head, instead of the preset's."""
+    warm_up: int | None = None
+    """Samples that first train the features alone; by default the recipe's, and none for an initialised stage."""

@@ -51,3 +51,18 @@ class Means:
         means = {name: total / (self.counts[name] or math.nan) for name, total in self.sums.items()}
         self.sums, self.counts = {}, {}
         return means
+
+
+class Every:
+    """Something that is due each time so many seconds of training have passed."""
+
+    def __init__(self, seconds: float, now: float) -> None:
+        self.seconds, self.last = seconds, now
+
+    def due(self, now: float) -> float:
+        """Seconds since it was due last, if these are more than it has to wait; otherwise 0."""
+        elapsed = now - self.last
+        if elapsed <= self.seconds:
+            return 0.0
+        self.last = now
+        return elapsed

@@ -1,35 +1,39 @@
-"""What a weights file says about where it comes from."""
+"""What a set of weights says about where it comes from: the record in a file's header, and the manifest's entry."""
 
 from __future__ import annotations
 
 import subprocess
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 
+from calibnet.training.build import Training
+from calibnet.training.recipe import RECIPE, changed_knobs
 from calibnet.training.validation import ValidationFigures
-
-if TYPE_CHECKING:
-    from calibnet.training.options import TrainingOptions
+from calibnet.weights.manifest import Manifest, StageEntry, load_manifest, manifest_path
 
 
 def training_record(
-    options: TrainingOptions, samples: int, minutes: float, device: str, figures: ValidationFigures | None
+    training: Training, samples: int, minutes: float, figures: ValidationFigures | None
 ) -> dict[str, Any]:
-    """Data, minutes, samples, seed, commit and validation figures, as JSON."""
-    described = asdict(options) | {"output": None, "scene_cache": None}
-    for key in ("data", "validate"):  # datasets are named, the machine's folders are not
-        described[key] = [_without_folder(spec) for spec in described[key]]
-    for key in ("initialize", "after"):
-        if described[key]:
-            described[key] = Path(described[key]).name
+    """Options, samples, minutes, commit, validation figures and changed knobs of a finished run, as JSON."""
+    options = training.options
+    described = asdict(options) | {
+        "output": None,
+        "scene_cache": None,
+        "data": _without_folders(options.data),
+        "validate": _without_folders(options.validate),
+        "initialize": options.initialize and Path(options.initialize).name,
+        "after": options.after and Path(options.after).name,
+    }
     return {
         "options": {key: value for key, value in described.items() if value is not None},
+        "recipe": _changes(training),
         "samples": samples,
         "minutes": round(minutes, 1),
-        "device": device,
+        "device": training.fabric.device.type,
         "torch": torch.__version__,
         "commit": _commit(),
         "validation": figures._asdict() if figures else None,
@@ -38,10 +42,58 @@ def training_record(
     }
 
 
-def _without_folder(spec: str) -> str:
-    dataset, _, rest = spec.partition(":")
-    root, _, name = rest.partition(":")
-    return ":".join(part for part in (dataset, Path(root).name, name) if part)
+def manifest_with(training: Training, weights: Path, samples: int, figures: ValidationFigures | None) -> Manifest:
+    """The manifest of the output folder with the stage just trained, as it is on disk by now.
+
+    A folder that has none yet gets the settings that ship with the package, without the runs they are from.
+    """
+    preset, folder = training.options.preset, weights.parent
+    manifest = load_manifest(preset, folder)
+    if not manifest_path(preset, folder).is_file():
+        stages = (replace(entry, run="", recipe="", validation={}) for entry in manifest.stages)
+        manifest = replace(manifest, stages=tuple(stages))
+    return manifest.with_stage(
+        StageEntry(
+            training.stage.range,
+            weights.name,
+            training.stage.settings,
+            run=folder.name,
+            recipe=recipe_sentence(training, samples),
+            validation=dict(figures._asdict()) if figures else {},
+        )
+    )
+
+
+def recipe_sentence(training: Training, samples: int) -> str:
+    """From what a run started, on what and how long it trained; folders of this machine are left out."""
+    options, config, draws = training.options, training.stage.network.config, training.samples.draws
+    if options.initialize:
+        path, output = Path(options.initialize), Path(options.output)
+        start = str(path.relative_to(output) if path.is_relative_to(output) else path.name)
+        if config.share_image_branch:
+            start += f", image branch {'trained' if options.train_image_branch else 'frozen'}"
+    else:
+        start = "random weights" if config.image_encoder == "own" else config.image_encoder
+    data = _without_folders(options.data)
+    if options.synthetic > 0:
+        data += [f"{options.synthetic:.0%} synthetic scenes" if data else "synthetic scenes"]
+    parts = [f"from {start}", f"{samples:,} samples of {', '.join(data)}"]
+    if draws.residuals:
+        parts.append(f"{draws.residual_share:.0%} of the miscalibrations are what earlier looks leave")
+    parts += [f"{name} {value}" for name, value in _changes(training).items()]
+    return "; ".join(parts)
+
+
+def _changes(training: Training) -> dict[str, Any]:
+    """The knobs in which the run's recipe differs from the usual one."""
+    usual = RECIPE.of_run(training.options, training.stage.network.config)
+    return changed_knobs(training.recipe, usual)
+
+
+def _without_folders(specs: list[str]) -> list[str]:
+    """``DATASET:ROOT[:SEQUENCE]`` with only the last part of the root: the machine's folders are not named."""
+    parts = [spec.split(":", 2) for spec in specs]
+    return [":".join([dataset, Path(root).name, *name]) for dataset, root, *name in parts]
 
 
 def _commit() -> str | None:

@@ -10,14 +10,9 @@ from calibnet.cascade.stage import Stage, load_stage
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert, range_of, sample_miscalibration
 from calibnet.geometry.types import Transform
-from calibnet.training.samples import TrainingSamples
+from calibnet.training.frames import TrainingFrames
+from calibnet.training.recipe import DrawRecipe
 from calibnet.weights.manifest import load_manifest
-
-LARGEST_ROTATION, LARGEST_TRANSLATION = 3.0, 6.0
-"""Residuals beyond so many times the stage's own range are lost frames: there is nothing to learn from them.
-
-A stage corrects less than it should of what is larger than all it has seen, so this is generous.
-"""
 
 
 def stages_before(preset: str, range_: MiscalibrationRange, folder: Path) -> list[Stage]:
@@ -30,24 +25,24 @@ def stages_before(preset: str, range_: MiscalibrationRange, folder: Path) -> lis
 
 def residual_errors(
     stages: list[Stage],
-    data: TrainingSamples,
+    frames: TrainingFrames,
     range_: MiscalibrationRange,
-    count: int,
+    recipe: DrawRecipe,
     start: Stage | None = None,
 ) -> list[Transform]:
-    """Errors ``correction @ delta`` that the stages leave on ``count`` augmented training frames.
+    """Errors ``correction @ delta`` that the stages leave on some augmented training frames.
 
     Args:
         stages: run one after the other, each from where the one before arrived.
-        data: where frames come from.
+        frames: of the training.
         range_: of the stage to be trained.
-        count: frames to run; what is lost altogether is left out of the result.
+        recipe: how many frames, and which errors are lost frames, left out of the result.
         start: the stage itself as it was, if it looks more than once: what its first look leaves is added.
     """
-    generator = np.random.default_rng([data.seed, 4])
+    generator = np.random.default_rng([frames.seed, 4])
     residuals = []
-    for number in range(count):
-        frame = data.draw_frame(number, generator, 1.0, whole=True)
+    for number in range(recipe.residuals):
+        frame = frames.draw(number, generator, whole=True)
         reference = frame.camera_from_lidar
         extrinsic = sample_miscalibration(stages[0].range if stages else range_, generator) @ reference
         left = []
@@ -59,14 +54,14 @@ def residual_errors(
                 left.append(start.look(frame, start.view(frame), extrinsic).after)
         except CalibrationError:  # too few points are left in the image: a lost frame
             pass
-        residuals += [delta for after in left if within(delta := after @ invert(reference), range_)]
+        residuals += [delta for after in left if within(delta := after @ invert(reference), range_, recipe)]
     return residuals
 
 
-def within(delta: Transform, range_: MiscalibrationRange) -> bool:
+def within(delta: Transform, range_: MiscalibrationRange, recipe: DrawRecipe) -> bool:
     """Whether an error is near enough to be corrected by a stage of this range."""
     error = range_of(delta)
     return (
-        error.rotation_deg < LARGEST_ROTATION * range_.rotation_deg
-        and error.translation_m < LARGEST_TRANSLATION * range_.translation_m
+        error.rotation_deg < recipe.lost_rotation * range_.rotation_deg
+        and error.translation_m < recipe.lost_translation * range_.translation_m
     )

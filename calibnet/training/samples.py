@@ -10,25 +10,17 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import Dataset
 
-from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.frame import Frame
 from calibnet.errors import DatasetError
-from calibnet.geometry import (
-    MiscalibrationRange,
-    PinholeCamera,
-    invert,
-    project,
-    scaled,
-    transform_points,
-)
+from calibnet.geometry import PinholeCamera, invert, project, transform_points
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform
 from calibnet.network.batch import Cut, LidarInput, NetworkInputs, lidar_input, make_batch
-from calibnet.training.augmentation import augment
-from calibnet.training.draws import draws_of
+from calibnet.network.pose import DEPTH_FLOOR
+from calibnet.training.draws import Draws
+from calibnet.training.frames import TrainingFrames
 from calibnet.training.losses import Target
-
-FEWEST_VISIBLE_CELLS = 40
-"""Cells with a point below which a sample teaches nothing and another is drawn."""
+from calibnet.training.recipe import SampleRecipe
 
 
 @dataclass(frozen=True)
@@ -43,27 +35,33 @@ class Sample:
     visible: list[NDArray[np.bool_]]
 
 
-def visible_cells(lidar: LidarInput, points: NDArray[np.float32], reference: Extrinsic,
-                  camera: PinholeCamera, correction: Transform) -> list[NDArray[np.bool_]]:  # fmt: skip
+def visible_cells(
+    lidar: LidarInput,
+    points: NDArray[np.float32],
+    reference: Extrinsic,
+    camera: PinholeCamera,
+    correction: Transform,
+    recipe: SampleRecipe,
+) -> list[NDArray[np.bool_]]:
     """Per scale ``[h, w]``: does the camera, truly placed, see the cell's point?
 
-    A point is taken as hidden when another one within 4 px is clearly nearer: the scanner looks over
+    A point is taken as hidden when another one in the same few pixels is clearly nearer: the scanner looks over
     what the camera has in front of it.
     """
     truth = project(points, reference, camera)
-    nearest = nearest_per_cell(truth, camera, 4)
+    nearest = nearest_per_cell(truth, camera, recipe.hiding_px)
     front = np.append(truth.depth, np.float32(np.inf))[nearest]  # empty cells pick the last, -1
     masks = []
     for cells in lidar.cells:
         flat = cells.reshape(3, -1).T
         moved = transform_points(correction, flat)
-        depth = np.maximum(moved[:, 2], 0.1)
+        depth = np.maximum(moved[:, 2], DEPTH_FLOOR)
         u = camera.matrix[0, 0] * moved[:, 0] / depth + camera.matrix[0, 2]
         v = camera.matrix[1, 1] * moved[:, 1] / depth + camera.matrix[1, 2]
         inside = (flat[:, 2] > 0) & (u > 0) & (u < camera.width - 1) & (v > 0) & (v < camera.height - 1)
-        column = np.clip((u + 0.5) / 4, 0, front.shape[1] - 1).astype(int)
-        row = np.clip((v + 0.5) / 4, 0, front.shape[0] - 1).astype(int)
-        seen = depth < 1.2 * front[row, column] + 1.0
+        column = np.clip((u + 0.5) / recipe.hiding_px, 0, front.shape[1] - 1).astype(int)
+        row = np.clip((v + 0.5) / recipe.hiding_px, 0, front.shape[0] - 1).astype(int)
+        seen = depth < recipe.hidden_factor * front[row, column] + recipe.hidden_margin_m
         masks.append((inside & seen).reshape(cells.shape[1:]))
     return masks
 
@@ -72,6 +70,7 @@ def make_sample(
     frame: Frame,
     delta: Transform,
     scales: tuple[int, ...],
+    recipe: SampleRecipe,
     shift: Floats | tuple[float, float] = (0.0, 0.0),
 ) -> Sample:
     """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
@@ -84,7 +83,7 @@ def make_sample(
     camera = PinholeCamera(frame.camera.width, frame.camera.height, displaced)
     lidar = lidar_input(frame.points, delta @ frame.camera_from_lidar, camera, scales)
     correction = invert(delta)
-    visible = visible_cells(lidar, frame.points, frame.camera_from_lidar, frame.camera, correction)
+    visible = visible_cells(lidar, frame.points, frame.camera_from_lidar, frame.camera, correction, recipe)
     return Sample(
         frame.image,
         lidar,
@@ -113,122 +112,37 @@ def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
     )
 
 
-@dataclass(frozen=True)
-class Source:
-    """A sequence and how often it is drawn, relative to the other sources."""
-
-    sequence: Sequence
-    weight: float
-
-
 class TrainingSamples(Dataset[Sample]):
-    """An endless, random and repeatable stream: sample ``n`` depends on the seed and on ``n`` alone.
+    """An endless, random and repeatable stream: sample ``n`` depends on the frames' seed and on ``n`` alone."""
 
-    Frames are kept in memory once read: the real ones are few. The input size is drawn once per
-    batch, so that lenses and aspect ratios vary while a batch stays one tensor.
-    """
-
-    SHAPES = ((160, 512), (192, 448), (224, 384))
-    SHAPE_PROBABILITY = (0.5, 0.2, 0.3)
-    ATTEMPTS = 100
-    EASIEST = 0.5  # strength of augmentation that the warm-up starts with
-    OWN_SHARE = 0.4  # where there are none before: only what a stage's own first look leaves
-    RESIDUAL_STRETCH = (0.7, 1.8)  # times as large as measured: frames never trained on leave more behind
-    WARM_UP_SHIFT = 40.0  # pixels in x and y by which the warm-up displaces the LiDAR image at most
-    SHIFT = 24.0  # the same later on, in every batch that trains features alone
-    FEATURES_EVERY = 3  # of so many batches after the warm-up, one trains features alone; 0: none does
-
-    def __init__(
-        self,
-        sources: Many[Source],
-        range_: MiscalibrationRange,
-        scales: tuple[int, ...],
-        area: float,
-        batch: int,
-        seed: int,
-        warm_up: int = 0,
-        magnification: float = 1.0,
-    ) -> None:
-        """A stream whose first ``warm_up`` samples are for the features alone.
-
-        They start with fewer of the odd scans and pictures, and their LiDAR images are displaced at random; so are
-        those of every third batch after them. Miscalibrations scatter around none, so "the match is where the cell is"
-        is a good guess that features pick up, from the image's borders and on the ground near the car, and then stay
-        with; the displacement makes it a bad one.
-
-        A stage whose image is larger than ``area`` by the square of ``magnification`` is trained on cuttings of it.
-        """
-        self.sources, self.range, self.scales = list(sources), range_, scales
-        self.batch, self.seed, self.warm_up, self.magnification = batch, seed, warm_up, magnification
-        weights = np.array([source.weight for source in sources], dtype=np.float64)
-        self.probability = weights / weights.sum()
-        factor = (area / (160 * 512)) ** 0.5
-        self.shapes = [(round(h * factor / 32) * 32, round(w * factor / 32) * 32) for h, w in self.SHAPES]
-        self.residuals: list[Transform] = []
-        self.features_every = self.FEATURES_EVERY
-        self.draws = draws_of(range_)
-        self.residual_share = self.draws.residual_share
-        self.cache: dict[tuple[int, int], Frame] = {}
-
-    def read(self, source: int, position: int) -> Frame:
-        """One frame, from memory if it was read before; a sequence may keep its own cache instead."""
-        sequence = self.sources[source].sequence
-        if getattr(sequence, "caches", False):
-            return sequence[position]
-        if (source, position) not in self.cache:
-            self.cache[source, position] = sequence[position]
-        return self.cache[source, position]
-
-    def strength(self, number: int) -> float:
-        """How varied sample ``number`` may be, 0..1."""
-        return max(self.EASIEST, min(1.0, number / self.warm_up)) if self.warm_up else 1.0
-
-    def shape(self, number: int) -> tuple[int, int]:
-        """Height and width of sample ``number``: its batch's."""
-        generator = np.random.default_rng([self.seed, 1, number // self.batch])
-        return self.shapes[generator.choice(len(self.shapes), p=self.SHAPE_PROBABILITY)]
+    def __init__(self, frames: TrainingFrames, draws: Draws, scales: tuple[int, ...]) -> None:
+        """Samples of frames under miscalibrations; ``scales`` are the strides of the network's volumes."""
+        self.frames, self.draws, self.scales = frames, draws, scales
+        self.recipe, self.features = frames.recipe.sample, frames.recipe.features
 
     def __getitem__(self, number: int) -> Sample:
         """Draw sample ``number``."""
-        strength = self.strength(number)
-        generator = np.random.default_rng([self.seed, 2, number])
-        for _ in range(self.ATTEMPTS):
-            frame = self.draw_frame(number, generator, strength)
-            largest = self.largest_shift(number)
+        generator = np.random.default_rng([self.frames.seed, 2, number])
+        largest = self.largest_shift(number)
+        for _ in range(self.recipe.attempts):
+            frame = self.frames.draw(number, generator, self.variety(number))
             shift = generator.uniform(-largest, largest, 2)
-            sample = make_sample(frame, self.draw(generator), self.scales, shift)
-            if sample.visible[0].sum() >= FEWEST_VISIBLE_CELLS:
+            sample = make_sample(frame, self.draws.draw(generator), self.scales, self.recipe, shift)
+            if sample.visible[0].sum() >= self.recipe.fewest_visible_cells:
                 return sample
         raise DatasetError(
-            f"None of {self.ATTEMPTS} draws gave {FEWEST_VISIBLE_CELLS} cells with a visible LiDAR point, the last one "
-            f"from {frame.source}; check that the training data's calibration fits its scans."
+            f"None of {self.recipe.attempts} draws gave {self.recipe.fewest_visible_cells} cells with a visible LiDAR "
+            f"point, the last one from {frame.source}; check that the training data's calibration fits its scans."
         )
+
+    def variety(self, number: int) -> float:
+        """How varied sample ``number`` may be, 0..1: ever more in the warm-up."""
+        warm_up = self.features.warm_up
+        return max(self.features.warm_up_variety, min(1.0, number / warm_up)) if warm_up else 1.0
 
     def largest_shift(self, number: int) -> float:
         """Pixels by which the LiDAR image of a sample is displaced at most: 0 but where features train alone."""
-        if number < self.warm_up:
-            return self.WARM_UP_SHIFT
-        every = self.features_every
-        return self.SHIFT if every and number // self.batch % every == every - 1 else 0.0
-
-    def draw_frame(self, number: int, generator: np.random.Generator, strength: float, whole: bool = False) -> Frame:
-        """An augmented frame at the size of sample ``number``; ``whole`` keeps the magnification out of it."""
-        source = self.draw_source(generator, strength)
-        frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
-        magnification = 1.0 if whole else self.magnification
-        return augment(frame, *self.shape(number), generator, strength, magnification)
-
-    def draw_source(self, generator: np.random.Generator, strength: float) -> int:
-        """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the strength."""
-        while True:
-            source = int(generator.choice(len(self.sources), p=self.probability))
-            synthetic = getattr(self.sources[source].sequence, "caches", False) and len(self.sources) > 1
-            if not synthetic or generator.random() < strength:
-                return source
-
-    def draw(self, generator: np.random.Generator) -> Transform:
-        """A miscalibration as `Draws` has them, or as the looks before leave behind."""
-        if self.residuals and generator.random() < self.residual_share:
-            residual = self.residuals[generator.integers(len(self.residuals))]
-            return scaled(residual, generator.uniform(*self.RESIDUAL_STRETCH))
-        return self.draws.uniform(generator)
+        if number < self.features.warm_up:
+            return self.features.warm_up_shift_px
+        every = self.features.every
+        return self.features.shift_px if every and number // self.frames.batch % every == every - 1 else 0.0

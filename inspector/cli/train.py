@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from calibnet.network.heads import HEADS
+from calibnet.training.options import TrainingOptions
+from calibnet.training.recipe import RECIPE
 from inspector.cli.options import FOLDER, RANGE
+from inspector.cli.training_console import ConsoleObserver, Observers
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.training.options import TrainingOptions
-    from calibnet.training.progress import Observer, Progress
-    from calibnet.training.validation import ValidationFigures
+    from calibnet.training.progress import Observer
 
 
 @click.command()
@@ -46,23 +46,29 @@ if TYPE_CHECKING:
 @click.option(
     "--synthetic",
     type=click.FloatRange(0, 1),
-    default=0.4,
+    default=TrainingOptions.synthetic,
     show_default=True,
     help="Share of samples from the synthetic world.",
 )
 @click.option(
-    "--scenes", type=click.IntRange(1), default=4000, show_default=True, help="Synthetic scenes, each rendered once."
+    "--scenes",
+    type=click.IntRange(1),
+    default=TrainingOptions.scenes,
+    show_default=True,
+    help="Synthetic scenes, each rendered once.",
 )
 @click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
 @click.option(
     "--minutes", type=click.FloatRange(0, min_open=True), help="Budget of training time, over all resumed runs."
 )
 @click.option("--samples", type=click.IntRange(1), help="Budget in samples instead: exactly repeatable.")
-@click.option("--batch", type=click.IntRange(1), default=8, show_default=True, help="Samples a step.")
+@click.option(
+    "--batch", type=click.IntRange(1), default=TrainingOptions.batch, show_default=True, help="Samples a step."
+)
 @click.option(
     "--learning-rate",
     type=click.FloatRange(0, min_open=True),
-    default=1e-3,
+    default=TrainingOptions.learning_rate,
     show_default=True,
     help="Peak of the cosine schedule.",
 )
@@ -70,10 +76,18 @@ if TYPE_CHECKING:
     "--warm-up",
     type=click.IntRange(0),
     help="Samples that first train the features alone; a third of --samples at most.  "
-    "[default: 6000, none with --initialize]",
+    f"[default: {RECIPE.features.warm_up}, none with --initialize]",
 )
-@click.option("--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that prepare samples.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option(
+    "--workers",
+    type=click.IntRange(0),
+    default=TrainingOptions.workers,
+    show_default=True,
+    help="Processes that prepare samples.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0), default=TrainingOptions.seed, show_default=True, help="Of everything random."
+)
 @click.option(
     "--initialize",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -141,7 +155,6 @@ def train(
     if (range_ is not None) == every_stage:
         raise click.UsageError("Give either --range, the stage to train, or --all.")
 
-    from calibnet.training.options import TrainingOptions
     from calibnet.training.schedule import all_stages
 
     options = TrainingOptions(
@@ -168,7 +181,7 @@ def train(
     from rich.console import Console
 
     console = Console(stderr=True, highlight=False)
-    steps = all_stages(options) if every_stage else [options]
+    steps = all_stages(options, RECIPE) if every_stage else [options]
     if not steps:
         console.print(f"All five stages have their weights in {output}; remove those to train again.")
     for number, step in enumerate(steps, start=1):
@@ -179,6 +192,7 @@ def train(
 
 def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:
     """One stage to its weights, watched on the console and, if asked for, in a recording."""
+    from calibnet.training.build import build
     from calibnet.training.trainer import Trainer
 
     observers: list[Observer] = [ConsoleObserver(console)]
@@ -186,7 +200,7 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
         from inspector.record.training import TrainingLog
 
         observers.append(TrainingLog(save, f"{options.preset} ±{options.range}"))
-    path = Trainer(options, Observers(observers), resume).run()
+    path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
     console.print(f"Weights with their training record: {path}")
 
 
@@ -194,51 +208,3 @@ def step_file(save: Path, step: TrainingOptions, output: Path) -> Path:
     """The recording of one step of --all, named after the range and the folder within the output's."""
     parts = [save.stem, *Path(step.output).relative_to(output).parts, step.range.replace("/", "-")]
     return save.with_stem("-".join(parts))
-
-
-class Observers:
-    """Several observers as one."""
-
-    def __init__(self, observers: list[Observer]) -> None:
-        self.observers = observers
-
-    def progressed(self, progress: Progress) -> None:
-        """Tell all of them."""
-        for observer in self.observers:
-            observer.progressed(progress)
-
-    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
-        """Tell all of them."""
-        for observer in self.observers:
-            observer.validated(progress, figures)
-
-
-class ConsoleObserver:
-    """One line of losses every few seconds, one of figures after each validation."""
-
-    def __init__(self, console: Console) -> None:
-        self.console = console
-
-    def progressed(self, progress: Progress) -> None:
-        """Print the running means."""
-        losses = progress.losses
-        pose = "warm-up, no pose yet"
-        if math.isfinite(losses["rotation_deg"]):
-            pose = f"rotation {losses['rotation_deg']:.2f}°  translation {losses['translation_cm']:.1f} cm"
-        terms = "  ".join(f"{name} {losses[name]:.3f}" for name in losses if not name.endswith(("_deg", "_cm")))
-        self.console.print(
-            f"{progress.share:4.0%}  {progress.minutes:6.1f} min  {progress.samples:8,d} samples  "
-            f"{progress.samples_per_second:5.1f}/s  {terms}  " + pose,
-            soft_wrap=True,
-        )
-
-    def validated(self, progress: Progress, figures: ValidationFigures) -> None:
-        """Print the figures beside the initial ones."""
-        self.console.print(
-            f"validation after {progress.samples:,d} samples, {figures.samples} single looks, medians: "
-            f"rotation {figures.initial_rotation_deg:.2f}° -> {figures.rotation_deg:.2f}° "
-            f"(p95 {figures.rotation_p95_deg:.2f}°), "
-            f"translation {figures.initial_translation_cm:.1f} -> {figures.translation_cm:.1f} cm",
-            style="bold",
-            soft_wrap=True,
-        )

@@ -45,7 +45,6 @@ class Scenes:
     """A ``Sequence`` of them that tells how often it was read."""
 
     name, rig = "scenes/00", "a camera that sees depth"
-    caches = True  # training asks each time instead of keeping the frames
 
     def __init__(self, length: int = 3, on_read: Callable[[int], None] = lambda reads: None) -> None:
         self.frames = [make_frame(seed) for seed in range(length)]

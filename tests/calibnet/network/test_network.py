@@ -12,6 +12,7 @@ from calibnet.network.cost_volume import band_index
 from calibnet.network.counting import count
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training.losses import Target, hybrid_loss
+from calibnet.training.recipe import RECIPE
 from tests.support.tiny import random_inputs, tiny_network
 
 PARTS = ["image_features", "lidar_features", "cost_volumes", "hourglass", "displacement", "pose"]
@@ -124,7 +125,7 @@ def test_every_ablation_trains_every_parameter(preset: str, switch: str | None) 
     network = preset_network(preset, **{switch: False} if switch else {})
     inputs = random_inputs(network.config, 32, 64)
     target = Target(torch.eye(4)[None], torch.zeros(1, 2), [cells[:, 2] > 0 for cells in inputs.cells])
-    losses = hybrid_loss(network(inputs), inputs, target, network.config)
+    losses = hybrid_loss(network(inputs), inputs, target, network.config, RECIPE.losses)
     if switch == "hybrid_loss":
         assert losses.matching == losses.displacement == losses.points == 0
     else:

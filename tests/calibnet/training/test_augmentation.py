@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import PinholeCamera, project, rotation_from_euler_xyz, transform
 from calibnet.training.augmentation import augment, mirror, photometric, thin_scan, virtual_camera
+from calibnet.training.recipe import RECIPE
 
 WIDTH, HEIGHT = 620, 188
 STEP = 100.0  # pixels from black to white
@@ -89,7 +90,7 @@ def test_mirrored_points_stay_on_the_picture() -> None:
 @pytest.mark.parametrize(("height", "width"), [(160, 512), (224, 384)])
 def test_a_turned_camera_with_another_lens_sees_the_points_where_they_were(seed: int, height: int, width: int) -> None:
     frame = ramp_frame(seed)
-    turned = virtual_camera(frame, height, width, np.random.default_rng(seed))
+    turned = virtual_camera(frame, height, width, np.random.default_rng(seed), RECIPE.camera)
     assert turned.image.shape == (height, width, 3)
     assert (turned.camera.height, turned.camera.width) == (height, width)
     assert_points_stay_on_the_picture(frame, turned)
@@ -99,7 +100,7 @@ def test_a_turned_camera_with_another_lens_sees_the_points_where_they_were(seed:
 
 def test_virtual_cameras_vary_lens_and_direction() -> None:
     frame = ramp_frame()
-    cameras = [virtual_camera(frame, 160, 512, np.random.default_rng(seed)) for seed in range(20)]
+    cameras = [virtual_camera(frame, 160, 512, np.random.default_rng(seed), RECIPE.camera) for seed in range(20)]
     focal = np.array([camera.camera.focal for camera in cameras])
     assert focal[:, 0].max() > 1.3 * focal[:, 0].min()
     assert np.std(focal[:, 0] / focal[:, 1]) > 0.01
@@ -109,7 +110,7 @@ def test_virtual_cameras_vary_lens_and_direction() -> None:
 
 def test_thinning_keeps_points_on_their_rays() -> None:
     points = ramp_frame().points
-    kept = [thin_scan(points, np.random.default_rng(seed)) for seed in range(20)]
+    kept = [thin_scan(points, np.random.default_rng(seed), RECIPE.scan) for seed in range(20)]
     original = points[:, :3] / np.linalg.norm(points[:, :3], axis=1, keepdims=True)
     for scan in kept[:3]:
         rays = scan[:, :3] / np.linalg.norm(scan[:, :3], axis=1, keepdims=True)
@@ -122,12 +123,12 @@ def test_thinning_keeps_points_on_their_rays() -> None:
 
 
 def test_thinning_takes_an_empty_scan() -> None:
-    assert thin_scan(np.zeros((0, 4), np.float32), np.random.default_rng(0)).shape == (0, 4)
+    assert thin_scan(np.zeros((0, 4), np.float32), np.random.default_rng(0), RECIPE.scan).shape == (0, 4)
 
 
 def test_photometric_changes_colours_only() -> None:
     image = ramp_frame().image
-    changed = [photometric(image, np.random.default_rng(seed)) for seed in range(12)]
+    changed = [photometric(image, np.random.default_rng(seed), RECIPE.picture) for seed in range(12)]
     assert all(other.shape == image.shape and other.dtype == np.uint8 for other in changed)
     for other in changed:  # bright stays bright: neither shifted nor inverted
         assert np.corrcoef(image[..., :2].mean(-1).ravel(), other.mean(-1).ravel())[0, 1] > 0.6
@@ -136,7 +137,7 @@ def test_photometric_changes_colours_only() -> None:
 
 def test_augmentation_is_a_function_of_the_generator() -> None:
     frame = ramp_frame()
-    one, two, other = (augment(frame, 160, 512, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    one, two, other = (augment(frame, 160, 512, np.random.default_rng(seed), RECIPE) for seed in (1, 1, 2))
     assert np.array_equal(one.image, two.image) and np.array_equal(one.points, two.points)
     assert np.array_equal(one.camera_from_lidar, two.camera_from_lidar)
     assert not np.array_equal(one.image, other.image)
@@ -145,7 +146,7 @@ def test_augmentation_is_a_function_of_the_generator() -> None:
 def test_a_magnified_camera_cuts_a_part_and_keeps_points_on_the_picture() -> None:
     before = ramp_frame(2)
     for seed in range(4):
-        after = virtual_camera(before, 96, 320, np.random.default_rng(seed), magnification=1.6)
+        after = virtual_camera(before, 96, 320, np.random.default_rng(seed), RECIPE.camera, magnification=1.6)
         assert_points_stay_on_the_picture(before, after)
         assert after.image.shape == (96, 320, 3)
 
@@ -154,7 +155,7 @@ def test_magnifying_stops_at_the_pixels_that_there_are() -> None:
     before = ramp_frame(2)
     native = before.camera.matrix[0, 0] / 0.96
     for seed in range(30):
-        after = virtual_camera(before, 160, 512, np.random.default_rng(seed), magnification=5.0)
+        after = virtual_camera(before, 160, 512, np.random.default_rng(seed), RECIPE.camera, magnification=5.0)
         enlarged = after.camera.matrix[0, 0] > 1.05 * native
-        unmagnified = virtual_camera(before, 160, 512, np.random.default_rng(seed))
+        unmagnified = virtual_camera(before, 160, 512, np.random.default_rng(seed), RECIPE.camera)
         assert not enlarged or after.camera.matrix[0, 0] == unmagnified.camera.matrix[0, 0]

@@ -13,7 +13,6 @@ from calibnet.network.displacement import DisplacementField
 from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import Pose
 from calibnet.training.losses import (
-    RAREST_BAND,
     Losses,
     Target,
     balanced,
@@ -24,9 +23,11 @@ from calibnet.training.losses import (
     scores_loss,
     true_displacement,
 )
+from calibnet.training.recipe import RECIPE
 from tests.support.tiny import TINY, random_inputs
 
 CONFIG = replace(TINY, radius=4)
+WEIGHTS = RECIPE.losses
 SIZES = ((8, 16), (4, 8), (2, 4))
 
 
@@ -64,7 +65,7 @@ def output(estimate: Tensor, shift_px: float | Tensor = 0.0, sharpness: float = 
 
 def losses(estimate: Tensor = TRUTH, shift_px: float = 0.0, **changes: bool) -> Losses:
     inputs, target = inputs_and_target()
-    return hybrid_loss(output(estimate, shift_px), inputs, target, replace(CONFIG, **changes))
+    return hybrid_loss(output(estimate, shift_px), inputs, target, replace(CONFIG, **changes), WEIGHTS)
 
 
 def test_true_displacement_is_that_of_the_projections() -> None:
@@ -123,8 +124,8 @@ def test_matching_follows_a_displaced_lidar_image() -> None:
     shift = torch.tensor([[8.0, -16.0]])
     displaced = target._replace(shift=shift)
     right, ignorant = output(TRUTH, shift_px=-shift[..., None, None]), output(TRUTH)
-    assert scores_loss(right.logits, inputs, displaced, CONFIG) < 0.2 * scores_loss(
-        ignorant.logits, inputs, displaced, CONFIG
+    assert scores_loss(right.logits, inputs, displaced, CONFIG, WEIGHTS) < 0.2 * scores_loss(
+        ignorant.logits, inputs, displaced, CONFIG, WEIGHTS
     )
 
 
@@ -145,7 +146,9 @@ def test_matching_is_least_at_the_true_cell() -> None:
     for cell in range(window**2):
         logits = torch.zeros(1, window**2, 1, 1)
         logits[0, cell] = 10.0
-        costs.append(float(matching_loss(logits, displacement, visible, torch.full((1, 1, 1), 7.0), stride, radius)))
+        costs.append(
+            float(matching_loss(logits, displacement, visible, torch.full((1, 1, 1), 7.0), stride, radius, WEIGHTS))
+        )
     true_cell = (radius - 2) * window + radius + 3
     assert int(np.argmin(costs)) == true_cell
     assert costs[true_cell] < 0.01 and min(np.delete(costs, true_cell)) > 5
@@ -154,7 +157,9 @@ def test_matching_is_least_at_the_true_cell() -> None:
 def test_matching_between_cells_asks_for_shares() -> None:
     displacement = torch.tensor([2.0, 4.0])[None, :, None, None]  # a quarter of a cell right, half a cell down
     logits = torch.zeros(1, 25, 1, 1, requires_grad=True)
-    matching_loss(logits, displacement, torch.ones(1, 1, 1, dtype=torch.bool), torch.ones(1, 1, 1), 8, 2).backward()
+    matching_loss(
+        logits, displacement, torch.ones(1, 1, 1, dtype=torch.bool), torch.ones(1, 1, 1), 8, 2, WEIGHTS
+    ).backward()
     assert logits.grad is not None
     asked = (1 / 25 - logits.grad).reshape(5, 5)  # the gradient of a cross-entropy is softmax minus target
     expected = torch.zeros(5, 5)
@@ -166,7 +171,9 @@ def test_matching_between_cells_asks_for_shares() -> None:
 def test_matching_leaves_out_what_the_window_cannot_hold(displacement: tuple[float, float]) -> None:
     logits = torch.randn(1, 81, 2, 2, requires_grad=True)
     truth = torch.tensor(displacement)[None, :, None, None].expand(1, 2, 2, 2)
-    loss = matching_loss(logits, truth, torch.ones(1, 2, 2, dtype=torch.bool), torch.full((1, 2, 2), 7.0), 8, 4)
+    loss = matching_loss(
+        logits, truth, torch.ones(1, 2, 2, dtype=torch.bool), torch.full((1, 2, 2), 7.0), 8, 4, WEIGHTS
+    )
     loss.backward()
     assert loss == 0 and logits.grad is not None and logits.grad.abs().sum() == 0
 
@@ -177,37 +184,39 @@ def test_matching_counts_the_end_of_the_window_and_hidden_cells_not_at_all() -> 
     truth = torch.full((1, 2, 1, 2), 32.0)
     visible = torch.tensor([[[True, False]]])
     depth = torch.tensor([[[7.0, 50.0]]])
-    assert float(matching_loss(logits, truth, visible, depth, 8, 4)) == pytest.approx(0.0, abs=1e-3)
-    assert float(matching_loss(logits, truth, ~visible, depth, 8, 4)) == pytest.approx(np.log(81), abs=1e-3)
+    assert float(matching_loss(logits, truth, visible, depth, 8, 4, WEIGHTS)) == pytest.approx(0.0, abs=1e-3)
+    assert float(matching_loss(logits, truth, ~visible, depth, 8, 4, WEIGHTS)) == pytest.approx(np.log(81), abs=1e-3)
 
 
 def test_bands_of_depth_count_alike() -> None:
     depth = torch.tensor([3.0, 7.0, 7.5, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 10.0])
     counted = torch.tensor([True] * 9 + [False])
-    weight = balanced(depth, counted)
+    weight = balanced(depth, counted, WEIGHTS)
     # nine cells in three bands: each band weighs three, however many cells share that
     torch.testing.assert_close(weight, torch.tensor([3.0, 1.5, 1.5, *[0.5] * 6, 0.0]))
-    torch.testing.assert_close(balanced(depth, counted, 0.5), torch.tensor([2.0, 1.25, 1.25, *[0.75] * 6, 0.0]))
-    torch.testing.assert_close(balanced(depth, counted, 0.0), counted.float())
+    torch.testing.assert_close(
+        balanced(depth, counted, WEIGHTS, 0.5), torch.tensor([2.0, 1.25, 1.25, *[0.75] * 6, 0.0])
+    )
+    torch.testing.assert_close(balanced(depth, counted, WEIGHTS, 0.0), counted.float())
 
 
 @pytest.mark.parametrize(("metres", "band"), [(5.9, 0), (6.0, 1), (8.9, 1), (9.0, 2), (13.0, 3), (20.0, 4), (35.0, 5)])
 def test_bands_end_at_their_metres(metres: float, band: int) -> None:
     centres = torch.tensor([3.0, 7.5, 11.0, 16.0, 27.0, 50.0])
-    weight = balanced(torch.cat([centres, torch.tensor([metres])]), torch.ones(7, dtype=torch.bool))
+    weight = balanced(torch.cat([centres, torch.tensor([metres])]), torch.ones(7, dtype=torch.bool), WEIGHTS)
     assert [other for other in range(6) if weight[other] == weight[6]] == [band], "two cells share their band's weight"
     assert weight[6] == weight[(band + 1) % 6] / 2
 
 
 def test_a_band_of_very_few_cells_is_not_heard_louder() -> None:
     depth = torch.cat([torch.full((999,), 50.0), torch.tensor([3.0])])
-    weight = balanced(depth, torch.ones(1000, dtype=torch.bool))
+    weight = balanced(depth, torch.ones(1000, dtype=torch.bool), WEIGHTS)
     assert float(weight.sum()) == pytest.approx(1000, rel=1e-5)
-    assert float(weight[-1] / weight[0]) == pytest.approx(0.999 / RAREST_BAND, rel=1e-4)
+    assert float(weight[-1] / weight[0]) == pytest.approx(0.999 / WEIGHTS.rarest_band, rel=1e-4)
 
 
 def test_nothing_is_weighted_where_nothing_counts() -> None:
-    assert not balanced(torch.tensor([3.0, 50.0]), torch.tensor([False, False])).any()
+    assert not balanced(torch.tensor([3.0, 50.0]), torch.tensor([False, False]), WEIGHTS).any()
 
 
 def test_matching_and_displacement_hear_the_near_cell_as_loud_as_all_far_ones() -> None:
@@ -215,11 +224,11 @@ def test_matching_and_displacement_hear_the_near_cell_as_loud_as_all_far_ones() 
     logits = torch.zeros(1, 81, 1, 4)
     logits[0, 40, 0, 1:] = 50.0  # the far ones are sure of their place, which is right; the near one knows nothing
     still = torch.zeros(1, 2, 1, 4)
-    assert float(matching_loss(logits, still, ones, depth, 8, 4)) == pytest.approx(np.log(81) / 2, rel=1e-3)
+    assert float(matching_loss(logits, still, ones, depth, 8, 4, WEIGHTS)) == pytest.approx(np.log(81) / 2, rel=1e-3)
     error = torch.zeros(1, 2, 1, 4)
     error[..., 0] = 8.0  # half of the weight is balanced (2 of 4 for the near cell), half is not (1 of 4)
     said = output(TRUTH)._replace(field=DisplacementField(error, torch.zeros_like(error), torch.empty(0)))
-    assert float(displacement_loss(said, still, ones, depth)) == pytest.approx(8.0 * (2 + 1) / 2 / 4)
+    assert float(displacement_loss(said, still, ones, depth, WEIGHTS)) == pytest.approx(8.0 * (2 + 1) / 2 / 4)
 
 
 def test_a_displaced_batch_trains_features_alone() -> None:
@@ -235,7 +244,7 @@ def test_displacement_loss_rewards_honest_uncertainty() -> None:
         field = DisplacementField(torch.full((1, 2, 1, 1), error), torch.full((1, 2, 1, 1), log_scale), torch.empty(0))
         said = made._replace(field=field)
         one = torch.ones(1, 1, 1)
-        return float(displacement_loss(said, torch.zeros(1, 2, 1, 1), one.bool(), 7.0 * one))
+        return float(displacement_loss(said, torch.zeros(1, 2, 1, 1), one.bool(), 7.0 * one, WEIGHTS))
 
     scales = np.linspace(-1, 4, 101)
     for error in (1.0, 5.0, 20.0):
@@ -262,6 +271,6 @@ def test_gradients_are_finite(visible: bool) -> None:
     made = output(TRUTH)
     leaves = [tensor.requires_grad_() for tensor in (*made.scores, *made.logits, *made.field[:2])]
     made = made._replace(pose=Pose(estimate, None))
-    hybrid_loss(made, inputs, target, CONFIG).total.backward()
+    hybrid_loss(made, inputs, target, CONFIG, WEIGHTS).total.backward()
     for leaf in (estimate, *leaves):
         assert leaf.grad is not None and leaf.grad.isfinite().all()

@@ -8,12 +8,16 @@ import torch
 
 from calibnet.datasets.frame import Frame
 from calibnet.errors import DatasetError
-from calibnet.geometry import RANGES, invert, miscalibration, project, range_of
+from calibnet.geometry import RANGES, invert, miscalibration, project
 from calibnet.network.batch import Cut, lidar_input
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.pose import GeometricHead
+from calibnet.training.data import Source
+from calibnet.training.draws import Draws
+from calibnet.training.frames import TrainingFrames
 from calibnet.training.losses import true_displacement
-from calibnet.training.samples import Sample, Source, TrainingSamples, collate, make_sample, visible_cells
+from calibnet.training.recipe import RECIPE
+from calibnet.training.samples import Sample, TrainingSamples, collate, make_sample, visible_cells
 from tests.support.scene import REFERENCE, Scenes, make_frame
 from tests.support.tiny import TINY
 
@@ -21,8 +25,10 @@ SCALES = (8, 16, 32)
 DELTA = miscalibration([1.0, -2.0, 3.0], [0.2, -0.1, 0.3])
 
 
-def stream(seed: int = 0, batch: int = 4, area: int = 96 * 256) -> TrainingSamples:
-    return TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, area, batch, seed)
+def stream(seed: int = 0, batch: int = 4, warm_up: int = 0, **features: int) -> TrainingSamples:
+    recipe = replace(RECIPE, features=replace(RECIPE.features, warm_up=warm_up, **features))
+    frames = TrainingFrames([Source(Scenes(), 1.0)], recipe, 96 * 256, batch, seed)
+    return TrainingSamples(frames, Draws(RANGES[2], recipe.draws), SCALES)
 
 
 def same(one: Sample, other: Sample) -> bool:
@@ -50,43 +56,9 @@ def test_a_sample_is_a_function_of_seed_and_number() -> None:
     assert not any(same(forwards[0], sample) for sample in (*forwards[1:], stream(seed=1)[0]))
 
 
-def test_a_batch_has_one_size_and_batches_differ() -> None:
-    samples = stream(batch=2)
-    sizes = [[samples[2 * batch + number].image.shape for number in range(2)] for batch in range(12)]
-    assert all(one == other for one, other in sizes)
-    assert len({size for size, _ in sizes}) > 1
-    assert all(side % 32 == 0 for size, _ in sizes for side in size[:2])
-
-
-def test_miscalibrations_fill_the_range_and_stay_in_it() -> None:
-    samples, generator = stream(), np.random.default_rng(0)
-    drawn = [range_of(samples.draw(generator)) for _ in range(400)]
-    assert max(range_.rotation_deg for range_ in drawn) == pytest.approx(5.0, abs=0.05)
-    assert max(range_.translation_m for range_ in drawn) == pytest.approx(0.9, abs=0.009)
-    assert all(range_.rotation_deg <= 5.001 and range_.translation_m <= 0.9001 for range_ in drawn)
-    assert sum(range_.rotation_deg < 2.0 for range_ in drawn) > 20, "a stage must also know when to stop"
-
-
-def test_sources_are_drawn_by_their_weight() -> None:
-    often, seldom = Scenes(1), Scenes(1)
-    samples = TrainingSamples([Source(often, 3.0), Source(seldom, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
-    for number in range(60):
-        samples[number]
-    assert 1.7 < often.reads / seldom.reads < 6.0
-
-
-def test_frames_are_read_once_unless_the_sequence_keeps_them() -> None:
-    scenes = Scenes(2)
-    scenes.caches = False
-    samples = TrainingSamples([Source(scenes, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
-    for number in range(12):
-        samples[number]
-    assert scenes.reads == 2
-
-
 def test_the_correction_undoes_the_miscalibration() -> None:
     frame = make_frame()
-    sample = make_sample(frame, DELTA, SCALES)
+    sample = make_sample(frame, DELTA, SCALES, RECIPE.sample)
     np.testing.assert_allclose(sample.correction @ DELTA @ REFERENCE, REFERENCE, atol=1e-6)
     expected = lidar_input(frame.points, DELTA @ REFERENCE, frame.camera, SCALES)
     assert np.array_equal(sample.lidar.image, expected.image)
@@ -94,7 +66,7 @@ def test_the_correction_undoes_the_miscalibration() -> None:
 
 def test_a_field_that_tells_the_truth_solves_to_the_correction() -> None:
     """Cells, displacements and the solver must mean the same pixels and the same point."""
-    inputs, target = collate([make_sample(make_frame(), DELTA, SCALES)])
+    inputs, target = collate([make_sample(make_frame(), DELTA, SCALES, RECIPE.sample)])
     truth = true_displacement(inputs.cells[0], target.correction, inputs.intrinsics)
     field = DisplacementField(truth, torch.full_like(truth, -2.0), torch.empty(0))
     estimate = GeometricHead(TINY, RANGES[2])(field, inputs.cells[0], inputs.intrinsics).correction[0]
@@ -103,7 +75,10 @@ def test_a_field_that_tells_the_truth_solves_to_the_correction() -> None:
 
 def test_the_warm_up_displaces_the_lidar_image() -> None:
     frame, shift = make_frame(), (9.0, -17.0)
-    still, displaced = make_sample(frame, DELTA, SCALES), make_sample(frame, DELTA, SCALES, shift)
+    still, displaced = (
+        make_sample(frame, DELTA, SCALES, RECIPE.sample),
+        make_sample(frame, DELTA, SCALES, RECIPE.sample, shift),
+    )
     moved = np.zeros_like(still.lidar.image)
     moved[:, :-17, 9:] = still.lidar.image[:, 17:, :-9]
     common = (slice(None), slice(0, -17), slice(9, None))
@@ -113,7 +88,7 @@ def test_the_warm_up_displaces_the_lidar_image() -> None:
 
 
 def test_the_warm_up_and_every_third_batch_are_displaced() -> None:
-    samples = TrainingSamples([Source(Scenes(), 1.0)], RANGES[2], SCALES, 96 * 256, 2, 0, warm_up=3)
+    samples = stream(batch=2, warm_up=3)
     shifts = [np.abs(samples[number].shift).max() for number in range(12)]
     assert [shift > 0 for shift in shifts] == [True] * 3 + [False, True, True] + [False] * 4 + [True] * 2
     assert [samples.largest_shift(number) for number in (0, 2, 3, 4, 5, 6, 10, 11)] == [40, 40, 0, 24, 24, 0, 24, 24]
@@ -121,14 +96,19 @@ def test_the_warm_up_and_every_third_batch_are_displaced() -> None:
 
 
 def test_no_batch_is_displaced_where_features_never_train_alone() -> None:
-    samples = stream()
-    samples.features_every = 0
+    samples = stream(every=0)
     assert [samples.largest_shift(number) for number in range(24)] == [0.0] * 24
+
+
+def test_samples_get_more_varied_in_the_warm_up() -> None:
+    samples = stream(warm_up=100)
+    assert [samples.variety(number) for number in (0, 50, 75, 100, 500)] == [0.5, 0.5, 0.75, 1.0, 1.0]
+    assert stream().variety(0) == 1.0
 
 
 def test_collated_samples_keep_their_order_and_types() -> None:
     frames = [make_frame(seed, 128, 64) for seed in range(2)]
-    samples = [make_sample(frame, DELTA, SCALES) for frame in frames]
+    samples = [make_sample(frame, DELTA, SCALES, RECIPE.sample) for frame in frames]
     inputs, target = collate(samples)
     assert inputs.image.shape == (2, 3, 64, 128) and inputs.lidar.shape == (2, 2, 64, 128)
     assert [tuple(cells.shape) for cells in inputs.cells] == [(2, 3, 8, 16), (2, 3, 4, 8), (2, 3, 2, 4)]
@@ -139,7 +119,10 @@ def test_collated_samples_keep_their_order_and_types() -> None:
 
 def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
     frames = [make_frame(seed, 128, 128) for seed in range(2)]
-    samples = [make_sample(lowered(frame, row), DELTA, SCALES) for frame, row in zip(frames, (100, 70), strict=True)]
+    samples = [
+        make_sample(lowered(frame, row), DELTA, SCALES, RECIPE.sample)
+        for frame, row in zip(frames, (100, 70), strict=True)
+    ]
     assert [Cut.of([sample.lidar]).rows for sample in samples] == [3, 2]
     inputs, target = collate(samples)
     assert inputs.image.shape == (2, 3, 128, 128) and inputs.lidar.shape == (2, 2, 64, 128)
@@ -153,7 +136,7 @@ def test_collated_scans_lose_only_the_rows_that_are_empty_in_all() -> None:
 def test_everything_is_visible_from_the_scanner_s_own_place() -> None:
     frame = make_frame()
     for delta in (np.eye(4), DELTA):
-        sample = make_sample(frame, delta, SCALES)
+        sample = make_sample(frame, delta, SCALES, RECIPE.sample)
         for cells, visible in zip(sample.lidar.cells, sample.visible, strict=True):
             occupied = cells[2] > 0
             assert not (visible & ~occupied).any()
@@ -173,7 +156,7 @@ def test_points_behind_others_are_not_visible() -> None:
     # from a place further left, parallax takes the hidden point out of the near ones' cells
     delta = miscalibration([0, 0, 6.0], [1.5, 0, 0])
     lidar = lidar_input(points, delta @ REFERENCE, camera, (8,))
-    (visible,) = visible_cells(lidar, points, REFERENCE, camera, invert(delta))
+    (visible,) = visible_cells(lidar, points, REFERENCE, camera, invert(delta), RECIPE.sample)
     far = lidar.cells[0][2] > 15
     u, v, _ = camera.matrix @ (delta @ REFERENCE @ np.append(free[:3], 1.0))[:3]
     w = (delta @ REFERENCE @ np.append(free[:3], 1.0))[2]
@@ -186,21 +169,29 @@ def test_points_outside_the_image_are_not_visible() -> None:
     points = lidar_point(20, 40, 30.0)[None]
     lidar = lidar_input(points, REFERENCE, camera, (8,))
     assert (lidar.cells[0][2] > 0).sum() == 1
-    assert visible_cells(lidar, points, REFERENCE, camera, np.eye(4))[0].sum() == 1
-    assert not visible_cells(lidar, points, invert(turned) @ REFERENCE, camera, invert(turned))[0].any()
+    assert visible_cells(lidar, points, REFERENCE, camera, np.eye(4), RECIPE.sample)[0].sum() == 1
+    assert not visible_cells(lidar, points, invert(turned) @ REFERENCE, camera, invert(turned), RECIPE.sample)[0].any()
 
 
 def test_nothing_is_visible_where_the_camera_sees_no_point() -> None:
     frame = make_frame()
     behind = replace(frame, camera_from_lidar=miscalibration([0, 0, 180.0], [0, 0, 0]) @ REFERENCE)
-    sample = make_sample(behind, miscalibration([0, 0, 180.0], [0, 0, 0]), SCALES)
+    sample = make_sample(behind, miscalibration([0, 0, 180.0], [0, 0, 0]), SCALES, RECIPE.sample)
     assert sample.lidar.cells[0].any(), "under the miscalibration it does"
     assert not any(mask.any() for mask in sample.visible)
 
 
 def test_frames_that_never_give_a_sample_are_named() -> None:
-    scenes = Scenes(2)
-    scenes.frames = [replace(frame, points=frame.points[:5]) for frame in scenes.frames]
-    samples = TrainingSamples([Source(scenes, 1.0)], RANGES[2], SCALES, 64 * 128, 4, 0)
-    with pytest.raises(DatasetError, match="scene"):
+    samples = stream()
+    sequence = samples.frames.sources[0].sequence
+    assert isinstance(sequence, Scenes)
+    sequence.frames = [replace(frame, points=frame.points[:5]) for frame in sequence.frames]
+    with pytest.raises(DatasetError, match=r"None of 100 draws gave 40 cells.*scene"):
         samples[0]
+
+
+def test_how_many_cells_a_sample_has_at_least_is_the_recipe_s() -> None:
+    samples = stream()
+    fewest = min(int(samples[number].visible[0].sum()) for number in range(8))
+    samples.recipe = replace(samples.recipe, fewest_visible_cells=fewest + 1)
+    assert all(samples[number].visible[0].sum() > fewest for number in range(8))

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from calibnet.geometry import RANGES, MiscalibrationRange
 from calibnet.training.options import TrainingOptions
+from calibnet.training.recipe import RECIPE, Step
 from calibnet.training.schedule import FEATURES, all_stages
 from calibnet.weights import weights_path
 
@@ -53,3 +55,12 @@ def test_finished_steps_are_not_trained_again(tmp_path: Path) -> None:
     for range_ in RANGES[:2]:
         weights_path("compact", range_, tmp_path).touch()
     assert [step.range for step in plan(tmp_path, minutes=1.0)] == ["5/0.5", "2/0.2", "1/0.1"]
+
+
+def test_the_schedule_is_the_recipe_s(tmp_path: Path) -> None:
+    options = TrainingOptions(preset="compact", range="", output=str(tmp_path), minutes=100.0, learning_rate=1e-3)
+    steps = (Step(RANGES[0], 0.75, None, 1.0), Step(RANGES[1], 0.25, RANGES[0], 0.1))
+    first, second = all_stages(options, replace(RECIPE, schedule=steps))
+    assert (first.range, first.minutes, first.learning_rate, first.initialize) == ("20/1.5", 75.0, 1e-3, None)
+    assert (second.range, second.minutes, second.learning_rate) == ("10/1", 25.0, pytest.approx(1e-4))
+    assert second.initialize == str(weights_of(first))

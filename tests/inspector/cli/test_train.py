@@ -1,15 +1,24 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 from click.testing import CliRunner
 
-from calibnet.geometry import MiscalibrationRange
+from calibnet.cascade import Cascade
+from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
+from calibnet.training import build
+from calibnet.training.data import Source
 from calibnet.training.options import TrainingOptions
+from calibnet.training.recipe import RECIPE
 from calibnet.weights import weights_path
+from calibnet.weights.manifest import load_manifest
 from inspector.cli import train as command
 from inspector.cli.main import cli
+from tests.support.scene import Scenes, make_frame
+from tests.support.tiny import TINY
 
 
 @pytest.fixture
@@ -52,3 +61,33 @@ def test_one_stage_is_recorded_where_it_is_told(
     assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
     ((options, save),) = trained
     assert (options.range, options.output, str(save)) == ("5/0.5", str(tmp_path), "log.rrd")
+
+
+def test_all_stages_end_in_a_folder_that_a_cascade_runs_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "runs"
+    sources = [Source(Scenes(2), 1.0)]
+    monkeypatch.setattr(build, "load_preset", lambda name: TINY)
+    monkeypatch.setattr(build, "training_sources", lambda options: (sources, [Scenes(1)]))
+    monkeypatch.setattr(command, "RECIPE", replace(RECIPE, draws=replace(RECIPE.draws, residuals=4)))
+    torch.set_num_threads(1)
+    arguments = ["train", "--all", "--samples", "12", "--batch", "2", "--workers", "0", "--output", str(folder)]
+    arguments += ["--data", f"folder:{tmp_path}/rigs"]
+    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    assert result.exit_code == 0, result.stderr
+
+    manifest, shipped = load_manifest("compact", folder), load_manifest("compact")
+    assert [entry.range for entry in manifest.stages] == list(RANGES)
+    for entry in manifest.stages:
+        assert (folder / entry.file).is_file() and entry.run == "runs" and entry.validation["samples"] == 4
+        assert entry.settings == shipped.settings(entry.range), "used as the stages that ship are"
+        assert entry.recipe.startswith(("from compact-", "from features/compact-5deg"))
+        assert "samples of folder:rigs, 40% synthetic" in entry.recipe
+    assert "70% of the miscalibrations are what earlier looks leave" in manifest.stages[1].recipe
+    (first,) = (entry for entry in load_manifest("compact", folder / "features").stages if entry.run)
+    assert (first.run, first.range) == ("features", RANGES[2]) and first.recipe.startswith("from random weights")
+
+    cascade = Cascade.load("compact", folder=folder)
+    assert [stage.number for stage in cascade.stages] == [1, 2, 3, 4, 5] and not cascade.skipped
+    frame = make_frame(7)
+    trace = cascade.calibrate(frame, miscalibration([1, 0, 0], [0, 0, 0]) @ frame.camera_from_lidar)
+    assert [stage.number for stage in trace.stages] == [1, 2, 3, 4, 5]

@@ -1,0 +1,148 @@
+"""Opens what a run needs: its data, its network, and the stage that this is to become."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+from lightning_fabric import Fabric
+
+from calibnet.cascade.stage import Stage
+from calibnet.errors import ConfigError
+from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.network.config import load_preset
+from calibnet.network.network import CalibrationNetwork
+from calibnet.training.data import Source, training_sources
+from calibnet.training.devices import launch
+from calibnet.training.draws import Draws
+from calibnet.training.frames import TrainingFrames
+from calibnet.training.options import TrainingOptions
+from calibnet.training.recipe import RECIPE, OptimizerRecipe, Recipe
+from calibnet.training.residuals import residual_errors, stages_before
+from calibnet.training.samples import TrainingSamples
+from calibnet.training.validation import Validation
+from calibnet.weights import load_network
+from calibnet.weights.manifest import load_manifest
+
+
+@dataclass(frozen=True)
+class Training:
+    """A run that can start.
+
+    Attributes:
+        options: as they were given.
+        recipe: as it acts in this run, see `Recipe.of_run`.
+        fabric: the devices; all processes are there.
+        stage: to be trained; its network is on the CPU, and what is not trained of it needs no gradient.
+        samples: what it is trained on.
+        validation: measures it on held-out frames, if there are any.
+    """
+
+    options: TrainingOptions
+    recipe: Recipe
+    fabric: Fabric
+    stage: Stage
+    samples: TrainingSamples
+    validation: Validation | None
+
+
+def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
+    """Open data and network.
+
+    Raises:
+        ConfigError: the options do not fit each other, or what they name.
+        DatasetError: data cannot be read.
+        WeightsError: nor can weights to start from.
+    """
+    if not (options.minutes or options.samples):
+        raise ConfigError("Training needs a budget: give --minutes or --samples.")
+    torch.manual_seed(options.seed)
+    fabric = launch()
+    network = open_network(options, recipe.optimizer)
+    start = initialize(network, options)
+    stage = open_stage(network, options)
+    recipe = recipe.of_run(options, network.config)
+    sources, held_out = training_sources(options)
+    frames = open_frames(sources, recipe, stage, options)
+    draws = open_draws(options, recipe, frames, stage, start.to(fabric.device) if start else None)
+    return Training(
+        options,
+        recipe,
+        fabric,
+        stage,
+        TrainingSamples(frames, draws, network.config.volume_scales),
+        Validation(held_out, stage, recipe.pace.validation_draws, options.seed) if held_out else None,
+    )
+
+
+def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> CalibrationNetwork:
+    """The preset's network; what is pretrained of it is filled, and its first levels are frozen."""
+    config = load_preset(options.preset)
+    if options.head:
+        config = replace(config, head=options.head)
+    network = CalibrationNetwork(config, MiscalibrationRange.parse(options.range))
+    network.features.load_pretrained()
+    for parameter in network.features.pretrained_levels()[: recipe.frozen_levels].parameters():
+        parameter.requires_grad_(False)
+    return network
+
+
+def initialize(network: CalibrationNetwork, options: TrainingOptions) -> CalibrationNetwork | None:
+    """Give the network the weights of ``options.initialize``; a head of another kind starts anew.
+
+    Returns:
+        The network they are of; None if training starts from nothing.
+    """
+    if not options.initialize:
+        return None
+    start = load_network(Path(options.initialize))
+    given = start.state_dict()
+    if start.config.head != network.config.head:
+        new = {name: tensor for name, tensor in network.state_dict().items() if name.startswith("pose.")}
+        given = {name: tensor for name, tensor in given.items() if not name.startswith("pose.")} | new
+    try:
+        network.load_state_dict(given)
+    except RuntimeError:  # lists every name and shape
+        raise ConfigError(
+            f"{options.initialize} holds another network than preset {options.preset}; "
+            "start from weights of that preset."
+        ) from None
+    if network.config.share_image_branch and not options.train_image_branch:
+        for name, parameter in network.features.named_parameters():
+            parameter.requires_grad_(not name.startswith("image_"))
+    return start
+
+
+def open_stage(network: CalibrationNetwork, options: TrainingOptions) -> Stage:
+    """The stage of the network, used as the manifest in the output folder says."""
+    number = RANGES.index(network.range) + 1 if network.range in RANGES else 0
+    manifest = load_manifest(options.preset, Path(options.output))
+    return Stage(number, network.range, network, manifest.settings(network.range))
+
+
+def open_frames(sources: list[Source], recipe: Recipe, stage: Stage, options: TrainingOptions) -> TrainingFrames:
+    """Frames at the size of the stage's image, or cuttings of it where that is larger than the preset's input."""
+    config, size = stage.network.config, stage.settings.image_size
+    area = config.input_height * config.input_width * min(size, 1.0) ** 2
+    return TrainingFrames(sources, recipe, area, options.batch, options.seed, magnification=max(size, 1.0))
+
+
+def open_draws(
+    options: TrainingOptions, recipe: Recipe, frames: TrainingFrames, stage: Stage, start: CalibrationNetwork | None
+) -> Draws:
+    """The miscalibrations: with ``options.after`` many are what the stages there leave, and what the first look does.
+
+    The first look is that of the stage as it starts, if it starts from itself and looks more than once: a neighbour's
+    would leave what this stage never sees, and a stage that looks once needs no practice in looking again.
+    """
+    drawn = recipe.draws.of(stage.range)
+    if not options.after:
+        return Draws(drawn.range, recipe.draws)
+    before = stages_before(options.preset, stage.range, Path(options.after))
+    again = None
+    if start is not None and start.range == stage.range and stage.settings.looks > 1:
+        again = replace(stage, network=start)
+    residuals = residual_errors(before, frames, stage.range, recipe.draws, again) if before or again else []
+    share = drawn.residual_share if before else recipe.draws.own_residual_share
+    return Draws(drawn.range, recipe.draws, residuals, share)

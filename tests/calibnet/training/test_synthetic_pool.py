@@ -1,0 +1,40 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibnet.training.synthetic_pool import SyntheticPool
+from tests.support.scene import make_frame
+
+
+def test_scenes_are_rendered_once_and_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from calibnet.datasets import synthetic
+
+    drawn: list[int] = []
+
+    def sample_frame(seed: int) -> object:
+        drawn.append(seed)
+        return make_frame(seed % 10)
+
+    monkeypatch.setattr(synthetic, "sample_frame", sample_frame)
+    pool = SyntheticPool(5, 2, tmp_path)
+    first, again = pool[3], SyntheticPool(5, 2, tmp_path)[3]
+    assert drawn == [2_000_003] and len(pool) == 5
+    assert np.array_equal(first.image, again.image) and np.array_equal(first.points, again.points)
+    assert np.array_equal(first.camera_from_lidar, again.camera_from_lidar)
+    assert np.array_equal(first.camera.matrix, again.camera.matrix)
+    assert (again.camera.width, again.camera.height) == (first.camera.width, first.camera.height)
+
+
+@pytest.mark.parametrize("keep", [0, 10, 3000, -1])
+def test_a_scene_cut_short_is_drawn_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keep: int) -> None:
+    from calibnet.datasets import synthetic
+
+    monkeypatch.setattr(synthetic, "sample_frame", lambda seed: make_frame(1))
+    pool = SyntheticPool(5, 2, tmp_path)
+    expected = pool[0].points
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:keep])
+    assert np.array_equal(pool[0].points, expected)
