@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
 
 MARGIN = 1.2
 """How far a calibration may end from its start, relative to the range that was searched, to be believed."""
@@ -112,6 +113,7 @@ class CascadeTrace:
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (resizing, image features).
         wider: stages of wider ranges that ran before them, because a first try left the range it searched.
+        verdict: whether the result is good; None from a method that does not say.
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
     """
 
@@ -120,6 +122,7 @@ class CascadeTrace:
     milliseconds: dict[str, float] = field(default_factory=dict)
     match_error_limit_px: float = math.inf
     wider: tuple[StageTrace, ...] = ()
+    verdict: Verdict | None = None
 
     @property
     def searched(self) -> MiscalibrationRange | None:
@@ -142,27 +145,14 @@ class CascadeTrace:
         return not self.stages or not self.stages[-1].match_error_px > self.match_error_limit_px
 
     @property
-    def confirmed(self) -> bool:
-        """Whether what the stages found is believed."""
-        return self.fits and self.stayed
+    def rejected(self) -> bool:
+        """Whether what the stages found is taken to be wrong."""
+        return self.verdict is not None and self.verdict.word == REJECTED
 
     @property
     def corrected(self) -> Extrinsic:
-        """``camera_from_lidar`` after the last stage; the initial one where that is not believed."""
-        return self.arrived if self.confirmed else self.initial
-
-
-@dataclass(frozen=True)
-class BadFrame:
-    """A frame that could not be used.
-
-    Attributes:
-        frame: its index or, where it could not even be read, its position in the sequence.
-        why: one sentence.
-    """
-
-    frame: int
-    why: str
+        """``camera_from_lidar`` after the last stage; the initial one where that is rejected."""
+        return self.initial if self.rejected else self.arrived
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +190,7 @@ class DriveEstimate(Estimate):
         history: the estimate after more and more frames of the last pass, with the index of the latest in its
             sequence; the last one is the estimate.
         skipped: frames that could not be read, or calibrated in the last look.
+        verdict: whether the estimate is good; None from a method that does not say.
         networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
             frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
     """
@@ -207,3 +198,4 @@ class DriveEstimate(Estimate):
     history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
     skipped: tuple[BadFrame, ...] = ()
     networks: Estimate | None = field(repr=False, default=None)
+    verdict: Verdict | None = None

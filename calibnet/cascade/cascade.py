@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -19,6 +19,7 @@ from calibnet.network.config import load_preset
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
 from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
+from calibnet.verdict.judge import judge, judge_drive
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
 
 
@@ -108,7 +109,7 @@ class Cascade:
                 before = self._run(wider, views, initial)
                 stages = self._run(self.stages, views, before[-1].after, detail)
                 trace = CascadeTrace(initial, stages, clock.parts, limit, before)
-        return trace
+        return replace(trace, verdict=judge(trace))
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -124,10 +125,12 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        estimate = solve_drive(self.stages, frames, initial, self.common, observer)
+        stages = self.stages
+        estimate = solve_drive(stages, frames, initial, self.common, observer)
         if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
-            estimate = solve_drive([*wider, *self.stages], frames, initial, self.common, observer)
-        return estimate
+            stages = [*wider, *self.stages]
+            estimate = solve_drive(stages, frames, initial, self.common, observer)
+        return replace(estimate, verdict=judge_drive(estimate, initial, stages[0].range, MARGIN))
 
     def _run(
         self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False

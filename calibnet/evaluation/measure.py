@@ -13,6 +13,7 @@ from calibnet.evaluation.runner import Evaluation, evaluate_frames
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator
 from calibnet.methods.edge_alignment import EdgeAlignment
+from calibnet.verdict.verdict import REJECTED
 
 NO_CORRECTION = "no correction"
 
@@ -130,8 +131,9 @@ class _Measurement:
             altered[name] = self.frames(f"audit, {name}", cascade, sequences)
         return replace(
             evaluation,
-            audit={name: row.final for name, row in altered.items()},
-            audit_unconfirmed={name: row.unconfirmed for name, row in altered.items()},
+            audit={name: row.applied for name, row in altered.items()},
+            audit_arrived={name: row.final for name, row in altered.items()},
+            audit_rejected={name: row.verdicts[REJECTED] for name, row in altered.items()},
             audit_images=", ".join(dict.fromkeys(donor.name for donor in donors)),
         )
 

@@ -14,6 +14,7 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
 from calibnet.methods.calibrator import Calibrator
+from calibnet.verdict.verdict import ACCEPTED, REJECTED, WORDS
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,10 @@ class Run:
         frame: index of the frame in it.
         repeat: which of the frame's miscalibrations, from 0.
         initial: error before the first stage.
-        stages: error after each stage that ran, by stage number; empty when the frame could not
+        stages: error after each stage that ran, by stage number, whatever the verdict; empty when the frame could not
             be calibrated.
-        unconfirmed: whether picture and scan did not fit after the last stage, so that the extrinsic was left as it
-            was: the last stage's error is the initial one then.
+        applied: error of the result as it is applied: the initial one, where what was found is rejected.
+        verdict: accepted, rejected or cannot tell; empty where there is none.
     """
 
     sequence: str
@@ -36,7 +37,8 @@ class Run:
     repeat: int
     initial: PoseError
     stages: dict[int, PoseError]
-    unconfirmed: bool = False
+    applied: PoseError
+    verdict: str = ""
 
 
 Observer = Callable[[Run], None]
@@ -70,8 +72,9 @@ class Evaluation:
         drives: errors of the drives' extrinsics, each solved from all its frames; None where none was measured.
         drives_networks: likewise of what the networks alone made of them, before edges were aligned.
         references: errors of other methods on the same single frames, by name: no correction, a classical refinement.
-        audit: errors after the last stage with altered frames, by name, see `calibnet.evaluation.audit`.
-        audit_unconfirmed: how many of those runs the picture did not confirm, by the same names.
+        audit: errors with altered frames, by name, see `calibnet.evaluation.audit`: of the results as applied.
+        audit_arrived: the same before the verdict, after the last stage.
+        audit_rejected: how many of those runs were rejected, by the same names.
         audit_images: where the swapped images come from.
     """
 
@@ -89,17 +92,29 @@ class Evaluation:
     drives_networks: Metrics | None = None
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
-    audit_unconfirmed: dict[str, int] = field(default_factory=dict)
+    audit_arrived: dict[str, Metrics] = field(default_factory=dict)
+    audit_rejected: dict[str, int] = field(default_factory=dict)
     audit_images: str = ""
 
     @property
-    def unconfirmed(self) -> int:
-        """Runs that the picture did not confirm; they count with their initial error after the last stage."""
-        return sum(run.unconfirmed for run in self.runs)
+    def verdicts(self) -> dict[str, int]:
+        """How many runs have each verdict."""
+        return {word: sum(run.verdict == word for run in self.runs) for word in WORDS}
+
+    @property
+    def accepted(self) -> Metrics | None:
+        """Errors of the accepted runs; None where there are none."""
+        errors = [run.applied for run in self.runs if run.verdict == ACCEPTED]
+        return Metrics.of(errors) if errors else None
+
+    @property
+    def applied(self) -> Metrics:
+        """Errors of the results as they are applied."""
+        return Metrics.of([run.applied for run in self.runs])
 
     @property
     def final(self) -> Metrics:
-        """Errors after the last stage."""
+        """Errors after the last stage, whatever the verdict."""
         return self.stages[-1].metrics
 
     def as_dict(self) -> dict[str, Any]:
@@ -112,7 +127,9 @@ class Evaluation:
             "seed": self.seed,
             "frames": self.frames,
             "failed": self.failed,
-            "unconfirmed": self.unconfirmed,
+            "unconfirmed": self.verdicts[REJECTED],  # its former name
+            "verdicts": {word.replace(" ", "_"): count for word, count in self.verdicts.items()},
+            "accepted": None if self.accepted is None else self.accepted.as_dict(),
             "initial": self.initial.as_dict(),
             "stages": [
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
@@ -123,7 +140,8 @@ class Evaluation:
         }
         if self.audit:
             content["audit"] = {name: metrics.as_dict() for name, metrics in self.audit.items()}
-            content["audit_unconfirmed"] = self.audit_unconfirmed
+            content["audit_arrived"] = {name: metrics.as_dict() for name, metrics in self.audit_arrived.items()}
+            content["audit_unconfirmed"] = content["audit_rejected"] = self.audit_rejected
             content["audit_images"] = self.audit_images
         return content
 
@@ -164,19 +182,17 @@ def evaluate_frames(
             for repeat in range(repeats):
                 initial = draw_miscalibration(range_, seed, frame.index, repeat) @ reference
                 errors: dict[int, PoseError] = {}
-                unconfirmed = False
+                applied, verdict = initial, ""
                 try:
                     trace = calibrator.calibrate(frame, initial)
                     for stage in trace.stages:
                         ranges[stage.number] = stage.range
                         errors[stage.number] = pose_error(stage.after, reference)
-                    errors[trace.stages[-1].number] = pose_error(trace.corrected, reference)
-                    unconfirmed = not trace.confirmed
+                    applied, verdict = trace.corrected, trace.verdict.word if trace.verdict else ""
                 except CalibrationError as error:
                     failure = error
-                runs.append(
-                    Run(sequence.name, frame.index, repeat, pose_error(initial, reference), errors, unconfirmed)
-                )
+                before, after = (pose_error(extrinsic, reference) for extrinsic in (initial, applied))
+                runs.append(Run(sequence.name, frame.index, repeat, before, errors, after, verdict))
                 if observer is not None:
                     observer(runs[-1])
     if not runs:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from calibnet.verdict.verdict import ACCEPTED
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -23,6 +25,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     rows = [("initial", evaluation.initial)]
     rows += [(name, metrics) for name, metrics in evaluation.references.items() if metrics is not evaluation.initial]
     rows += [(f"stage {stage.number} ({stage.range})", stage.metrics) for stage in evaluation.stages]
+    if evaluation.accepted is not None and evaluation.verdicts[ACCEPTED] < len(evaluation.runs):
+        rows.append(("accepted runs", evaluation.accepted))
     if evaluation.drives_networks is not None:
         rows.append(("drive, networks", evaluation.drives_networks))
     if evaluation.drives is not None:
@@ -36,8 +40,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     console.print(success_table(rows))
     if evaluation.audit:
         console.print(audit_sentence(evaluation))
-    if evaluation.audit or evaluation.unconfirmed:
-        console.print(unconfirmed_sentence(evaluation))
+    if sum(evaluation.verdicts.values()):
+        console.print(verdict_sentence(evaluation))
     if evaluation.failed:
         console.print(
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
@@ -54,13 +58,11 @@ def audit_sentence(evaluation: Evaluation) -> str:
     return f"Of the initial rotation error (median) is left: {shares}."
 
 
-def unconfirmed_sentence(evaluation: Evaluation) -> str:
-    """In how many runs the picture did not confirm the result."""
-    with_audit = "".join(f", {count} with the audit's {name}" for name, count in evaluation.audit_unconfirmed.items())
-    return (
-        f"Picture and scan did not fit after the last stage, so the extrinsic was left as it was, in "
-        f"{evaluation.unconfirmed} of {len(evaluation.runs)} runs{with_audit}."
-    )
+def verdict_sentence(evaluation: Evaluation) -> str:
+    """How many runs have which verdict, and how many of the audit's were rejected."""
+    counts = ", ".join(f"{count} {word}" for word, count in evaluation.verdicts.items())
+    with_audit = ", ".join(f"{count} with the audit's {name}" for name, count in evaluation.audit_rejected.items())
+    return f"Of {len(evaluation.runs)} runs: {counts}." + (f" Rejected besides: {with_audit}." if with_audit else "")
 
 
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:

@@ -15,7 +15,8 @@ from typing import Any
 import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import BadFrame, DriveEstimate
+from calibnet.trace import DriveEstimate
+from calibnet.verdict.verdict import BadFrame
 from inspector import entities
 from inspector.record.frame import log_frame
 from inspector.record.observation import Layout, Observation

@@ -23,7 +23,7 @@ from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
-from calibnet.trace import BadFrame
+from calibnet.verdict.verdict import BadFrame
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs

@@ -9,7 +9,7 @@ from statistics import median
 
 from calibnet.errors import DatasetError
 from calibnet.geometry import PoseError, pose_error
-from calibnet.trace import BadFrame
+from calibnet.verdict.verdict import BadFrame
 from inspector.record.observation import Observation
 
 
@@ -32,7 +32,7 @@ class Summary:
         """Take in one frame."""
         trace = observation.trace
         self.frames += 1
-        self.unconfirmed += not trace.confirmed
+        self.unconfirmed += trace.rejected
         self._change.append(pose_error(trace.corrected, trace.initial))
         for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
             error = observation.error(extrinsic)

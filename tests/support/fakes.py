@@ -26,6 +26,7 @@ from calibnet.geometry import (
 )
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.trace import CascadeTrace, ScaleTrace, StageDetail, StageTrace
+from tests.support.judged import judged
 
 LEFTOVER = 0.3
 MATCH_ERROR_LIMIT = 4.0
@@ -92,7 +93,7 @@ class FakeCascade:
         size: tuple[int, int] = (512, 160),
         doubted: tuple[int, ...] = (),
     ) -> None:
-        """Frames whose index is in ``doubted`` are not confirmed by their picture."""
+        """Frames whose index is in ``doubted`` are rejected."""
         self.doubted = doubted
         self.stages = [FakeStage(number) for number in stages]
         self.strides, self.radius, self.size = strides, radius, size
@@ -110,7 +111,8 @@ class FakeCascade:
             timing = {"projection": float(np.random.default_rng().uniform(1, 3))}
             range_, off = RANGES[number - 1], 6.0 if frame.index in self.doubted else 2.0
             stages.append(StageTrace(number, range_, camera, before, current, correction, timing, None, details, off))
-        return CascadeTrace(initial, tuple(stages), {"features": 3.0}, match_error_limit_px=MATCH_ERROR_LIMIT)
+        trace = CascadeTrace(initial, tuple(stages), {"features": 3.0}, match_error_limit_px=MATCH_ERROR_LIMIT)
+        return judged(trace, frame.index in self.doubted)
 
     def _detail(self, frame: Frame, camera: PinholeCamera, before: NDArray[np.float64], seed: int) -> StageDetail:
         projection = project(frame.points, before, camera)

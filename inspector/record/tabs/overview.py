@@ -60,7 +60,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     trace, reference = observation.trace, observation.reference
     overlays = frame_overlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
-    result = "corrected" if trace.confirmed else "left as it was: picture and scan do not fit"
+    result = "corrected" if not trace.rejected else "left as it was: picture and scan do not fit"
     overlays.log(rec, entities.OVERLAY_CORRECTED, result, trace.corrected)
     if reference is not None:
         overlays.log_reference(rec, entities.OVERLAY_REFERENCE, reference)

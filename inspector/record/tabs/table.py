@@ -47,7 +47,7 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
 def _headline(observation: Observation) -> str:
     """The result in a line."""
     frame, trace = observation.frame, observation.trace
-    if not trace.confirmed:
+    if trace.rejected:
         return f"Frame {frame.index}: not corrected, picture and scan do not fit together"
     before, after = observation.error(trace.initial), observation.error(trace.corrected)
     if before is None or after is None:
@@ -67,7 +67,7 @@ def _confirmation(observation: Observation) -> list[str]:
     last = trace.stages[-1]
     found = f"its matches are expected to be {observation.image_px(last, last.match_error_px):.1f} px off"
     limit = f"{observation.image_px(last, trace.match_error_limit_px):.1f} px"
-    if trace.confirmed:
+    if not trace.rejected:
         return [f"The picture confirms it: after stage {last.number} {found} (of at most {limit}).", ""]
     return [
         f"**Left as it was**: after stage {last.number} {found}, more than {limit}. "

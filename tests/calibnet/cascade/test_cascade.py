@@ -82,7 +82,7 @@ def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: C
     last = trace.stages[-1]
     assert trace.fits and last.match_error_px > 0.5 and not np.array_equal(trace.arrived, INITIAL)
     doubting = cascade(limit=last.match_error_px - 0.01).calibrate(frame, INITIAL)
-    assert not doubting.fits and not doubting.confirmed and np.array_equal(doubting.corrected, INITIAL)
+    assert not doubting.fits and doubting.rejected and np.array_equal(doubting.corrected, INITIAL)
     assert np.array_equal(doubting.stages[-1].after, trace.stages[-1].after), "what the stages found can be seen"
     believing = cascade(limit=last.match_error_px + 0.01).calibrate(frame, INITIAL)
     assert believing.fits and np.array_equal(believing.arrived, trace.arrived)
@@ -518,7 +518,7 @@ def test_what_leaves_the_range_is_looked_for_again_from_the_stage_whose_range_it
     trace = with_wider_stages().calibrate(frame, INITIAL)
     assert ran == expected and [stage.number for stage in trace.stages] == [3, 4, 5]
     assert [stage.number for stage in trace.wider] == expected[3:-3]
-    assert trace.confirmed and trace.searched == RANGES[min(expected) - 1]
+    assert not trace.rejected and trace.searched == RANGES[min(expected) - 1]
     moved = sum(again.values()) or first_try
     np.testing.assert_allclose(trace.corrected, miscalibration([0, 0, 0], [moved, 0, 0]) @ INITIAL, atol=1e-12)
 
@@ -526,7 +526,7 @@ def test_what_leaves_the_range_is_looked_for_again_from_the_stage_whose_range_it
 def test_what_wanders_from_all_ranges_is_left_as_it_was(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     wandering(monkeypatch, {1: [4.0], 2: [0.5], 3: [4.5, 0.0], 4: [0.0, 0.0], 5: [0.0, 0.0]})
     trace = with_wider_stages().calibrate(frame, INITIAL)
-    assert trace.fits and not trace.stayed and not trace.confirmed
+    assert trace.fits and not trace.stayed and trace.rejected
     np.testing.assert_array_equal(trace.corrected, INITIAL)
     np.testing.assert_allclose(trace.arrived[0, 3] - INITIAL[0, 3], 4.5, atol=1e-12)
 
@@ -534,7 +534,7 @@ def test_what_wanders_from_all_ranges_is_left_as_it_was(frame: Frame, monkeypatc
 def test_stages_that_were_asked_for_only_reject(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
     ran = wandering(monkeypatch, {3: [0.7], 4: [0.0], 5: [0.0]})
     trace = cascade((3, 4, 5)).calibrate(frame, INITIAL)
-    assert ran == [3, 4, 5] and trace.wider == () and not trace.confirmed
+    assert ran == [3, 4, 5] and trace.wider == () and trace.rejected
 
 
 def test_wider_stages_are_loaded_where_they_are_wanted(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from calibnet.geometry import RANGES, MiscalibrationRange, invert, miscalibratio
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, DriveEstimate, StageTrace
 from tests.support.drive import REFERENCE, Drive
+from tests.support.judged import judged
 
 RANGE = MiscalibrationRange(5, 0.5)
 
@@ -28,7 +28,7 @@ class Leaving:
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         stage = StageTrace(3, RANGES[2], frame.camera, initial, self.found, self.found @ invert(initial))
         seen = bool((frame.image == 7).all())
-        return CascadeTrace(initial, (replace(stage, match_error_px=1.0 if seen else 9.0),), match_error_limit_px=4.0)
+        return judged(CascadeTrace(initial, (stage,)), rejected=not seen)
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -52,8 +52,9 @@ def test_every_row_that_was_asked_for_and_no_other() -> None:
     assert whole.references["other"].rotation_deg.yaw == pytest.approx(0.5)
     assert whole.drives is not None and whole.drives.rotation_deg.yaw == pytest.approx(1.0)
     assert whole.drives_networks is None
-    assert whole.audit_unconfirmed == {"swapped": 0, "grey": 10, "thinned": 0}
-    assert whole.audit["grey"] == whole.initial
+    assert whole.audit_rejected == {"swapped": 0, "grey": 10, "thinned": 0}
+    assert whole.audit["grey"] == whole.initial, "as applied"
+    assert whole.audit_arrived["grey"] == whole.final, "before the verdict"
     assert whole.audit_images == "a/01, a/00"
 
 
@@ -70,7 +71,7 @@ def test_the_audit_takes_images_from_beside_where_there_is_one_sequence() -> Non
         Leaving(1.0), drives()[:1], RANGE, references={}, drives=False, audit=True, beside=lambda: iter([beside])
     )
     assert evaluation.audit_images == "a/05"
-    assert evaluation.audit_unconfirmed == {"swapped": 3, "grey": 3, "thinned": 0}
+    assert evaluation.audit_rejected == {"swapped": 3, "grey": 3, "thinned": 0}
 
 
 def test_the_observer_hears_of_every_row_before_its_first_run_and_after_each() -> None:

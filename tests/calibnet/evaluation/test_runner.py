@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from calibnet.geometry import (
 from calibnet.geometry.types import Transform
 from calibnet.trace import CascadeTrace, StageTrace
 from tests.support.drive import CAMERA, REFERENCE, Drive
+from tests.support.judged import judged
 
 RANGE = MiscalibrationRange(5, 0.5)
 
@@ -41,9 +42,9 @@ class ShrinkingCascade:
         stages, before = [], initial
         for number, after in steps:
             stage = StageTrace(number, RANGES[number - 1], CAMERA, before, after, after @ invert(before))
-            stages.append(replace(stage, match_error_px=5.0 if frame.index in self.doubted else 3.0))
+            stages.append(stage)
             before = after
-        return CascadeTrace(initial, tuple(stages), match_error_limit_px=4.0)
+        return judged(CascadeTrace(initial, tuple(stages)), frame.index in self.doubted)
 
 
 def test_every_stage_is_measured_against_the_reference() -> None:
@@ -59,13 +60,17 @@ def test_every_stage_is_measured_against_the_reference() -> None:
     assert len(evaluation.runs) == 6
 
 
-def test_runs_that_the_picture_does_not_confirm_keep_their_initial_error_in_the_end() -> None:
+def test_rows_measure_where_the_cascade_ended_whatever_the_verdict() -> None:
     evaluation = evaluate_frames(ShrinkingCascade(doubted=frozenset({1})), [Drive([0, 1, 2])], RANGE, repeats=2, seed=7)
-    assert evaluation.unconfirmed == evaluation.as_dict()["unconfirmed"] == 2
+    assert evaluation.verdicts == {"accepted": 4, "rejected": 2, "cannot tell": 0}
+    assert evaluation.as_dict()["verdicts"] == {"accepted": 4, "rejected": 2, "cannot_tell": 0}
+    assert evaluation.as_dict()["unconfirmed"] == 2
     for run in evaluation.runs:
-        assert run.unconfirmed == (run.frame == 1)
-        assert (run.stages[4] == run.initial) == run.unconfirmed
-        assert run.stages[3].pitch_deg == pytest.approx(1.5), "what the stages before found is measured as it is"
+        assert (run.verdict == "rejected") == (run.frame == 1) == (run.applied == run.initial)
+        assert run.stages[4].yaw_deg == pytest.approx(0.5)
+    assert evaluation.final.rotation_deg.mean == pytest.approx(0.5)
+    assert evaluation.accepted is not None and evaluation.accepted.rotation_deg.mean == pytest.approx(0.5)
+    assert evaluation.applied.rotation_deg.mean > 0.5
 
 
 def test_initial_errors_are_those_of_what_the_cascade_was_given() -> None:

@@ -11,7 +11,8 @@ from rerun.chunk import RrdReader
 
 from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
-from calibnet.trace import BadFrame, DriveEstimate, Estimate
+from calibnet.trace import DriveEstimate, Estimate
+from calibnet.verdict.verdict import BadFrame
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive

@@ -1,0 +1,1 @@
+"""Whether a calibration is good, and what is wrong where it is not."""

@@ -1,0 +1,16 @@
+"""Traces with the verdict that a test wants."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from calibnet.trace import CascadeTrace
+from calibnet.verdict.verdict import ACCEPTED, REJECTED, Cause, Verdict, moved
+
+REASON = "Picture and scan do not fit together."
+
+
+def judged(trace: CascadeTrace, rejected: bool = False, causes: tuple[Cause, ...] = ()) -> CascadeTrace:
+    word, reason = (REJECTED, REASON) if rejected else (ACCEPTED, "Picture and scan fit together.")
+    verdict = Verdict(word, reason, trace.arrived, moved(trace.initial, trace.arrived), causes)
+    return replace(trace, verdict=verdict)
