@@ -35,7 +35,7 @@ NAMES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (MATRIX, (r"[fc][xyuv]?|[uv]0|pp[xy]|skew", r"focal\w*|principal\w*|(optical)?cent(er|re)[xyuv]?")),
     (f"{LENS}, and a projection of KITTI as 'camera_matrix' (its left 3x3)", (r"p[12]",)),
     (LENS, (r"(lens|camera|cam)?dist(ort|ors)\w*|\w*distortion\w*", r"d(0\d)?|k[1-9]|s[1-4]|xi|alpha|beta")),
-    (LENS, (r"(camera|cam)?dist(coeffs?|coefs?|coefficients?|params?)?", r"coeffs?|(radial|tangential)\w*")),
+    (LENS, (r"(camera|cam)?dist(coeffs?|coefs?|coefficients?|params?)?", r"coeff\w*|(radial|tangential)\w*")),
     (RECTIFIED, (r"p\d?|p(roj(ection)?)?(mat(rix)?|rect\w*)|(new|optimal)cam\w*", r"r?rect(ification)?(mat(rix)?)?")),
     (RECTIFIED, (r"rrect\w*|r0\w*",)),
     (STRAIGHT, (r"(is)?fisheye\w*|omni\w*|equidistant\w*|kannala\w*",)),
@@ -43,7 +43,7 @@ NAMES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (INVERSE, (rf"({_A}?{_LIDAR}(from|in)|{_A}{_LIDAR}){_CAM}{_OF}", rf"{_A}?{_CAM}(to|2){_LIDAR}{_OF}")),
     (EXTRINSIC, (rf"{_A}?{_CAM}(from)?{_LIDAR}{_OF}", rf"{_A}?{_LIDAR}(to|2)?{_CAM}{_OF}", rf"extrinsics?{_OF}")),
     (EXTRINSIC, (r"t|tf|tr|rt|pose|transform\w*", rf"t({_CAM}|{_LIDAR}|bs|body|imu|base|ic|vehicle)\w*")),
-    (EXTRINSIC, (r"r|q|t[xyz]|q[wxyz]|[rt]vecs?|rpy|roll|pitch|yaw|euler", r"(rot|trans)(ation|lation)?s?|quaternions?")),
+    (EXTRINSIC, (r"r|q|[tq][wxyz]|[rt]vecs?|rpy|roll|pitch|yaw|euler", r"(rot|trans)(ation|lation)?s?|quaternions?")),
 )  # fmt: skip
 """What is right, instead of names such as these, in lower case and without ``_``; the first that fits counts."""
 
