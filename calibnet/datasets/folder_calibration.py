@@ -12,6 +12,7 @@ import yaml
 from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rigid
 from calibnet.datasets.unread_keys import in_words, unread_geometry
 from calibnet.errors import DatasetError
+from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Floats
 
 DISTORTION_LENGTHS = (4, 5, 8)
@@ -33,6 +34,11 @@ class FolderCalibration:
     height: int
     calibration: Calibration
     distortion: Floats = field(repr=False)
+
+    @property
+    def camera(self) -> PinholeCamera:
+        """Of the pictures once they are rectified."""
+        return PinholeCamera(self.width, self.height, self.calibration.matrix)
 
 
 def read_folder_calibration(path: Path) -> FolderCalibration:
