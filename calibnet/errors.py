@@ -15,6 +15,18 @@ class DatasetError(CalibnetError):
     """A folder, frame or calibration file is missing, malformed or inconsistent."""
 
 
+class ImplausibleError(DatasetError):
+    """Input that can be read and cannot be right, for instance a focal length in millimetres.
+
+    Attributes:
+        cause: its short name for machines, for instance ``"focal-length"``; see `calibnet.datasets.plausibility`.
+    """
+
+    def __init__(self, message: str, cause: str = "") -> None:
+        super().__init__(message)
+        self.cause = cause
+
+
 class WeightsError(CalibnetError):
     """A weights file is missing, foreign, truncated or of another preset."""
 

@@ -15,6 +15,7 @@ from torch import Tensor
 from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
+from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled
 from calibnet.geometry.types import Extrinsic, Transform
@@ -108,10 +109,14 @@ class Stage:
         clock, camera = Clock(self.device), self.camera(frame)
         lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
         if lidar.occupied.sum() < FEWEST_CELLS:
+            why = suspicion(
+                frame.remarks,
+                "check that the extrinsic maps LiDAR points (x forward, y left, z up) into the camera (x right, "
+                "y down, z forward)",
+            )
             raise CalibrationError(
                 f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
-                f"stage {self.number}; check that the extrinsic maps LiDAR points (x forward, y left, z up) into the "
-                "camera (x right, y down, z forward)."
+                f"stage {self.number}; {why}."
             )
         clock("projection")
         cut = Cut.of([lidar])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from calibnet.errors import DatasetError
+from calibnet.errors import DatasetError, ImplausibleError
 from calibnet.geometry.types import Extrinsic, Intrinsics, Rotation, Transform
 
 RIGID_TOLERANCE = 2e-3
@@ -47,7 +47,7 @@ def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
     """Return the 3x3 ``rotation`` if it is one.
 
     Raises:
-        DatasetError: it stretches or mirrors; the message names ``path`` and ``key``.
+        DatasetError: it stretches, or, as `ImplausibleError`, mirrors; the message names ``path`` and ``key``.
     """
     deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if deviation > RIGID_TOLERANCE:
@@ -56,7 +56,11 @@ def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
             "give a rotation matrix with at least four decimals."
         )
     if np.linalg.det(rotation) < 0.0:
-        raise DatasetError(f"{path}: the rotation of {key} is a reflection (determinant -1); swap or negate one axis.")
+        raise ImplausibleError(
+            f"{path}: the rotation of {key} is a reflection (determinant -1), so one of its coordinate systems is "
+            "left-handed; negate one axis of that.",
+            "left-handed",
+        )
     return rotation
 
 

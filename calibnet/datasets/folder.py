@@ -13,6 +13,7 @@ from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.folder_calibration import FolderCalibration, read_folder_calibration
 from calibnet.datasets.images import read_image
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
+from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
 from calibnet.datasets.scans import SCAN_SUFFIXES
 from calibnet.errors import DatasetError
 
@@ -34,7 +35,7 @@ class Folder(PairedSequence):
                 ``calibration.yaml`` as `read_folder_calibration` describes it.
 
         Raises:
-            DatasetError: one of them is missing or malformed, or images and scans do not pair.
+            DatasetError: one of them is missing, malformed or cannot be right, or images and scans do not pair.
         """
         root = Path(root)
         layout = "a data folder holds images/, clouds/ and calibration.yaml"
@@ -43,6 +44,10 @@ class Folder(PairedSequence):
         scans = files_by_stem(require_folder(root / "clouds", layout), SCAN_SUFFIXES, "scans")
         check_paired(images, scans)
         self._file: FolderCalibration = read_folder_calibration(root / "calibration.yaml")
+        refuse(
+            [*of_camera(self._file.camera), *of_extrinsic(self._file.calibration.camera_from_lidar)],
+            f"Calibration {root / 'calibration.yaml'}",
+        )
         files = [
             FrameFiles(number, PERIOD * position, image, scans[stem])
             for position, (number, (stem, image)) in enumerate(zip(_numbers(list(images)), images.items(), strict=True))

@@ -10,7 +10,9 @@ import numpy as np
 import yaml
 
 from calibnet.datasets.calibration import Calibration, checked_intrinsics, checked_rigid
+from calibnet.datasets.unread_keys import in_words, unread_geometry
 from calibnet.errors import DatasetError
+from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Floats
 
 DISTORTION_LENGTHS = (4, 5, 8)
@@ -33,14 +35,19 @@ class FolderCalibration:
     calibration: Calibration
     distortion: Floats = field(repr=False)
 
+    @property
+    def camera(self) -> PinholeCamera:
+        """Of the pictures once they are rectified."""
+        return PinholeCamera(self.width, self.height, self.calibration.matrix)
+
 
 def read_folder_calibration(path: Path) -> FolderCalibration:
     """Read ``width``, ``height``, ``camera_matrix`` (3x3), ``distortion`` and ``camera_from_lidar`` (4x4).
 
-    Other keys are ignored.
+    Other keys are ignored, but for those that mean geometry elsewhere, see `calibnet.datasets.unread_keys`.
 
     Raises:
-        DatasetError: the file or a key is missing, or a value has the wrong form.
+        DatasetError: the file or a key is missing, a value has the wrong form, or geometry would go unread.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -52,9 +59,11 @@ def read_folder_calibration(path: Path) -> FolderCalibration:
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         where = getattr(error, "problem_mark", None)
         line = f" (line {where.line + 1})" if where is not None else ""
-        raise DatasetError(f"Calibration {path} is not valid YAML{line}; repair it.") from None
+        raise DatasetError(f"Calibration {path} is not valid YAML{line}; {_repair(path)}.") from None
     if not isinstance(content, dict):
         raise DatasetError(f"Calibration {path} is not a list of 'key: value' lines; repair it.")
+    if unread := unread_geometry(content):
+        raise DatasetError(f"Calibration {path} holds geometry that is not read: {in_words(unread)}.")
     matrix = _numbers(content, "camera_matrix", path, (3, 3))
     extrinsic = _numbers(content, "camera_from_lidar", path, (4, 4))
     distortion = _numbers(content, "distortion", path, *((length,) for length in DISTORTION_LENGTHS))
@@ -68,8 +77,15 @@ def read_folder_calibration(path: Path) -> FolderCalibration:
     )
 
 
+def _repair(path: Path) -> str:
+    """What to do about a file that is no YAML; OpenCV's ``FileStorage`` writes a dialect of its own."""
+    if path.read_bytes().startswith(b"%YAML:1.0"):
+        return "it is OpenCV's dialect, so remove its first line and write matrices as lists of rows"
+    return "repair it"
+
+
 def _value(content: dict[str, Any], key: str, path: Path) -> Any:
-    if key not in content:
+    if content.get(key) is None:
         hint = " ([0, 0, 0, 0, 0] for rectified images)" if key == "distortion" else ""
         raise DatasetError(f"Calibration {path} has no key '{key}'; add it{hint}.")
     return content[key]

@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from calibnet.datasets.plausibility import Implausible
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Extrinsic
 
@@ -26,6 +27,7 @@ class Frame:
         camera_from_lidar: the dataset's own extrinsic, 4x4 float64; the reference where the
             dataset is calibrated, a starting guess where the user's sensors are not yet.
         source: the image's path (or a description), to name in messages.
+        remarks: what is unlikely about it, though some sensor may be so: the first suspects when it does not fit.
     """
 
     index: int
@@ -35,6 +37,7 @@ class Frame:
     camera: PinholeCamera
     camera_from_lidar: Extrinsic = field(repr=False)
     source: str = ""
+    remarks: tuple[Implausible, ...] = ()
 
 
 class Frames(Protocol):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import read_image
+from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
 from calibnet.datasets.scans import read_scan
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
@@ -51,20 +52,25 @@ class PairedSequence(ABC):
         """Read one frame.
 
         Raises:
-            DatasetError: a file of it is missing, damaged, empty or malformed.
+            DatasetError: a file of it is missing, damaged, empty, malformed, or holds what cannot be right.
             IndexError: there is no such position.
         """
         files = self.files[position]
         calibration = self._calibration(files)
-        image = self._image(files)
+        image, points = self._image(files), read_scan(files.scan)
+        camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
+        extrinsic = calibration.camera_from_lidar
+        remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {files.image}")
+        remarks += refuse([bit_depth(image)], f"Image {files.image}") + refuse(of_scan(points), f"Scan {files.scan}")
         return Frame(
             index=files.index,
             timestamp=files.timestamp,
             image=image,
-            points=read_scan(files.scan),
-            camera=PinholeCamera(image.shape[1], image.shape[0], calibration.matrix),
-            camera_from_lidar=calibration.camera_from_lidar,
+            points=points,
+            camera=camera,
+            camera_from_lidar=extrinsic,
             source=str(files.image),
+            remarks=remarks,
         )
 
     @abstractmethod

@@ -17,6 +17,11 @@ POINT_BYTES = 16
 INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity", "scalar_reflectance", "i")
 """Names under which clouds store intensity, best first, in lower case."""
 
+INTENSITY_SCALES = (1.0, 255.0, 65535.0)
+"""Largest intensity by the way it is stored: a share, 8 bits, 16 bits."""
+BRIGHT_SHARE = 0.99
+"""Share of the points whose intensity has to fit."""
+
 
 def read_scan(path: Path) -> NDArray[np.float32]:
     """Read a scan of any supported format.
@@ -38,23 +43,27 @@ def read_scan(path: Path) -> NDArray[np.float32]:
 
 
 def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32]:
-    """Drop rows of ``[N, 4]`` that are not finite and bring intensity to 0..1.
+    """Drop rows of ``[N, 4]`` whose position is not finite and bring intensity to 0..1, 0 where it is not finite.
+
+    Intensity is a share, or stored as 8 or as 16 bits. Which of them most points tell: a reflector may shine beyond.
 
     Raises:
         DatasetError: nothing is left; the message names ``path``.
     """
     if len(points) == 0:
         raise DatasetError(f"Scan {path} is empty; remove the frame or record it again.")
-    finite = np.isfinite(points)
+    finite = np.isfinite(points[:, :3])
     if not finite.all():
         points = points[finite.all(axis=1)]
         if len(points) == 0:
             raise DatasetError(f"Scan {path} has no finite point (all NaN or infinite); remove the frame.")
     clean = np.array(points, dtype=np.float32)
-    brightest = clean[:, 3].max()
-    if brightest > 1.0:  # stored as 8 or as 16 bits
-        clean[:, 3] /= 255.0 if brightest <= 255.0 else 65535.0
-    np.clip(clean[:, 3], 0.0, 1.0, out=clean[:, 3])
+    intensity = clean[:, 3]
+    intensity[~np.isfinite(intensity)] = 0.0
+    if intensity.max() > 1.0:
+        bright = np.quantile(intensity, BRIGHT_SHARE, method="lower")
+        intensity /= next((scale for scale in INTENSITY_SCALES if bright <= scale), INTENSITY_SCALES[-1])
+    np.clip(intensity, 0.0, 1.0, out=intensity)
     return clean
 
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.plausibility import suspicion
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due, spread
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
@@ -164,9 +165,10 @@ def believed(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
         CalibrationError: they do not.
     """
     if look.match_error_px > limit_px:
+        usual = "check that they belong together and that the start is within the range of the first stage"
         raise CalibrationError(
             f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {look.number}, "
             f"which expects its matches to be {look.match_error_px:.1f} px off (at most {limit_px:g}): "
-            "check that they belong together and that the start is within the range of the first stage."
+            f"{suspicion(frame.remarks, usual)}."
         )
     return look

@@ -129,6 +129,34 @@ def test_intensity_is_brought_to_one(largest, divisor, write_layout):
     assert_allclose(layout.open()[1].points[:, 3], points[:, 3] / divisor, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("glint", "divisor"), [(4095.0, 255.0), (1e9, 255.0), (np.inf, 255.0), (7.0, 1.0)])
+def test_a_glint_leaves_the_other_intensities_as_they_are(glint, divisor, write_layout):
+    """A reflector overflows what the sensor's other points are stored in."""
+    layout = write_layout("folder")
+    points = layout.points[1].copy()
+    points[:, 3] = np.linspace(0, 0.98 * divisor, len(points))
+    points[7, 3] = glint
+    points.tofile(layout.scans[1])
+    expected = points[:, 3] / divisor
+    expected[7] = 0.0 if np.isinf(glint) else 1.0
+    assert_allclose(layout.open()[1].points[:, 3], expected, rtol=1e-6)
+
+
+def test_a_point_without_intensity_is_a_point(write_layout):
+    """Drivers of sensors without intensity leave it NaN."""
+    layout = write_layout("folder")
+    points = layout.points[1].copy()
+    points[::2, 3] = np.nan
+    points.tofile(layout.scans[1])
+    read = layout.open()[1].points
+    assert_array_equal(read[:, :3], points[:, :3])
+    assert_array_equal(read[::2, 3], 0.0)
+    assert_array_equal(read[1::2, 3], points[1::2, 3])
+    points[:, 3] = np.nan
+    points.tofile(layout.scans[1])
+    assert_array_equal(layout.open()[1].points[:, 3], 0.0)
+
+
 def brown(x: float, y: float, k: list[float]) -> tuple[float, float]:
     """OpenCV's distortion model, written out: k1 k2 p1 p2 [k3 [k4 k5 k6]]."""
     k1, k2, p1, p2, k3, k4, k5, k6 = [*k, *[0.0] * (8 - len(k))]
@@ -175,8 +203,8 @@ def test_lens_distortion_is_undone(coefficients, write_layout, write_calibration
 
 def test_image_of_another_size(write_layout, write_calibration):
     layout = write_layout("folder")
-    layout.calibration.write_text(write_calibration(width=640))
-    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 and calibration\.yaml is for 640x48"):
+    layout.calibration.write_text(write_calibration(width=80))
+    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 and calibration\.yaml is for 80x48"):
         layout.open()[0]
 
 

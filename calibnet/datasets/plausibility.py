@@ -1,0 +1,224 @@
+"""Checks that cost nothing: whether a camera matrix, an extrinsic, a scan or a picture can be what it is taken to be.
+
+Each returns what cannot be right in one sentence, with a short name for machines, or None. What no sensor could have is
+refused as it is read (`refuse`); what some sensor might have is kept beside the frame, and is the first suspect when
+picture and scan do not fit (`suspicion`). The limits leave out no sensor that we know of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.errors import ImplausibleError
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.types import Extrinsic
+
+VIEW_DEG = (8.0, 150.0)
+"""Angle across the picture; beyond the second a pinhole camera spends its pixels on the corners."""
+SQUARE, STRETCHED = 1.25, 2.5
+"""Ratio of the focal lengths of pictures with square pixels, and of pictures that were resized to another shape."""
+MIDDLE, CROPPED = (0.25, 0.75), (-0.5, 1.5)
+"""Shares of width and height where the principal point lies, and where it may lie after a picture was cropped."""
+SAME_SHAPE, OTHER_SIZE, SURELY_OTHER = 0.1, 1.35, 1.8
+"""A matrix is of another size where its factors across and down are alike within the first, and exceed the second."""
+NEAREST_M, FARTHEST_M = 0.5, 250.0
+"""Half of a scan's points are farther, and nearer, than this."""
+LONGEST_ARM_M = 30.0
+"""Between camera and LiDAR; a lorry is 20 m long."""
+STEEP = 0.9
+"""Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
+FLAT = 0.4
+"""A scene is this much lower than it is wide, whatever it is; else z is not up."""
+GREY_LEVELS = 24
+"""A picture that shines no brighter than this has lost its upper bits."""
+WRAPPED, GREY = 0.01, 0.3
+"""Shares of neighbouring pixels half the range apart, and of grey pixels, where upper bits were cut off. Real pictures
+have 0.0005 of the former; 10 or 12 bits cut to their lower eight have 0.01 to 0.2, and black and white is not grey."""
+ENOUGH_POINTS, ROW_STEP = 10_000, 8
+"""Points of a scan, and rows of a picture from one to the next, that are looked at."""
+
+
+@dataclass(frozen=True)
+class Implausible:
+    """Something that cannot be right, or hardly.
+
+    Attributes:
+        name: ``focal-length``, ``principal-point``, ``picture-size``, ``units``, ``axes`` or ``bit-depth``.
+        text: a sentence without its full stop: what is seen; what to do.
+        certain: whether no sensor has it, so that the input is refused.
+    """
+
+    name: str
+    text: str
+    certain: bool = False
+
+
+def refuse(found: Iterable[Implausible | None], where: str | Path) -> tuple[Implausible, ...]:
+    """What is unlikely.
+
+    Raises:
+        ImplausibleError: something is certainly wrong; the message names ``where`` it was found.
+    """
+    remarks = tuple(remark for remark in found if remark is not None)
+    for remark in remarks:
+        if remark.certain:
+            raise ImplausibleError(f"{where}: {remark.text}.", remark.name)
+    return remarks
+
+
+def suspicion(remarks: Iterable[Implausible], otherwise: str) -> str:
+    """What to check when picture and scan do not fit: what is unlikely about them, or what usually is wrong."""
+    return ", or ".join(remark.text for remark in remarks) or otherwise
+
+
+def of_camera(camera: PinholeCamera) -> list[Implausible | None]:
+    """All checks of a camera matrix against its picture; the first that finds something is the best explanation."""
+    return [focal_length(camera) or pixel_shape(camera), picture_size(camera) or principal_point(camera)]
+
+
+def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:
+    """All checks of an extrinsic."""
+    return [arm(camera_from_lidar), viewing_direction(camera_from_lidar)]
+
+
+def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
+    """All checks of a scan ``[N, 4]``."""
+    return [ranges(points), up(points)]
+
+
+def focal_length(camera: PinholeCamera) -> Implausible | None:
+    """Against the width of the picture."""
+    focal, width = camera.focal[0], camera.width
+    view = float(np.degrees(2 * np.arctan(width / 2 / focal)))
+    if VIEW_DEG[0] <= view <= VIEW_DEG[1]:
+        return None
+    guess = "give it in pixels"
+    if focal < 5:
+        guess = f"it seems to be a share of the width, so multiply by that ({focal * width:.0f} px)"
+    elif focal < 100:
+        guess = "it seems to be in millimetres, so divide it by the size of a pixel on the sensor"
+    text = f"the focal length {focal:g} px of a picture {width} px wide would see {view:.0f} degrees; {guess}"
+    return Implausible("focal-length", text, certain=True)
+
+
+def pixel_shape(camera: PinholeCamera) -> Implausible | None:
+    """One focal length against the other."""
+    ratio = camera.focal[0] / camera.focal[1]
+    if 1 / SQUARE <= ratio <= SQUARE:
+        return None
+    text = (
+        f"the focal lengths {camera.focal[0]:g} and {camera.focal[1]:g} px make pixels {ratio:.2g} times as high as "
+        "wide; unless the picture was resized to another shape, give the same units for both"
+    )
+    return Implausible("focal-length", text, certain=not 1 / STRETCHED <= ratio <= STRETCHED)
+
+
+def picture_size(camera: PinholeCamera) -> Implausible | None:
+    """The principal point lies in the middle, but of a picture of another size."""
+    across, down = 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height
+    factor = (max(across, 0.0) * max(down, 0.0)) ** 0.5
+    if not factor or abs(across / down - 1) > SAME_SHAPE or 1 / OTHER_SIZE < factor < OTHER_SIZE:
+        return None
+    text = (
+        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is the middle of a picture of about "
+        f"{2 * camera.center[0]:.0f}x{2 * camera.center[1]:.0f}, and this one is {camera.width}x{camera.height}; "
+        "scale the camera matrix by the factor that the picture was resized by"
+    )
+    return Implausible("picture-size", text, certain=not 1 / SURELY_OTHER < factor < SURELY_OTHER)
+
+
+def principal_point(camera: PinholeCamera) -> Implausible | None:
+    """In the middle of the picture, more or less."""
+    shares = camera.center[0] / camera.width, camera.center[1] / camera.height
+    if all(MIDDLE[0] <= share <= MIDDLE[1] for share in shares):
+        return None
+    text = (
+        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is far from the middle of a picture of "
+        f"{camera.width}x{camera.height}; unless the picture was cropped, give the camera matrix of this very size"
+    )
+    return Implausible("principal-point", text, certain=not all(CROPPED[0] <= share <= CROPPED[1] for share in shares))
+
+
+def arm(camera_from_lidar: Extrinsic) -> Implausible | None:
+    """The distance of camera and LiDAR."""
+    metres = float(np.linalg.norm(camera_from_lidar[:3, 3]))
+    if metres <= LONGEST_ARM_M:
+        return None
+    text = f"camera_from_lidar puts {metres:.0f} m between camera and LiDAR; give its translation in metres"
+    return Implausible("units", text, certain=True)
+
+
+def viewing_direction(camera_from_lidar: Extrinsic) -> Implausible | None:
+    """Whether the camera looks about horizontally, and is not on its side only because the matrix is the inverse."""
+    towards_up = float(camera_from_lidar[2, 2])
+    if abs(towards_up) > STEEP:
+        text = (
+            f"under camera_from_lidar the camera looks straight {'up' if towards_up > 0 else 'down'}, along the "
+            "LiDAR's z axis; map x forward, y left, z up to x right, y down, z forward, which for a camera that looks ahead is "
+            "[0, -1, 0], [0, 0, -1], [1, 0, 0]"
+        )
+        return Implausible("axes", text)
+    if abs(camera_from_lidar[0, 2]) > STEEP and -camera_from_lidar[2, 1] > STEEP:
+        text = (
+            "under camera_from_lidar the camera lies on its side, under its inverse it stands upright; if it is "
+            "lidar_from_camera, invert it"
+        )
+        return Implausible("axes", text)
+    return None
+
+
+def ranges(points: NDArray[np.float32]) -> Implausible | None:
+    """How far away the points are, in metres if all is well."""
+    middle = float(np.median(np.linalg.norm(some(points).astype(np.float64), axis=1)))
+    if NEAREST_M <= middle <= FARTHEST_M:
+        return None
+    seen = f"half of its points are more than {middle:.3g} m away" if middle > FARTHEST_M else (
+        f"half of its points are within {100 * middle:.3g} cm"
+    )  # fmt: skip
+    guess = "they seem to be in kilometres or scaled, so give metres"
+    if middle > FARTHEST_M:
+        guess = "they seem to be in millimetres or centimetres, or of a map, so give metres from the LiDAR"
+    return Implausible("units", f"{seen}; {guess}", certain=True)
+
+
+def up(points: NDArray[np.float32]) -> Implausible | None:
+    """Which axis of the scan is the vertical: the world is wider than high."""
+    low, high = np.percentile(some(points), (10, 90), axis=0)
+    spread = np.maximum(high - low, 1e-6)
+    flattest = int(spread.argmin())
+    if flattest == 2 or spread[flattest] > FLAT * spread[2]:
+        return None
+    text = (
+        f"the scan is flattest along its {'xy'[flattest]} axis ({spread[flattest]:.1f} m; {spread[2]:.1f} m along z); "
+        "give points with x forward, y left and z up"
+    )
+    return Implausible("axes", text)
+
+
+def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
+    """Whether a picture ``[H, W, 3]`` lost its upper or its lower bits on the way to eight."""
+    rows = image[::ROW_STEP, :, 1].astype(np.int16)
+    if 0 < rows.max() <= GREY_LEVELS:
+        text = (
+            f"no pixel is brighter than {rows.max()} of 255; if the camera gives 10 or 12 bits, "
+            "shift the picture's values up before they are cut to eight"
+        )
+        return Implausible("bit-depth", text)
+    jumps = float((np.abs(np.diff(rows, axis=1)) > 128).mean())
+    if jumps < WRAPPED or float(((rows > 64) & (rows < 192)).mean()) < GREY:
+        return None
+    text = (
+        "neighbouring pixels jump from black to white as where upper bits were cut off; "
+        "if the camera gives 10 or 12 bits, shift the picture's values down before they are cut to eight"
+    )
+    return Implausible("bit-depth", text)
+
+
+def some(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Enough of the positions ``[N, 3]`` for a median."""
+    return points[:: max(1, len(points) // ENOUGH_POINTS), :3]
