@@ -59,6 +59,22 @@ class StageDetail:
 
 
 @dataclass(frozen=True, eq=False)
+class Matches:
+    """Where one look finds the scan in the picture: the occupied cells of its finest scale, row by row.
+
+    Attributes:
+        points: ``[N, 3]`` float32 metres, the nearest point of each cell in the camera frame before the correction.
+        displacement: ``[N, 2]`` float32 pixels ``(dx, dy)`` of the stage's camera, from where a point is projected to
+            where it is found.
+        scale: ``[N, 2]`` float32, what absolute error the network expects of each.
+    """
+
+    points: NDArray[np.float32] = field(repr=False)
+    displacement: NDArray[np.float32] = field(repr=False)
+    scale: NDArray[np.float32] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
 class StageTrace:
     """One stage of the cascade on one frame.
 
@@ -74,6 +90,8 @@ class StageTrace:
             network states it, or None from a head that does not.
         detail: intermediate results of its first round, or None when they were not asked for.
         match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
+        matches: of its last look, relative to `looked_from`; None where a trace was made without.
+        last_before: ``camera_from_lidar`` that its last look started from; None where that is ``before``.
     """
 
     number: int
@@ -86,6 +104,13 @@ class StageTrace:
     information: Matrix6 | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
     match_error_px: float = math.nan
+    matches: Matches | None = field(default=None, repr=False)
+    last_before: Extrinsic | None = field(default=None, repr=False)
+
+    @property
+    def looked_from(self) -> Extrinsic:
+        """``camera_from_lidar`` that its last look started from, 4x4."""
+        return self.before if self.last_before is None else self.last_before
 
     def followed_by(self, again: StageTrace) -> StageTrace:
         """This and a second round of the same stage as one; the detail stays that of the first look."""
@@ -97,6 +122,8 @@ class StageTrace:
             milliseconds={part: self.milliseconds.get(part, 0.0) + again.milliseconds.get(part, 0.0) for part in parts},
             information=again.information,
             match_error_px=again.match_error_px,
+            matches=again.matches,
+            last_before=again.looked_from,
         )
 
 

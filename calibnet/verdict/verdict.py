@@ -1,0 +1,121 @@
+"""What may be said of a calibration: accepted, rejected or cannot tell, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from calibnet.geometry import pose_error
+from calibnet.geometry.types import Extrinsic, Matrix6
+
+Word = Literal["accepted", "rejected", "cannot tell"]
+ACCEPTED: Word = "accepted"
+REJECTED: Word = "rejected"
+CANNOT_TELL: Word = "cannot tell"
+
+CAUSES = (
+    "focal-length",
+    "principal-point",
+    "distortion",
+    "lens-model",
+    "roll",
+    "mirrored",
+    "other-picture",
+    "time-offset",
+    "accumulated",
+    "units",
+    "axes",
+    "left-handed",
+    "bit-depth",
+    "picture-size",
+)
+"""Names of what can be wrong with input, as JSON has them."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What is likely to be wrong with the input.
+
+    Attributes:
+        name: one of `CAUSES`.
+        text: a sentence for the user.
+        evidence: what was measured that says so.
+    """
+
+    name: str
+    text: str
+    evidence: str
+
+    def as_dict(self) -> dict[str, str]:
+        """The form that JSON files hold."""
+        return {"name": self.name, "text": self.text, "evidence": self.evidence}
+
+
+@dataclass(frozen=True)
+class SkippedFrame:
+    """A frame of a drive that was left out, and why."""
+
+    frame: int
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What may be said of a calibration.
+
+    Attributes:
+        word: accepted, rejected or cannot tell.
+        reason: a sentence for the user.
+        camera_from_lidar: the extrinsic that is judged, 4x4.
+        moved: rotation in degrees and translation in centimetres from the start to there.
+        causes: what is likely to be wrong with the input, the likeliest first.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, None where there is nothing to state it from.
+        used: number of frames judged.
+        skipped: frames that were left out.
+    """
+
+    word: Word
+    reason: str
+    camera_from_lidar: Extrinsic = field(repr=False)
+    moved: tuple[float, float] = (0.0, 0.0)
+    causes: tuple[Cause, ...] = ()
+    covariance: Matrix6 | None = field(default=None, repr=False)
+    used: int = 1
+    skipped: tuple[SkippedFrame, ...] = ()
+
+    @property
+    def sigma_rotation_deg(self) -> float | None:
+        """Standard deviation of the rotation over all axes."""
+        return None if self.covariance is None else float(np.degrees(np.sqrt(np.trace(self.covariance[3:, 3:]))))
+
+    @property
+    def sigma_translation_cm(self) -> float | None:
+        """Standard deviation of the translation over all axes."""
+        return None if self.covariance is None else float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The object that JSON files hold for a verdict, wherever it stands."""
+        sigma = None
+        if self.covariance is not None:
+            sigma = {
+                "rotation_deg": self.sigma_rotation_deg,
+                "translation_cm": self.sigma_translation_cm,
+                "covariance": self.covariance.tolist(),
+            }
+        return {
+            "verdict": self.word,
+            "reason": self.reason,
+            "causes": [cause.as_dict() for cause in self.causes],
+            "camera_from_lidar": self.camera_from_lidar.tolist(),
+            "moved": {"rotation_deg": self.moved[0], "translation_cm": self.moved[1]},
+            "sigma": sigma,
+            "frames": {"used": self.used, "skipped": [vars(skipped) for skipped in self.skipped]},
+        }
+
+
+def moved(initial: Extrinsic, final: Extrinsic) -> tuple[float, float]:
+    """Rotation in degrees and translation in centimetres, as `calibnet.geometry.pose_error` measures them."""
+    error = pose_error(final, initial)
+    return error.rotation_deg, error.translation_cm
