@@ -161,7 +161,7 @@ def blurred(pixels: float) -> Alteration:
 
 def exposed(gain: float) -> Alteration:
     """Expose the picture so many times as long; what is too bright is white."""
-    return lambda frame: replace(frame, image=np.minimum(frame.image * gain, 255.0).astype(np.uint8))
+    return lambda frame: replace(frame, image=np.minimum(frame.image * np.float32(gain), 255).astype(np.uint8))
 
 
 def mirrored(frame: Frame) -> Frame:

@@ -160,7 +160,7 @@ def lens(focal: float = 1.0, right: float = 0.0, down: float = 0.0) -> Callable[
 
 
 def rectified(bend: Callable[[Floats], Floats]) -> Callable[[Frame], Frame]:
-    """Undo a lens that shows at ``bend(r)`` what a pinhole shows at ``r``, in focal lengths from the principal point."""
+    """Undo a lens that shows at ``bend(r)`` what a pinhole shows at ``r``, in focal lengths from the centre."""
 
     def undo(frame: Frame) -> Frame:
         camera = frame.camera
@@ -215,7 +215,9 @@ def _lenses() -> Iterator[Attempt]:
 
 
 PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=25.0, unit="px of expected match error")
-"""By the match error of a coarse stage. Of 4 frames of 4 rigs, a mirrored picture and other axes undone came to 0.13..0.5
-of it, a rolled picture to 0.3..0.6; the best wrong attempt for a picture of another place to 0.5, and otherwise to 0.8."""
+"""By the match error of a coarse stage. Of 4 frames of 4 rigs, a mirrored picture and other axes undone came to 0.13 to
+0.5 of it, a rolled picture to 0.3 to 0.6; the best wrong attempt for a picture of another place to 0.5 once, and
+otherwise to 0.8 and more."""
 LENSES = Search(tuple(_lenses()), share=0.85, most=np.inf, unit="of misfit a match")
-"""By the misfit of the last stage's matches."""
+"""By the misfit of the last stage's matches. Where picture and scan fit well, the right attempt came to 0.35 to 0.82 of
+what was given, and the best wrong one of a frame without fault to 1.17 (2 frames)."""

@@ -14,7 +14,7 @@ from calibnet.trace import StageTrace
 
 INDEPENDENT = 1 / 20
 """Share of the matches that err independently."""
-COMMON_TRANSLATION_M, COMMON_ROTATION_DEG = 0.06, 0.3
+COMMON_TRANSLATION_M, COMMON_ROTATION_DEG = 0.068, 0.29
 """Standard deviation, an axis, of what does not follow from the matches' own errors."""
 PIXEL = 2.0
 """Expected match error, in pixels, at which the common part is that large; it grows in proportion."""

@@ -1,4 +1,4 @@
-"""Matches fitted with more than a pose: the focal length, the principal point, the lens that the camera may really have.
+"""Matches fitted with more than a pose: the focal length, principal point and lens that the camera may really have.
 
 A wrong camera matrix lets matches fit under a pose that is not believable: a focal length that is too long looks like a
 camera farther back. With the pose held near the guess by the range that was searched, fitting what else can be wrong

@@ -66,14 +66,12 @@ class Witnesses:
         earlier_error: likewise of the stage before it.
         misfit: logarithm of the last stage's `misfit`.
         reach: how far the run went, in ranges searched.
-        lens_gain: what the lens that explains the last matches best gains over a pose alone, as ``log(1 + gain)``.
     """
 
     match_error: float
     earlier_error: float
     misfit: float
     reach: float
-    lens_gain: float
 
 
 def witnesses(trace: CascadeTrace, again: StageTrace | None = None) -> Witnesses:
@@ -90,7 +88,6 @@ def witnesses(trace: CascadeTrace, again: StageTrace | None = None) -> Witnesses
         earlier_error=math.log(earlier.match_error_px),
         misfit=math.log(max(misfit(last), 1e-6)),
         reach=reach(trace.initial, trace.stages[-1].after, trace.stages[0].range).share,
-        lens_gain=math.log1p(max(0.0, lens_gain(last))),
     )
 
 
@@ -106,7 +103,7 @@ def misfit(stage: StageTrace) -> float:
 
 
 def lens_gain(stage: StageTrace) -> float:
-    """By how much a wrong lens explains a stage's last matches better than a pose alone, as a logarithm of likelihood."""
+    """What the best lens of another kind gains over a pose alone with a stage's last matches, as a log likelihood."""
     if stage.matches is None or not len(stage.matches.points):
         return math.nan
     alone = _fit(stage, PINHOLE).cost

@@ -84,6 +84,13 @@ def test_bytes_of_a_picture_with_more_bits() -> None:
     assert (low // 16 == image % 16).all()  # 12 bits are 16 times as bright, and go round after 16 steps
 
 
+def test_an_over_exposed_picture_is_white_where_it_was_bright() -> None:
+    image = np.full((4, 4, 3), 30, np.uint8)
+    image[0] = 100
+    exposed = faults.exposed(4)(replace(FRAME, image=image)).image
+    assert (exposed[0] == 255).all() and (exposed[1:] == 120).all()
+
+
 def test_scans_in_other_units_axes_and_hands() -> None:
     points = np.array([[10.0, 2.0, -1.0, 0.5]], np.float32)
     frame = replace(FRAME, points=points)

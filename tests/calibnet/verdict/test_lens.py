@@ -50,7 +50,7 @@ def equidistant(places: np.ndarray) -> np.ndarray:
     ("name", "bend", "found"),
     [
         ("focal-length", lambda places: 1.05 * places, lambda one: (one.focal - 1, 0.05, 0.003)),
-        ("principal-point", lambda places: places + [0.05, 0.0], lambda one: (one.center[0] / 580, 0.05, 0.005)),
+        ("principal-point", lambda places: places + np.eye(2)[0] / 20, lambda one: (one.center[0] / 580, 0.05, 0.005)),
         ("distortion", by_radius(-0.15), lambda one: (one.radial, -0.15, 0.01)),
         ("lens-model", equidistant, lambda one: (one.focal, 1.0, 1e-9)),
     ],
