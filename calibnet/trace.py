@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import MiscalibrationRange, PinholeCamera, invert
+from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
 
@@ -63,6 +63,22 @@ class StageDetail:
 
 
 @dataclass(frozen=True, eq=False)
+class Matches:
+    """Where one look finds the scan in the picture: the occupied cells of its finest scale, row by row.
+
+    Attributes:
+        points: ``[N, 3]`` float32 metres, the nearest point of each cell in the camera frame before the correction.
+        displacement: ``[N, 2]`` float32 pixels ``(dx, dy)`` of the stage's camera, from where a point is projected to
+            where it is found.
+        scale: ``[N, 2]`` float32, what absolute error the network expects of each.
+    """
+
+    points: NDArray[np.float32] = field(repr=False)
+    displacement: NDArray[np.float32] = field(repr=False)
+    scale: NDArray[np.float32] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
 class StageTrace:
     """One stage of the cascade on one frame.
 
@@ -78,6 +94,8 @@ class StageTrace:
             network states it, or None from a head that does not.
         detail: intermediate results of its first round, or None when they were not asked for.
         match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
+        matches: of its last look, relative to `looked_from`; None where a trace was made without.
+        last_before: ``camera_from_lidar`` that its last look started from; None where that is ``before``.
     """
 
     number: int
@@ -90,6 +108,13 @@ class StageTrace:
     information: Matrix6 | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
     match_error_px: float = math.nan
+    matches: Matches | None = field(default=None, repr=False)
+    last_before: Extrinsic | None = field(default=None, repr=False)
+
+    @property
+    def looked_from(self) -> Extrinsic:
+        """``camera_from_lidar`` that its last look started from, 4x4."""
+        return self.before if self.last_before is None else self.last_before
 
     def followed_by(self, again: StageTrace) -> StageTrace:
         """This and a second round of the same stage as one; the detail stays that of the first look."""
@@ -101,6 +126,8 @@ class StageTrace:
             milliseconds={part: self.milliseconds.get(part, 0.0) + again.milliseconds.get(part, 0.0) for part in parts},
             information=again.information,
             match_error_px=again.match_error_px,
+            matches=again.matches,
+            last_before=again.looked_from,
         )
 
 
@@ -133,11 +160,6 @@ class CascadeTrace:
     def arrived(self) -> Extrinsic:
         """``camera_from_lidar`` after the last stage, whether or not it is believed."""
         return self.stages[-1].after if self.stages else self.initial
-
-    @property
-    def stayed(self) -> bool:
-        """Whether that lies within the range that was searched."""
-        return self.searched is None or self.searched.contains(self.arrived @ invert(self.initial), MARGIN)
 
     @property
     def fits(self) -> bool:

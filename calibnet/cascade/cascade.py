@@ -12,14 +12,17 @@ from calibnet.cascade.image_views import ImageViews, image_branches
 from calibnet.cascade.stage import Stage, load_stage
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
-from calibnet.errors import ConfigError, WeightsError
+from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.network.config import load_preset
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
 from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
-from calibnet.verdict.judge import judge, judge_drive
+from calibnet.verdict.causes import match_error_of, misfit_of
+from calibnet.verdict.drive import judge_drive
+from calibnet.verdict.judge import judge
+from calibnet.verdict.verdict import ACCEPTED, Verdict
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
 
 
@@ -101,7 +104,7 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
+        clock, limit, last = Clock(self.device), self.stages[-1].match_error_limit_px, self.stages[-1]
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(frame, clock)
             trace = CascadeTrace(initial, self._run(self.stages, views, initial, detail), clock.parts, limit)
@@ -109,7 +112,26 @@ class Cascade:
                 before = self._run(wider, views, initial)
                 stages = self._run(self.stages, views, before[-1].after, detail)
                 trace = CascadeTrace(initial, stages, clock.parts, limit, before)
-        return replace(trace, verdict=judge(trace))
+            view = views.of(last, self.image_branches[len(self.stages) - 1])
+            again = last.look(frame, view, trace.arrived) if trace.fits else None
+        return replace(trace, verdict=judge(frame, initial, trace, again))
+
+    def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
+        """The verdict on a frame with its causes: what, undone in the input, makes picture and scan fit.
+
+        This runs stages some thirty times, for frames whose verdict in `calibrate` is not accepted.
+
+        Args:
+            frame: image, scan and camera; its own extrinsic is not looked at.
+            initial: ``camera_from_lidar`` to start from.
+        """
+        try:
+            trace = self.calibrate(frame, initial)
+        except CalibrationError:
+            trace = None
+        if trace is not None and trace.verdict is not None and trace.verdict.word == ACCEPTED:
+            return trace.verdict
+        return judge(frame, initial, trace, None, match_error_of(self.stages[0]), misfit_of(self.calibrate))
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -125,12 +147,10 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        stages = self.stages
-        estimate = solve_drive(stages, frames, initial, self.common, observer)
+        estimate = solve_drive(self.stages, frames, initial, self.common, observer)
         if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
-            stages = [*wider, *self.stages]
-            estimate = solve_drive(stages, frames, initial, self.common, observer)
-        return replace(estimate, verdict=judge_drive(estimate, initial, stages[0].range, MARGIN))
+            estimate = solve_drive([*wider, *self.stages], frames, initial, self.common, observer)
+        return replace(estimate, verdict=judge_drive(estimate, initial, self.stages[0].range))
 
     def _run(
         self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from calibnet.cascade.stage_detail import stage_detail
@@ -21,11 +22,11 @@ from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_fin
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.network.batch import Cut, lidar_input, make_batch
 from calibnet.network.convolution import pack
-from calibnet.network.displacement import expected_error
+from calibnet.network.displacement import DisplacementField, expected_error
 from calibnet.network.network import CalibrationNetwork, NetworkOutput
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast, fastest
-from calibnet.trace import StageTrace
+from calibnet.trace import Matches, StageTrace
 from calibnet.weights import load_network
 from calibnet.weights.manifest import Manifest, StageSettings
 
@@ -140,6 +141,7 @@ class Stage:
             None if output.pose.information is None else output.pose.information[0].double().cpu().numpy(),
             stage_detail(self.network.config, lidar, cut, output) if detail else None,
             float(expected_error(output.field, inputs.cells[0])[0]),
+            matches_of(output.field, inputs.cells[0]),
         )
 
     def is_settled(self, correction: Transform) -> bool:
@@ -151,6 +153,16 @@ class Stage:
         """The correction of a batch of one, extended by the stage's gain."""
         estimate: Transform = output.pose.correction[0].double().cpu().numpy()
         return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
+
+
+def matches_of(found: DisplacementField, cells: Tensor) -> Matches:
+    """The matches of a batch of one, of the cells ``[1, 3, h, w]`` that hold a point."""
+    occupied = cells[0, 2] > 0
+
+    def picked(grid: Tensor) -> NDArray[np.float32]:
+        return grid[0].float()[:, occupied].T.contiguous().cpu().numpy()
+
+    return Matches(picked(cells), picked(found.displacement), picked(found.log_scale.exp()))
 
 
 def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:

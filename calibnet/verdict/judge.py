@@ -1,46 +1,98 @@
-"""The verdict on a calibrated frame, and on a drive."""
+"""The verdict on one frame: cheap checks first, then what the run itself tells, then, where that was asked for, why."""
 
 from __future__ import annotations
 
-from calibnet.geometry import MiscalibrationRange, invert
+import math
+
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.plausibility import Implausible, bit_depth, of_camera, of_extrinsic, of_scan
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import CascadeTrace, DriveEstimate
-from calibnet.verdict.verdict import ACCEPTED, REJECTED, Verdict, moved
+from calibnet.trace import MARGIN, CascadeTrace, StageTrace
+from calibnet.verdict.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
+from calibnet.verdict.covariance import covariance
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
+from calibnet.verdict.witnesses import Doubt, load_doubt, reach, witnesses
+
+FARTHEST_REACH = 1.6
+"""Ranges searched beyond which a run is surely wrong; between `MARGIN` and this it may have started outside them."""
+UNRELATED_PX = 8.0
+"""Expected match error beyond which nothing in the picture belongs to the scan."""
+BLANK = 2.0
+"""Standard deviation of grey levels under which a picture shows nothing."""
 
 
-def judge(trace: CascadeTrace) -> Verdict:
-    """Whether what the stages found on one frame is good."""
+def judge(
+    frame: Frame,
+    guess: Extrinsic,
+    trace: CascadeTrace | None,
+    again: StageTrace | None = None,
+    match_error: Measure | None = None,
+    misfit: Measure | None = None,
+    doubt: Doubt | None = None,
+) -> Verdict:
+    """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
+
+    Args:
+        frame: that was calibrated.
+        guess: ``camera_from_lidar`` that it started from, 4x4.
+        trace: of the run; None where it could not be run because too few points fall into the picture.
+        again: one more look of the last stage from where the run arrived; without it less is accepted.
+        match_error: where picture and scan do not fit, finds out why by `calibnet.verdict.causes.PICTURE_AND_SCAN`.
+        misfit: where they fit, but not well enough, finds out why by `calibnet.verdict.causes.LENSES`.
+        doubt: how witnesses are summed up; by default as it was fitted to the weights that ship with the package.
+    """
+    checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan(frame.points), bit_depth(frame.image)]
+    remarks = [remark for remark in checks if remark is not None]
+    suspects = tuple(map(_suspect, remarks))
+
+    def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
+        return suspects or (() if measure is None else cause(search, frame, guess, measure))
+
+    if trace is None or not trace.stages:
+        causes = why(PICTURE_AND_SCAN, match_error)
+        reason = "Hardly any point of the scan falls into the picture under the extrinsic that the run started from."
+        return Verdict(REJECTED, _because(reason, causes), guess, causes=causes)
+
     last = trace.stages[-1]
-    word, reason = ACCEPTED, "Picture and scan fit together."
+
+    def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
+        going = moved(trace.initial, last.after)
+        return Verdict(word, _because(reason, causes), last.after, going, causes, covariance(last))
+
+    if float(frame.image.std()) < BLANK:
+        return verdict(REJECTED, "The picture shows nothing.")
+    if any(remark.certain for remark in remarks):
+        return verdict(REJECTED, "The input is not plausible.", suspects)
     if not trace.fits:
-        word, reason = (
-            REJECTED,
-            (
-                f"Picture and scan do not fit together after stage {last.number}, which expects its matches to be "
-                f"{last.match_error_px:.1f} px off (at most {trace.match_error_limit_px:g})."
-            ),
+        reason = (
+            f"Picture and scan do not fit together: matches are expected to be {last.match_error_px:.1f} px off, "
+            f"at most {trace.match_error_limit_px:g} px are usual."
         )
-    elif not trace.stayed:
-        assert trace.searched is not None
-        turned, shifted = moved(trace.initial, trace.arrived)
-        word, reason = (
-            REJECTED,
-            (
-                f"It moved by {turned:.2g}° and {shifted:.0f} cm, out of the range that was searched, "
-                f"{trace.searched.label}."
-            ),
-        )
-    return Verdict(word, reason, trace.arrived, moved(trace.initial, trace.arrived))
+        causes = why(PICTURE_AND_SCAN, match_error)
+        if not causes and match_error is not None and last.match_error_px > UNRELATED_PX:
+            text = "They seem to be of different places, or the start is far outside the range searched."
+            causes = (Cause("other-picture", text, f"{last.match_error_px:.1f} px, and nothing tried makes them fit"),)
+        return verdict(REJECTED, reason, causes)
+    gone = reach(trace.initial, last.after, trace.stages[0].range)
+    if gone.share > MARGIN:
+        word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
+        return verdict(word, f"The LiDAR {gone}.", why(LENSES, misfit))
+
+    doubt = doubt or load_doubt(again is not None)
+    wrong = doubt(witnesses(trace, again))
+    if wrong < doubt.accepted_below:
+        return verdict(ACCEPTED, f"Picture and scan fit together (match error {last.match_error_px:.1f} px).")
+    if math.isnan(wrong):
+        return verdict(CANNOT_TELL, "What the network tells of its matches is not enough to judge them.", suspects)
+    reason = f"Picture and scan fit, but not as well as in runs that end right (an error is {wrong:.0%} likely)."
+    return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why(LENSES, misfit))
 
 
-def judge_drive(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, margin: float) -> Verdict:
-    """Whether the extrinsic that was solved from a drive is good."""
-    there, skipped = estimate.camera_from_lidar, estimate.skipped
-    turned, shifted = moved(initial, there)
-    word, reason = ACCEPTED, f"{estimate.frames} frames agree."
-    if not searched.contains(there @ invert(initial), margin):
-        word, reason = (
-            REJECTED,
-            (f"It moved by {turned:.2g}° and {shifted:.0f} cm, out of the range that was searched, {searched.label}."),
-        )
-    return Verdict(word, reason, there, (turned, shifted), (), estimate.covariance, estimate.frames, skipped)
+def _suspect(remark: Implausible) -> Cause:
+    """What is unlikely about a frame, as a cause."""
+    return Cause(remark.name, f"{remark.text[0].upper()}{remark.text[1:]}.", "the numbers as they were given")
+
+
+def _because(reason: str, causes: tuple[Cause, ...]) -> str:
+    """The reason, and the likeliest cause."""
+    return f"{reason} {causes[0].text}" if causes else reason

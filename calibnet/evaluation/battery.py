@@ -1,0 +1,183 @@
+"""Does it know when it is wrong? Faults are put into frames, and verdicts held against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Sequence as FrameSequence
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.corruptions import Corruption, unaltered
+from calibnet.evaluation.runner import draw_miscalibration
+from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import Calibrator
+from calibnet.trace import CascadeTrace
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, Verdict
+
+FRAME_LIMITS, DRIVE_LIMITS = (1.0, 25.0), (0.3, 8.0)
+"""Degrees and centimetres beyond which the extrinsic of a frame, and of a drive, is wrong."""
+PLAIN = Corruption("none", "", None, unaltered, middle=False)
+"""Input as it should be."""
+
+Judge = Callable[[Frame, Extrinsic, CascadeTrace | None], Verdict]
+"""Gives the verdict on a frame, the guess it was calibrated from, and the trace; None where it could not be run."""
+
+
+@dataclass(frozen=True)
+class BatteryRun:
+    """One verdict on one frame with one fault.
+
+    Attributes:
+        corruption: the fault; `PLAIN` where there is none.
+        error: of the extrinsic that was judged.
+        word: of the verdict.
+        causes: names of the causes that it gives.
+    """
+
+    corruption: Corruption
+    error: PoseError
+    word: str
+    causes: tuple[str, ...] = ()
+
+    def is_right(self, limits: tuple[float, float] = FRAME_LIMITS) -> bool:
+        """Whether the extrinsic is within limits of degrees and centimetres."""
+        return self.error.rotation_deg <= limits[0] and self.error.translation_cm <= limits[1]
+
+
+@dataclass(frozen=True)
+class BatteryRow:
+    """The runs with one fault at one strength, counted by what was said of them.
+
+    Attributes:
+        corruption, strength: which fault.
+        runs: how many.
+        accepted_right: accepted, and within limits.
+        accepted_wrong: accepted, though not within limits.
+        rejected, cannot_tell: the others.
+        cause_right: not accepted, and the fault's cause is among those given.
+    """
+
+    corruption: str
+    strength: str
+    runs: int
+    accepted_right: int
+    accepted_wrong: int
+    rejected: int
+    cannot_tell: int
+    cause_right: int
+
+
+@dataclass(frozen=True)
+class Battery:
+    """All runs of a battery.
+
+    Attributes:
+        runs: every single one.
+        limits: degrees and centimetres within which an extrinsic is right.
+    """
+
+    runs: tuple[BatteryRun, ...]
+    limits: tuple[float, float] = FRAME_LIMITS
+
+    @property
+    def rows(self) -> tuple[BatteryRow, ...]:
+        """A row for each fault and strength, in the order of their first runs."""
+        groups: dict[tuple[str, str], list[BatteryRun]] = {}
+        for run in self.runs:
+            groups.setdefault((run.corruption.name, run.corruption.strength), []).append(run)
+        return tuple(self._row(name, strength, runs) for (name, strength), runs in groups.items())
+
+    def _row(self, name: str, strength: str, runs: Sequence[BatteryRun]) -> BatteryRow:
+        accepted = [run for run in runs if run.word == ACCEPTED]
+        right = sum(run.is_right(self.limits) for run in accepted)
+        unsure = sum(run.word == CANNOT_TELL for run in runs)
+        return BatteryRow(
+            name,
+            strength,
+            len(runs),
+            accepted_right=right,
+            accepted_wrong=len(accepted) - right,
+            rejected=len(runs) - len(accepted) - unsure,
+            cannot_tell=unsure,
+            cause_right=sum(run.word != ACCEPTED and run.corruption.cause in run.causes for run in runs),
+        )
+
+    @property
+    def false_accept_rate(self) -> float:
+        """Share of all runs that are accepted and wrong; not a number without runs."""
+        wrong = [run.word == ACCEPTED and not run.is_right(self.limits) for run in self.runs]
+        return float(np.mean(wrong)) if wrong else float("nan")
+
+    @property
+    def acceptance_of_good(self) -> float:
+        """Share that is accepted of the runs without fault that end right; not a number without such runs."""
+        good = [run for run in self.runs if run.corruption.name == PLAIN.name and run.is_right(self.limits)]
+        return float(np.mean([run.word == ACCEPTED for run in good])) if good else float("nan")
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that JSON files hold; a rate of nothing is null."""
+        return {
+            "rows": [vars(row) for row in self.rows],
+            "false_accept_rate": None if np.isnan(self.false_accept_rate) else self.false_accept_rate,
+            "acceptance_of_good": None if np.isnan(self.acceptance_of_good) else self.acceptance_of_good,
+        }
+
+
+Faults = Callable[[FrameSequence, int], Iterable[Corruption]]
+"""The faults to put into the frame at a position of a sequence, see `calibnet.evaluation.corruptions.corruptions`."""
+
+
+def run_battery(
+    cascade: Calibrator,
+    judge: Judge,
+    sequences: Iterable[FrameSequence],
+    faults: Faults,
+    range_: MiscalibrationRange,
+    repeats: int = 1,
+    seed: int = 0,
+    observer: Callable[[BatteryRun], None] | None = None,
+) -> Battery:
+    """Calibrate and judge every frame with every fault, and without.
+
+    Args:
+        cascade: what calibrates.
+        judge: what is measured.
+        sequences: where the frames come from; their own extrinsics are the truth.
+        faults: what to put into them.
+        range_: range of the miscalibrations, the same one for every fault of a frame and repeat.
+        repeats: miscalibrations a frame.
+        seed: of the miscalibrations.
+        observer: called after every run.
+    """
+    runs = []
+    for sequence in sequences:
+        for position in range(len(sequence)):
+            frame = sequence[position]
+            for corruption in [PLAIN, *faults(sequence, position)]:
+                altered = corruption.alter(frame)
+                farther = MiscalibrationRange(
+                    corruption.farther * range_.rotation_deg, corruption.farther * range_.translation_m
+                )
+                for repeat in range(repeats):
+                    guess = draw_miscalibration(farther, seed, frame.index, repeat) @ frame.camera_from_lidar
+                    verdict = judged(cascade, judge, altered, guess)
+                    error = pose_error(verdict.camera_from_lidar, altered.camera_from_lidar)
+                    names = tuple(cause.name for cause in verdict.causes)
+                    runs.append(BatteryRun(corruption, error, verdict.word, names))
+                    if observer is not None:
+                        observer(runs[-1])
+    return Battery(tuple(runs))
+
+
+def judged(cascade: Calibrator, judge: Judge, frame: Frame, guess: Extrinsic) -> Verdict:
+    """Calibrate one frame from a guess, and judge that."""
+    try:
+        trace: CascadeTrace | None = cascade.calibrate(frame, guess)
+    except CalibrationError:
+        trace = None
+    return judge(frame, guess, trace)

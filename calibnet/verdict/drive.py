@@ -1,0 +1,48 @@
+"""The verdict on a drive."""
+
+from __future__ import annotations
+
+from calibnet.geometry import MiscalibrationRange, invert
+from calibnet.geometry.types import Extrinsic
+from calibnet.trace import MARGIN, DriveEstimate
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word, moved
+
+LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
+"""Standard deviations, over all axes, beyond which the frames agree on too little."""
+
+
+def judge_drive(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange) -> Verdict:
+    """Whether the extrinsic that was solved from a drive is good.
+
+    Args:
+        estimate: of the drive.
+        initial: ``camera_from_lidar`` that it started from.
+        searched: the range that was to be searched around it.
+    """
+    word, reason = _word(estimate, initial, searched)
+    there = estimate.camera_from_lidar
+    return Verdict(
+        word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped
+    )
+
+
+def _word(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange) -> tuple[Word, str]:
+    used, skipped = estimate.frames, len(estimate.skipped)
+    if 2 * skipped >= used + skipped:
+        return REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}"
+    turned, shifted = moved(initial, estimate.camera_from_lidar)
+    if not searched.contains(estimate.camera_from_lidar @ invert(initial), MARGIN):
+        return REJECTED, (
+            f"It lies {turned:.2g}° and {shifted:.0f} cm from the start, out of the range that was to be searched, "
+            f"{searched.label}: a wrong lens or late scans look like that. If the start may be that far off, search a "
+            "wider range."
+        )
+    if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
+        return CANNOT_TELL, (
+            f"The frames leave it open to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.0f} cm (one "
+            "standard deviation); more frames of other places help."
+        )
+    return ACCEPTED, (
+        f"{used} frames agree, to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.1f} cm (one standard "
+        "deviation)."
+    )

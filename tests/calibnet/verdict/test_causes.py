@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import CalibrationError
+from calibnet.evaluation import corruptions as faults
+from calibnet.geometry.types import Extrinsic
+from calibnet.verdict.causes import LENSES, PICTURE_AND_SCAN, Attempt, Search, cause, match_error_of, misfit_of
+from tests.support.boxes import boxes
+from tests.support.matches import matches, run
+
+FRAME = boxes()
+
+
+def unlike(frame: Frame, guess: Extrinsic) -> float:
+    """A measure that knows the frame as it should be: 5 if it is that, more the farther it is from it."""
+    if len(frame.points) != len(FRAME.points) or (frame.points[:, 0] < -20).mean() > 0.5:
+        raise CalibrationError("nothing falls into the picture")
+    scan = np.abs(frame.points - FRAME.points).mean()
+    picture = np.abs(frame.image.astype(float) - FRAME.image)[60:260, 350:680].mean() / 10
+    camera = np.abs(frame.camera.matrix - FRAME.camera.matrix).max()
+    return float(5 + scan + picture + camera)
+
+
+@pytest.mark.parametrize(
+    ("alter", "names"),
+    [
+        (faults.mirrored, ("mirrored", "left-handed")),
+        (faults.rolled(-30), ("roll",)),
+        (faults.rolled(90), ("roll",)),
+        (faults.rolled(180), ("roll",)),
+        (faults.turned(faults.AXES["x right, y forward, z up"]), ("axes",)),
+        (faults.turned(faults.AXES["x right, y down, z forward"]), ("axes",)),
+        (faults.turned(faults.AXES["x backward, y right, z up"]), ("axes",)),
+        (faults.flipped(0), ("left-handed",)),
+        (faults.flipped(2), ("left-handed",)),
+    ],
+)
+def test_what_undoes_the_fault_is_the_cause(alter: faults.Alteration, names: tuple[str, ...]) -> None:
+    found = cause(replace(PICTURE_AND_SCAN, share=0.9), alter(FRAME), FRAME.camera_from_lidar, unlike)
+    assert tuple(one.name for one in found) == names
+
+
+@pytest.mark.parametrize(
+    ("alter", "name", "said"),
+    [
+        (faults.focal(1.05), "focal-length", "5 % shorter"),
+        (faults.focal(0.9), "focal-length", "10 % longer"),
+        (faults.principal(60, 0), "principal-point", "farther left"),
+        (faults.principal(0, -60), "principal-point", "farther lower"),
+    ],
+)
+def test_a_lens_is_named_with_its_direction(alter: faults.Alteration, name: str, said: str) -> None:
+    (found,) = cause(LENSES, alter(FRAME), FRAME.camera_from_lidar, unlike)
+    assert found.name == name and said in found.text
+
+
+@pytest.mark.parametrize(
+    ("alter", "name"), [(faults.distorted(-0.2), "distortion"), (faults.equidistant, "lens-model")]
+)
+def test_undoing_a_lens_gives_the_pinhole_s_picture_back(alter: faults.Alteration, name: str) -> None:
+    smooth = replace(FRAME, image=(np.indices((320, 1024)).sum(0) // 8)[..., None].repeat(3, 2).astype(np.uint8))
+    bent = alter(smooth)
+    (undo,) = (attempt.undo for attempt in LENSES.attempts if attempt.names == (name,))
+    (left, top) = (round(was - now) for was, now in zip(smooth.camera.center, bent.camera.center, strict=True))
+    inner = undo(bent).image[60:-60, 150:-150]
+    expected = smooth.image[top : top + bent.camera.height, left : left + bent.camera.width][60:-60, 150:-150]
+    assert np.abs(inner.astype(int) - expected).max() <= 1
+
+
+def test_nothing_is_named_that_fits_no_better_or_not_well() -> None:
+    constant = Search((Attempt(("roll",), "", lambda frame: frame),), share=0.9, most=10.0, unit="px")
+    assert cause(constant, FRAME, FRAME.camera_from_lidar, lambda frame, guess: 5.0) == ()
+    halved = replace(constant, attempts=(Attempt(("roll",), "It is rolled.", lambda frame: replace(frame, index=1)),))
+    (named,) = cause(halved, FRAME, FRAME.camera_from_lidar, lambda frame, guess: 8.0 - 4 * frame.index)
+    assert (named.name, named.text) == ("roll", "It is rolled.")
+    assert named.evidence == "4 px with that undone, instead of 8 px"
+    assert cause(halved, FRAME, FRAME.camera_from_lidar, lambda frame, guess: 80.0 - 60 * frame.index) == ()
+
+
+def test_measures_are_those_of_the_stages() -> None:
+    looks: list[float] = []
+
+    class Stage:
+        def view(self, frame: Frame) -> Any:
+            return None
+
+        def look(self, frame: Frame, view: Any, before: Extrinsic) -> Any:
+            looks.append(float(before[0, 3]))
+            after = before.copy()
+            after[0, 3] += 1
+            return SimpleNamespace(match_error_px=2.0 if len(looks) == 1 else 8.0, after=after)
+
+    assert match_error_of(Stage())(FRAME, np.eye(4)) == pytest.approx(4.0)
+    assert looks == [0.0, 1.0]
+    exact, bent = (run(np.eye(4), np.eye(4), matches(np.eye(4), bend)) for bend in (lambda at: at, lambda at: at**3))
+    assert misfit_of(lambda frame, guess: exact)(FRAME, np.eye(4)) == pytest.approx(0, abs=1e-6)
+    assert misfit_of(lambda frame, guess: bent)(FRAME, np.eye(4)) > 0.05

@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from calibnet.geometry import RANGES, miscalibration
+from calibnet.verdict.verdict import BadFrame, Cause, Verdict, moved
+from calibnet.verdict.witnesses import Doubt, Witnesses, lens_gain, load_doubt, misfit, reach, witnesses
+from tests.support.drive import REFERENCE
+from tests.support.matches import matches, run
+
+
+def test_json_of_a_verdict() -> None:
+    covariance = np.diag([0.03**2, 0, 0.04**2, 0, np.radians(0.2) ** 2, 0])
+    cause = Cause("roll", "The picture is rolled.", "7 px")
+    verdict = Verdict(
+        "rejected", "It does not fit.", REFERENCE, (2.0, 5.0), (cause,), covariance, 3, (BadFrame(7, "damaged"),)
+    )
+    said = json.loads(json.dumps(verdict.as_dict()))
+    assert said["sigma"].pop("rotation_deg") == pytest.approx(0.2)
+    assert said["sigma"].pop("translation_cm") == pytest.approx(5.0)
+    assert said == {
+        "verdict": "rejected",
+        "reason": "It does not fit.",
+        "causes": [{"name": "roll", "text": "The picture is rolled.", "evidence": "7 px"}],
+        "camera_from_lidar": REFERENCE.tolist(),
+        "moved": {"rotation_deg": 2.0, "translation_cm": 5.0},
+        "sigma": {"covariance": covariance.tolist()},
+        "frames": {"used": 3, "skipped": [{"frame": 7, "why": "damaged"}]},
+    }
+    assert Verdict("accepted", "", REFERENCE).as_dict()["sigma"] is None
+
+
+def test_moved_is_what_pose_error_says() -> None:
+    after = miscalibration([0, 0, 3], [0, 0, 0]) @ REFERENCE
+    assert moved(REFERENCE, after)[0] == pytest.approx(3)
+
+
+def test_the_axis_that_went_farthest_is_named_with_what_was_searched() -> None:
+    along = reach(miscalibration([0, 0, 0], [0.1, 0, -4.5]) @ REFERENCE, REFERENCE, RANGES[2])
+    assert along.share == pytest.approx(9)
+    assert str(along) == "moved 4.5 m along the view, farther than the ±0.5 m searched"
+    rolled = reach(miscalibration([20, 1, 2], [0, 0, 0]) @ REFERENCE, REFERENCE, RANGES[2])
+    assert rolled.share == pytest.approx(4) and str(rolled) == "turned 20° in roll, farther than the ±5° searched"
+    within = reach(miscalibration([1, 2, -4], [0.1, 0.2, 0.3]) @ REFERENCE, REFERENCE, RANGES[2])
+    assert within.share == pytest.approx(0.8)
+
+
+def test_witnesses_of_a_run_that_fits_and_of_one_that_does_not() -> None:
+    guess = miscalibration([1, 2, 3], [0.1, 0.2, -0.25]) @ REFERENCE
+    fits = run(guess, REFERENCE, matches(np.eye(4), noise=0.5))
+    found = witnesses(fits)
+    assert found.match_error == found.earlier_error == pytest.approx(np.log(1.5))
+    assert found.reach == pytest.approx(0.6)
+    bent = matches(np.eye(4), lambda places: places * (1 - 0.3 * (places**2).sum(axis=1, keepdims=True)), noise=0.5)
+    wrong = witnesses(run(guess, REFERENCE, bent))
+    assert wrong.misfit > found.misfit + 0.5
+    assert lens_gain(fits.stages[-1]) < 1 and lens_gain(run(guess, REFERENCE, bent).stages[-1]) > 10
+
+
+def test_a_look_again_counts_instead_of_the_last_one() -> None:
+    trace, other = (
+        run(REFERENCE, REFERENCE, matches(np.eye(4)), 3.0),
+        run(REFERENCE, REFERENCE, matches(np.eye(4)), 1.0),
+    )
+    again = witnesses(trace, other.stages[-1])
+    assert (again.match_error, again.earlier_error) == (pytest.approx(0.0), pytest.approx(np.log(3)))
+
+
+def test_without_matches_the_witness_is_missing_and_doubt_is_not_a_number() -> None:
+    trace = run(REFERENCE, REFERENCE)
+    assert np.isnan(misfit(trace.stages[-1]))
+    doubt = Doubt(0.0, {"misfit": 1.0}, 0.1, 0.9)
+    assert np.isnan(doubt(witnesses(trace)))
+
+
+def test_doubt_is_a_logistic_regression() -> None:
+    doubt = Doubt(1.0, {"reach": 2.0, "match_error": -1.0}, 0.1, 0.9)
+    assert doubt(Witnesses(0.5, 0, 0, 1.0)) == pytest.approx(1 / (1 + np.exp(-2.5)))
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_the_coefficients_that_ship_doubt_what_is_worse(again: bool) -> None:
+    doubt = load_doubt(again)
+    assert 0 < doubt.accepted_below < doubt.rejected_above <= 1
+    good, bad = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), 0.6), Witnesses(1.6, 1.6, -3.5, 1.5)
+    assert doubt(good) < doubt.accepted_below < doubt(bad)
