@@ -24,6 +24,8 @@ FARTHEST_CENTRE = 0.45
 """How far from the middle the principal point may lie, as a share of the picture's half width or height."""
 NEAREST_MEDIAN, FARTHEST_MEDIAN, MILLIMETRES = 0.3, 200.0, 1200.0
 """Median ranges in metres that no scanner sees, too near and too far, and beyond which it must be millimetres."""
+ROWS = 8
+"""Of so many rows of a picture one is looked at."""
 DARKEST = 20
 """Grey level that the brightest thousandth reaches in the darkest picture of eight bits."""
 WRAPPED, MOST_WHITE = 0.05, 0.3
@@ -45,15 +47,15 @@ def implausible(frame: Frame) -> tuple[Cause, ...]:
 
 def is_blank(frame: Frame) -> bool:
     """Whether the picture shows nothing at all."""
-    return float(frame.image.std()) < (FLATTEST_IN_THE_DARK if _brightest(frame) <= DARKEST else FLATTEST)
+    return float(frame.image[::ROWS].std()) < (FLATTEST_IN_THE_DARK if _brightest(frame) <= DARKEST else FLATTEST)
 
 
 def _brightest(frame: Frame) -> float:
-    return float(np.percentile(frame.image, 99.9))
+    return float(np.percentile(frame.image[::ROWS], 99.9))
 
 
 def _picture(frame: Frame) -> Iterator[Cause]:
-    green = frame.image[..., 1].astype(np.int16)
+    green = frame.image[::ROWS, :, 1].astype(np.int16)
     brightest = _brightest(frame)
     if not is_blank(frame) and brightest <= DARKEST:
         yield Cause(
@@ -124,10 +126,8 @@ def _ground(frame: Frame) -> Iterator[Cause]:
     below = shares.pop("-z")
     elsewhere = max(shares, key=lambda side: shares[side])
     if shares[elsewhere] > max(GROUND_SHARE, GROUND_FACTOR * below):
-        flipped = elsewhere == "+z"
-        yield Cause(
-            "axes",
-            f"The scan's ground seems to lie towards {elsewhere}, so its axes are not x forward, y left, z up"
-            + (", or it is left-handed." if flipped else "."),
-            f"{100 * shares[elsewhere]:.0f} % of its points lie in one plane there, {100 * below:.0f} % below",
-        )
+        said = f"{100 * shares[elsewhere]:.0f} % of its points lie in one plane there, {100 * below:.0f} % below"
+        text = f"The scan's ground seems to lie towards {elsewhere}: its axes are not x forward, y left, z up."
+        yield Cause("axes", text, said)
+        if elsewhere == "+z":  # turned over, or only this axis the other way round: the ground is the same
+            yield Cause("left-handed", "If only z points down, the scan's axes are left-handed as well.", said)

@@ -47,13 +47,16 @@ def test_nothing_is_wrong_with_what_is_right(frame: Frame) -> None:
         (faults.scaled_scan(0.001), "units", "nearer"),
         (faults.focal(0.1), "focal-length", "72 px"),
         (faults.turned(faults.AXES["x right, y down, z forward"]), "axes", "one plane there"),
-        (faults.flipped(2), "axes", "one plane there"),
     ],
 )
 def test_what_cannot_be_is_named(frame: Frame, alter: faults.Alteration, name: str, said: str) -> None:
     altered = alter(frame)
     assert names(altered) == [name]
     assert said in implausible(altered)[0].evidence
+
+
+def test_a_scan_upside_down_may_be_turned_or_left_handed(frame: Frame) -> None:
+    assert names(faults.flipped(2)(frame)) == ["axes", "left-handed"]
 
 
 def test_what_is_said_of_units_and_sizes_is_what_to_do(frame: Frame) -> None:
