@@ -112,8 +112,10 @@ class Cascade:
                 before = self._run(wider, views, initial)
                 stages = self._run(self.stages, views, before[-1].after, detail)
                 trace = CascadeTrace(initial, stages, clock.parts, limit, before)
-            view = views.of(last, self.image_branches[len(self.stages) - 1])
-            again = last.look(frame, view, trace.arrived) if trace.fits else None
+            again = None  # one more look tells more, and is only made where the rest may be accepted
+            if trace.fits and self.stages[0].range.contains(trace.arrived @ invert(initial), MARGIN):
+                view = views.of(last, self.image_branches[len(self.stages) - 1])
+                again = last.look(frame, view, trace.arrived)
         return replace(trace, verdict=judge(frame, initial, trace, again))
 
     def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:

@@ -275,10 +275,10 @@ def relensed(frame: Frame, bend: Callable[[NDArray[np.float64]], NDArray[np.floa
     pinhole, seen = pinhole[:rising], seen[:rising]
     edges = np.array([-cx, camera.width - 1 - cx]) / fx, np.array([-cy, camera.height - 1 - cy]) / fy
     corner_x, corner_y = (grid.ravel() for grid in np.meshgrid(*edges))
-    share = np.interp(np.hypot(corner_x, corner_y), pinhole, seen) / np.hypot(corner_x, corner_y)
-    kept = float(np.minimum(share, 1.0).min())
-    left, top = (int(np.ceil(centre - kept * centre)) for centre in (cx, cy))
-    width, height = int(kept * (camera.width - 1)), int(kept * (camera.height - 1))
+    corners = np.hypot(corner_x, corner_y)
+    share = min(1.0, float((np.interp(corners, pinhole, seen) / corners).min()))
+    left, top = (int(np.ceil(centre - share * centre)) for centre in (cx, cy))
+    width, height = int(share * (camera.width - 1)), int(share * (camera.height - 1))
     v, u = np.mgrid[top : top + height, left : left + width].astype(np.float64)
     x, y = (u - cx) / fx, (v - cy) / fy
     radius = np.hypot(x, y)

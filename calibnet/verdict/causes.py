@@ -169,9 +169,8 @@ def rectified(bend: Callable[[Floats], Floats]) -> Callable[[Frame], Frame]:
         x, y = (u - cx) / fx, (v - cy) / fy
         radius = np.hypot(x, y)
         stretch = bend(radius) / np.maximum(radius, 1e-9)
-        from_u, from_v = (fx * x * stretch + cx).astype(np.float32), (fy * y * stretch + cy).astype(np.float32)
-        image = cv2.remap(frame.image, from_u, from_v, cv2.INTER_LINEAR)
-        return replace(frame, image=image.astype(np.uint8, copy=False))
+        maps = ((fx * x * stretch + cx).astype(np.float32), (fy * y * stretch + cy).astype(np.float32))
+        return replace(frame, image=cv2.remap(frame.image, *maps, cv2.INTER_LINEAR).astype(np.uint8, copy=False))
 
     return undo
 
@@ -220,5 +219,5 @@ PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=25.0, unit
 0.5 of it, a rolled picture to 0.3 to 0.6; the best wrong attempt for a picture of another place to 0.5 once, and
 otherwise to 0.8 and more."""
 LENSES = Search(tuple(_lenses()), share=0.85, most=np.inf, unit="of misfit a match")
-"""By the misfit of the last stage's matches. Where picture and scan fit well, the right attempt came to 0.35 to 0.82 of
-what was given, and the best wrong one of a frame without fault to 1.17 (2 frames)."""
+"""By the misfit of the last stage's matches. Of 24 runs with a wrong lens (4 frames, of KITTI and the synthetic world)
+it names 18 rightly and one wrongly; on 4 runs without fault the best attempt came to 0.87 to 1.2."""

@@ -106,8 +106,7 @@ def fit(
     pose, extra = before @ invert(before), np.zeros(4)
 
     def residuals(pose: Extrinsic, extra: Floats) -> tuple[Floats, Floats, float]:
-        placed = transform_points(pose, points).astype(np.float64, copy=False)
-        seen, jacobian, ahead = view(placed, extra, lens.equidistant)
+        seen, jacobian, ahead = view(transform_points(pose, points).astype(np.float64), extra, lens.equidistant)
         residual = target - seen
         size = np.sqrt(scale**2 + residual**2)
         weight = ahead[:, None] * INDEPENDENT / (scale * size)
