@@ -1,7 +1,7 @@
 """What the cascade tells about itself: every picture, curve and table is made from these types.
 
 Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's input camera
-(`StageTrace.camera`), whose image is the frame's, resized.
+(`StageTrace.camera`), whose image is the frame's, resized, and turned upright before where the camera is not.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, invert
-from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform
 
 MARGIN = 1.2
 """How far a calibration may end from its start, relative to the range that was searched, to be believed."""
@@ -77,6 +77,8 @@ class StageTrace:
             network states it, or None from a head that does not.
         detail: intermediate results of its first round, or None when they were not asked for.
         match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
+        upright: ``[3, 3]``, ``camera`` from the frame's camera, where the picture was turned upright (`detail` is of
+            that picture, all extrinsics are of the frame's own camera); None where it was not.
     """
 
     number: int
@@ -89,6 +91,7 @@ class StageTrace:
     information: Matrix6 | None = field(default=None, repr=False)
     detail: StageDetail | None = field(default=None, repr=False)
     match_error_px: float = math.nan
+    upright: Rotation | None = field(default=None, repr=False)
 
     def followed_by(self, again: StageTrace) -> StageTrace:
         """This and a second round of the same stage as one; the detail stays that of the first look."""

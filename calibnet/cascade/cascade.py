@@ -10,6 +10,7 @@ import torch
 
 from calibnet.cascade.image_views import ImageViews, image_branches
 from calibnet.cascade.stage import Stage, load_stage
+from calibnet.cascade.upright import Upright, UprightFrames
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import ConfigError, WeightsError
@@ -100,15 +101,16 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
+        clock, limit, upright = Clock(self.device), self.stages[-1].match_error_limit_px, Upright.of(initial)
+        start = upright.extrinsic(initial)
         with torch.inference_mode(), autocast(self.device):
-            views = ImageViews(frame, clock)
-            trace = CascadeTrace(initial, self._run(self.stages, views, initial, detail), clock.parts, limit)
-            if wider := self._covering(trace.arrived @ invert(initial)):
-                before = self._run(wider, views, initial)
+            views = ImageViews(upright.frame(frame), clock)
+            trace = CascadeTrace(start, self._run(self.stages, views, start, detail), clock.parts, limit)
+            if wider := self._covering(trace.arrived @ invert(start)):
+                before = self._run(wider, views, start)
                 stages = self._run(self.stages, views, before[-1].after, detail)
-                trace = CascadeTrace(initial, stages, clock.parts, limit, before)
-        return trace
+                trace = CascadeTrace(start, stages, clock.parts, limit, before)
+        return upright.undo(trace, initial)
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -124,10 +126,12 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        estimate = solve_drive(self.stages, frames, initial, self.common, observer)
-        if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
-            estimate = solve_drive([*wider, *self.stages], frames, initial, self.common, observer)
-        return estimate
+        upright = Upright.of(initial)
+        start, turned = upright.extrinsic(initial), UprightFrames(frames, upright)
+        estimate = solve_drive(self.stages, turned, start, self.common, observer)
+        if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
+            estimate = solve_drive([*wider, *self.stages], turned, start, self.common, observer)
+        return upright.undo_drive(estimate)
 
     def _run(
         self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False

@@ -159,8 +159,8 @@ def viewing_direction(camera_from_lidar: Extrinsic) -> Implausible | None:
     if abs(towards_up) > STEEP:
         text = (
             f"under camera_from_lidar the camera looks straight {'up' if towards_up > 0 else 'down'}, along the "
-            "LiDAR's z axis; map x forward, y left, z up to x right, y down, z forward, which for a camera that looks ahead is "
-            "[0, -1, 0], [0, 0, -1], [1, 0, 0]"
+            "LiDAR's z axis; map x forward, y left, z up to x right, y down, z forward, which for a camera that looks "
+            "ahead is [0, -1, 0], [0, 0, -1], [1, 0, 0]"
         )
         return Implausible("axes", text)
     if abs(camera_from_lidar[0, 2]) > STEEP and -camera_from_lidar[2, 1] > STEEP:
