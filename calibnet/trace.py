@@ -1,7 +1,7 @@
 """What the cascade tells about itself: every picture, curve and table is made from these types.
 
 Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's input camera
-(`StageTrace.camera`), whose image is the frame's, resized.
+(`StageTrace.camera`), whose image is the frame's, resized, and turned upright before where the camera is not.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
-from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform
 from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
 
 MARGIN = 1.2
@@ -96,6 +96,8 @@ class StageTrace:
         match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
         matches: of its last look, relative to `looked_from`; None where a trace was made without.
         last_before: ``camera_from_lidar`` that its last look started from; None where that is ``before``.
+        upright: ``[3, 3]``, ``camera`` from the frame's camera, where the picture was turned upright; None where it
+            was not. `detail` and `matches` are of the turned picture, all extrinsics of the frame's own camera.
     """
 
     number: int
@@ -110,6 +112,7 @@ class StageTrace:
     match_error_px: float = math.nan
     matches: Matches | None = field(default=None, repr=False)
     last_before: Extrinsic | None = field(default=None, repr=False)
+    upright: Rotation | None = field(default=None, repr=False)
 
     @property
     def looked_from(self) -> Extrinsic:

@@ -10,6 +10,7 @@ import torch
 
 from calibnet.cascade.image_views import ImageViews, image_branches
 from calibnet.cascade.stage import Stage, load_stage
+from calibnet.cascade.upright import Upright, UprightFrames
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
@@ -104,19 +105,17 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, limit, last = Clock(self.device), self.stages[-1].match_error_limit_px, self.stages[-1]
+        clock, limit, upright = Clock(self.device), self.stages[-1].match_error_limit_px, Upright.of(initial)
+        start = upright.extrinsic(initial)
         with torch.inference_mode(), autocast(self.device):
-            views = ImageViews(frame, clock)
-            trace = CascadeTrace(initial, self._run(self.stages, views, initial, detail), clock.parts, limit)
-            if wider := self._covering(trace.arrived @ invert(initial)):
-                before = self._run(wider, views, initial)
+            views = ImageViews(upright.frame(frame), clock)
+            trace = CascadeTrace(start, self._run(self.stages, views, start, detail), clock.parts, limit)
+            if wider := self._covering(trace.arrived @ invert(start)):
+                before = self._run(wider, views, start)
                 stages = self._run(self.stages, views, before[-1].after, detail)
-                trace = CascadeTrace(initial, stages, clock.parts, limit, before)
-            again = None  # one more look tells more, and is only made where the rest may be accepted
-            if trace.fits and self.stages[0].range.contains(trace.arrived @ invert(initial), MARGIN):
-                view = views.of(last, self.image_branches[len(self.stages) - 1])
-                again = last.look(frame, view, trace.arrived)
-        return replace(trace, verdict=judge(frame, initial, trace, again))
+                trace = CascadeTrace(start, stages, clock.parts, limit, before)
+            trace = replace(trace, verdict=judge(views.frame, start, trace, self._again(views, trace)))
+        return upright.undo(trace, initial)
 
     def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
         """The verdict on a frame with its causes: what, undone in the input, makes picture and scan fit.
@@ -127,13 +126,16 @@ class Cascade:
             frame: image, scan and camera; its own extrinsic is not looked at.
             initial: ``camera_from_lidar`` to start from.
         """
+        upright = Upright.of(initial)
+        frame, start = upright.frame(frame), upright.extrinsic(initial)
         try:
-            trace = self.calibrate(frame, initial)
+            trace = self.calibrate(frame, start)
         except CalibrationError:
             trace = None
-        if trace is not None and trace.verdict is not None and trace.verdict.word == ACCEPTED:
-            return trace.verdict
-        return judge(frame, initial, trace, None, match_error_of(self.stages[0]), misfit_of(self.calibrate))
+        verdict = None if trace is None else trace.verdict
+        if verdict is None or verdict.word != ACCEPTED:
+            verdict = judge(frame, start, trace, None, match_error_of(self.stages[0]), misfit_of(self.calibrate))
+        return upright.undo_verdict(verdict)
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -149,10 +151,13 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        estimate = solve_drive(self.stages, frames, initial, self.common, observer)
-        if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
-            estimate = solve_drive([*wider, *self.stages], frames, initial, self.common, observer)
-        return replace(estimate, verdict=judge_drive(estimate, initial, self.stages[0].range))
+        upright = Upright.of(initial)
+        start, turned = upright.extrinsic(initial), UprightFrames(frames, upright)
+        estimate = solve_drive(self.stages, turned, start, self.common, observer)
+        if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
+            estimate = solve_drive([*wider, *self.stages], turned, start, self.common, observer)
+        verdict = judge_drive(estimate, start, self.stages[0].range)
+        return upright.undo_drive(replace(estimate, verdict=verdict))
 
     def _run(
         self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False
@@ -164,6 +169,17 @@ class Cascade:
             before = traces[-1].after if traces else initial
             traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail))
         return tuple(traces)
+
+    def _again(self, views: ImageViews, trace: CascadeTrace) -> StageTrace | None:
+        """One more look of the last stage, from where a run arrived: it tells most about the result.
+
+        None where the rest speaks against it already.
+        """
+        moved = trace.arrived @ invert(trace.initial)
+        if not trace.fits or not self.stages[0].range.contains(moved, MARGIN):
+            return None
+        last, branch = self.stages[-1], self.image_branches[len(self.stages) - 1]
+        return last.look(views.frame, views.of(last, branch), trace.arrived)
 
     def _covering(self, moved: Transform) -> list[Stage]:
         """The wider stages with which to start again after moving so far; none where the first stage's range covers it.

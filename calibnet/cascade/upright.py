@@ -1,0 +1,191 @@
+"""Cameras that are mounted on their side, on their head or at any roll: their picture is turned upright first.
+
+The networks have learnt from upright pictures. A roll that is known is none of their business: the guess of the
+extrinsic tells it, since the LiDAR's z axis points up. The picture is turned about its principal point, which moves no
+parallax, so that the turned camera is as exact as the real one; and what the stages find is turned back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.geometry import PinholeCamera, transform
+from calibnet.geometry.se3 import rotation_from_vector
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
+from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
+from calibnet.verdict.verdict import Verdict
+
+AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
+
+TOLERATED = np.radians(8.0)
+"""Roll up to which nothing is resampled: training had as much, and a picture that is turned loses its corners."""
+LEVEL = 0.5
+"""Length, seen by the camera, of an upward unit vector below which the camera looks up or down and has no roll."""
+QUARTER = np.pi / 2
+QUARTER_TURN: Rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+FILLED = 1 / 3
+"""Rows and columns at the border of a turned picture that hold less than this share of the fullest are cut off."""
+
+
+@dataclass(frozen=True)
+class Upright:
+    """How a camera is turned about its optical axis to stand upright: not at all, for most.
+
+    Attributes:
+        quarters: quarter turns, clockwise in the picture; exact.
+        rest: radians beyond them, likewise clockwise; the picture is resampled.
+    """
+
+    quarters: int = 0
+    rest: float = 0.0
+
+    @classmethod
+    def of(cls, camera_from_lidar: Extrinsic) -> Upright:
+        """The turn that a guess of the extrinsic asks for."""
+        turn = -roll_of(camera_from_lidar)
+        quarters = round(turn / QUARTER)
+        rest = turn - quarters * QUARTER
+        return cls(quarters, rest if abs(rest) > TOLERATED else 0.0)
+
+    def __bool__(self) -> bool:
+        """Whether anything is turned."""
+        return bool(self.quarters or self.rest)
+
+    @cached_property
+    def rotation(self) -> Rotation:
+        """``[3, 3]``, upright camera from real camera."""
+        quarter = np.linalg.matrix_power(QUARTER_TURN, self.quarters % 4)
+        return rotation_from_vector([0.0, 0.0, self.rest]) @ quarter
+
+    def extrinsic(self, camera_from_lidar: Extrinsic) -> Extrinsic:
+        """An extrinsic of the real camera as that of the upright one."""
+        return transform(self.rotation, np.zeros(3)) @ camera_from_lidar if self else camera_from_lidar
+
+    def frame(self, frame: Frame) -> Frame:
+        """A frame as the upright camera has it."""
+        if not self:
+            return frame
+        image, camera = turned_by_quarters(frame.image, frame.camera, self.quarters % 4)
+        if self.rest:
+            image, camera = turned(image, camera, rotation_from_vector([0.0, 0.0, self.rest]))
+        return replace(frame, image=image, camera=camera, camera_from_lidar=self.extrinsic(frame.camera_from_lidar))
+
+    def undo(self, trace: CascadeTrace, initial: Extrinsic) -> CascadeTrace:
+        """A run on the upright frame as one on the real frame, which started from ``initial``."""
+        if not self:
+            return trace
+        stages, wider = (tuple(map(self._real_stage, part)) for part in (trace.stages, trace.wider))
+        verdict = None if trace.verdict is None else self.undo_verdict(trace.verdict)
+        return replace(trace, initial=initial, stages=stages, wider=wider, verdict=verdict)
+
+    def undo_verdict(self, verdict: Verdict) -> Verdict:
+        """The verdict on an upright frame or drive, of the real camera."""
+        if not self:
+            return verdict
+        extrinsic = transform(self.rotation.T, np.zeros(3)) @ verdict.camera_from_lidar
+        covariance = None if verdict.covariance is None else self._real_matrix(verdict.covariance)
+        return replace(verdict, camera_from_lidar=extrinsic, covariance=covariance)
+
+    def undo_drive(self, estimate: DriveEstimate) -> DriveEstimate:
+        """What a drive of upright frames says, of the real camera."""
+        if not self:
+            return estimate
+        history = tuple((frame, self._real(so_far)) for frame, so_far in estimate.history)
+        networks = None if estimate.networks is None else self._real(estimate.networks)
+        verdict = None if estimate.verdict is None else self.undo_verdict(estimate.verdict)
+        return replace(self._real(estimate), history=history, networks=networks, verdict=verdict)
+
+    def _real_stage(self, stage: StageTrace) -> StageTrace:
+        back = transform(self.rotation.T, np.zeros(3))
+        return replace(
+            stage,
+            before=back @ stage.before,
+            after=back @ stage.after,
+            correction=back @ stage.correction @ back.T,
+            information=None if stage.information is None else self._real_matrix(stage.information),
+            upright=self.rotation,
+            last_before=None if stage.last_before is None else back @ stage.last_before,
+        )
+
+    def _real(self, estimate: AnyEstimate) -> AnyEstimate:
+        extrinsic = transform(self.rotation.T, np.zeros(3)) @ estimate.camera_from_lidar
+        return replace(estimate, camera_from_lidar=extrinsic, covariance=self._real_matrix(estimate.covariance))
+
+    def _real_matrix(self, of_pose: Matrix6) -> Matrix6:
+        """A covariance or information of ``(translation, rotation)`` in the real camera's axes."""
+        axes = np.kron(np.eye(2), self.rotation)
+        real: Matrix6 = axes.T @ of_pose @ axes
+        return real
+
+
+@dataclass(frozen=True)
+class UprightFrames:
+    """The frames of a drive, each turned as it is read."""
+
+    frames: Frames
+    upright: Upright
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __getitem__(self, position: int, /) -> Frame:
+        """Read one frame."""
+        return self.upright.frame(self.frames[position])
+
+
+def roll_of(camera_from_lidar: Extrinsic) -> float:
+    """Radians by which what stands upright leans clockwise in the picture; 0 where the camera looks up or down."""
+    right, down = camera_from_lidar[:2, 2]  # of the LiDAR's upward axis
+    return float(np.arctan2(right, -down)) if np.hypot(right, down) >= LEVEL else 0.0
+
+
+def turned_by_quarters(
+    image: NDArray[np.uint8], camera: PinholeCamera, quarters: int
+) -> tuple[NDArray[np.uint8], PinholeCamera]:
+    """Turn a picture ``[H, W, 3]`` clockwise by so many quarters, and its camera with it."""
+    matrix, width, height = camera.matrix, camera.width, camera.height
+    for _ in range(quarters):
+        pixels = np.array([[0.0, -1.0, height - 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        matrix, width, height = pixels @ matrix @ QUARTER_TURN.T, height, width
+    return np.ascontiguousarray(np.rot90(image, -quarters)), PinholeCamera(width, height, matrix)
+
+
+def turned(
+    image: NDArray[np.uint8], camera: PinholeCamera, rotation: Rotation
+) -> tuple[NDArray[np.uint8], PinholeCamera]:
+    """A picture ``[H, W, 3]`` and its camera turned about the camera's centre.
+
+    A turned picture is a tilted one in a larger, and mostly empty, upright frame: of that the part is kept that is
+    mostly filled. Beyond its border the picture goes on as it is there, as a border of any other kind would be an edge.
+    """
+    homography = camera.matrix @ rotation @ np.linalg.inv(camera.matrix)
+    right, bottom = camera.width - 0.5, camera.height - 0.5
+    corners = homography @ np.array([[-0.5, right, right, -0.5], [-0.5, -0.5, bottom, bottom], [1.0, 1.0, 1.0, 1.0]])
+    left, top = np.ceil((corners[:2] / corners[2]).min(axis=1)).astype(int).tolist()
+    right, bottom = np.floor((corners[:2] / corners[2]).max(axis=1)).astype(int).tolist()
+
+    def warped(picture: NDArray[np.uint8], columns: range, rows: range, border: int) -> NDArray[np.uint8]:
+        moved = np.array([[1.0, 0.0, -columns.start], [0.0, 1.0, -rows.start], [0.0, 0.0, 1.0]]) @ homography
+        warped = cv2.warpPerspective(picture, moved, (len(columns), len(rows)), borderMode=border)
+        return warped.astype(np.uint8, copy=False)
+
+    columns, rows = range(left, right + 1), range(top, bottom + 1)
+    filled = warped(np.asarray(image.any(axis=2), np.uint8), columns, rows, cv2.BORDER_CONSTANT)
+    middle = mostly(filled.sum(axis=1))
+    rows, columns = rows[middle], columns[mostly(filled[middle].sum(axis=0))]
+    matrix = camera.matrix.copy()
+    matrix[:2, 2] -= columns.start, rows.start
+    return warped(image, columns, rows, cv2.BORDER_REPLICATE), PinholeCamera(len(columns), len(rows), matrix)
+
+
+def mostly(filled: NDArray[np.integer]) -> slice:
+    """From the first to the last of the rows, or columns, that hold a fair share of what the fullest does."""
+    full = np.flatnonzero(filled >= FILLED * filled.max())
+    return slice(int(full[0]), int(full[-1]) + 1)
