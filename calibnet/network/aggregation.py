@@ -127,14 +127,15 @@ class Fusion(NamedTuple):
         return self.own if self.coarser is None else self.own + double(refine_window(self.coarser))
 
     def read(self, head: nn.Module) -> Tensor:
-        """What a `Pointwise` head without activation makes of the sum: ``[B, Dy, Dx, h, w, C']``.
+        """What a 1x1x1 convolution makes of the sum: ``[B, Dy, Dx, h, w, C']``.
 
-        The head is linear and so is the interpolation. So each part is read before it is interpolated, and the sum,
-        which at the finest scale is by far the largest volume, is never made.
+        It is linear and so is the interpolation. So each part is read before it is interpolated, and the sum, which at
+        the finest scale is by far the largest volume, is never made.
         """
-        assert isinstance(head, Pointwise)
-        coarser = None if self.coarser is None else F.linear(self.coarser, head.weight.flatten(1))
-        return Fusion(head(self.own), coarser).volume()
+        assert isinstance(head, nn.Conv3d)
+        weight = head.weight.flatten(1)
+        coarser = None if self.coarser is None else F.linear(self.coarser, weight)
+        return Fusion(F.linear(self.own, weight, head.bias), coarser).volume()
 
 
 class Hourglass(nn.Module):
@@ -179,7 +180,7 @@ class Aggregation(nn.Module):
         # each a sequence of one: so its weights are named in the files
         self.enter = nn.ModuleList(nn.Sequential(Pointwise(inputs, width, "relu")) for width in channels)
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
-        self.score = nn.ModuleList(Pointwise(width, 1) for width in channels)
+        self.score = nn.ModuleList(nn.Conv3d(width, 1, 1) for width in channels)
 
     def forward(
         self, volumes: list[Tensor], scores: list[Tensor], keep_activations: bool = False

@@ -114,12 +114,13 @@ def test_going_down_is_a_convolution_of_every_image_of_shared_displacements() ->
 
 
 def test_a_fused_volume_is_read_as_if_it_were_made() -> None:
-    fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), Pointwise(3, 2).double()
-    interpolated = refine_window(double(fusion.coarser))
-    torch.testing.assert_close(fusion.volume(), fusion.own + interpolated)
-    made = torch.einsum("...c,kc->...k", fusion.own + interpolated, head.weight.flatten(1)) + head.bias
-    torch.testing.assert_close(fusion.read(head), made)
-    torch.testing.assert_close(Fusion(fusion.own).read(head), head(fusion.own))
+    fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), nn.Conv3d(3, 2, 1).double()
+    assert fusion.coarser is not None
+    volume = fusion.own + refine_window(double(fusion.coarser))
+    torch.testing.assert_close(fusion.volume(), volume)
+    for found, made in ((fusion.read(head), volume), (Fusion(fusion.own).read(head), fusion.own)):
+        expected = torch.einsum("...c,kc->...k", made, head.weight.flatten(1)) + head.bias
+        torch.testing.assert_close(found, expected)
 
 
 @pytest.mark.skipif(not HAS_ONEDNN, reason="this machine has no oneDNN for x86")
