@@ -1,0 +1,161 @@
+"""Whether a calibration that somebody has is good: what a frame or a drive finds from there, held against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry.se3 import invert, pose_vector
+from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
+
+SIGNIFICANT = 16.27
+"""99.9 % quantile of chi-square with three degrees of freedom: those of the rotation, or of the translation."""
+PROBABLE = 0.95
+"""Probability of being within the tolerance from which on a calibration is accepted."""
+BAND = 1.96
+"""Standard deviations on either side that hold 95 % of a normal distribution."""
+SAMPLES = 100_000
+"""Draws for that probability: at 95 % it is told to 0.07 %, and drawn alike every time."""
+ROTATION, TRANSLATION = slice(3, 6), slice(0, 3)
+"""Rows of a covariance."""
+TURNS = {"pitch_deg": "pitch", "yaw_deg": "yaw", "roll_deg": "roll"}
+SHIFTS = {"x_cm": "x (right)", "y_cm": "y (down)", "z_cm": "z (ahead)"}
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far off a calibration may be to count as good."""
+
+    rotation_deg: float
+    translation_cm: float
+
+    def __str__(self) -> str:
+        return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"
+
+
+FRAME, DRIVE = Tolerance(1.0, 25.0), Tolerance(0.3, 8.0)
+"""What single frames, and what drives, can tell."""
+
+
+def verify(given: Extrinsic, found: Verdict, tolerance: Tolerance) -> Verdict:
+    """Hold a calibration against what was found from there.
+
+    It is rejected if it is off by more than the tolerance in rotation or in translation, and if that is significant
+    (chi-square, 99.9 %). It is accepted if it is within the tolerance with a probability of 95 %, by the covariance of
+    what was found. Otherwise nobody can tell. Where what was found is not accepted itself, the calibration is rejected
+    if causes are known, for then the input is wrong, and else nobody can tell.
+
+    Args:
+        given: ``camera_from_lidar`` to verify, 4x4.
+        found: verdict on the estimate of a frame or of a drive that started there, with its covariance.
+        tolerance: `FRAME` or `DRIVE`.
+
+    Returns:
+        A verdict on ``given``. Its ``camera_from_lidar`` is what was found, and ``moved`` leads there from ``given``.
+    """
+    estimate = found.camera_from_lidar
+
+    def verdict(word: Word, reason: str) -> Verdict:
+        return replace(found, word=word, reason=reason, moved=moved(given, estimate))
+
+    if found.word != ACCEPTED:
+        if found.word == REJECTED and found.causes:
+            return verdict(REJECTED, found.reason)
+        return verdict(CANNOT_TELL, f"There is nothing to hold the calibration against. {found.reason}")
+    skipped, tried = len(found.skipped), found.used + len(found.skipped)
+    if 2 * skipped >= tried:
+        return verdict(CANNOT_TELL, f"{skipped} of {tried} frames do not fit or cannot be read.")
+    error = pose_error(given, estimate)
+    if found.covariance is None:
+        off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        return verdict(CANNOT_TELL, f"The calibration seems to be off by {off}, but nothing states how sure that is.")
+    offset = pose_vector(given @ invert(estimate))
+    off = _said(error, offset, found.covariance)
+    if _is_beyond(error, offset, found.covariance, tolerance):
+        return verdict(REJECTED, f"The calibration is off by {off}; {tolerance} are tolerated.")
+    share = probability_within(offset, found.covariance, tolerance)
+    if share >= PROBABLE:
+        return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: by {off}.")
+    reason = f"The calibration is off by {off}; that it is within {tolerance} is {share:.0%} probable."
+    return verdict(CANNOT_TELL, reason)
+
+
+def unfit(given: Extrinsic, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
+    """The verdict where nothing could be found, because picture and scan do not fit together.
+
+    Args:
+        given: ``camera_from_lidar`` to verify, 4x4.
+        reason: why nothing could be found.
+        causes: what is wrong with the input; with any the calibration is rejected, without nobody can tell.
+    """
+    return Verdict(REJECTED if causes else CANNOT_TELL, reason, given, causes=causes, used=0)
+
+
+def named_cause(error: BaseException | None) -> tuple[Cause, ...]:
+    """What an error that names a cause in its attribute ``cause`` says is wrong with input that can be read.
+
+    An error that was raised from such a one is taken for it.
+    """
+    while error is not None:
+        name = getattr(error, "cause", "")
+        if name:
+            return (Cause(name, str(error), "seen when the input was read"),)
+        error = error.__cause__
+    return ()
+
+
+def probability_within(offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> float:
+    """Probability that rotation and translation are both within the tolerance.
+
+    Args:
+        offset: ``(translation m, rotation rad)`` of the calibration against the estimate.
+        covariance: ``[6, 6]`` of it.
+        tolerance: how far off is good.
+    """
+    draws = np.random.default_rng(0).multivariate_normal(offset, covariance, SAMPLES, method="eigh")
+    turned, shifted = (np.linalg.norm(draws[:, rows], axis=1) for rows in (ROTATION, TRANSLATION))
+    within = (turned <= np.radians(tolerance.rotation_deg)) & (shifted <= tolerance.translation_cm / 100)
+    return float(within.mean())
+
+
+def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> bool:
+    """Whether rotation or translation exceeds the tolerance, significantly by itself.
+
+    Each is tested alone: a small turn that is very sure says nothing of a large shift that is not.
+    """
+    too_far = {
+        ROTATION: error.rotation_deg > tolerance.rotation_deg,
+        TRANSLATION: error.translation_cm > tolerance.translation_cm,
+    }
+    return any(
+        far and offset[rows] @ np.linalg.solve(covariance[rows, rows], offset[rows]) > SIGNIFICANT
+        for rows, far in too_far.items()
+    )
+
+
+def _said(error: PoseError, offset: Vector6, covariance: Matrix6) -> str:
+    """How far off, about and along which axis most, and how sure that is."""
+    turn = float(np.degrees(BAND * _deviation(offset[ROTATION], covariance[ROTATION, ROTATION])))
+    shift = float(100 * BAND * _deviation(offset[TRANSLATION], covariance[TRANSLATION, TRANSLATION]))
+    about, along = _most(error, TURNS), _most(error, SHIFTS)
+    return (
+        f"{error.rotation_deg:.2f}° ± {turn:.2f}° (most of it {TURNS[about]}, {getattr(error, about):+.2f}°) and "
+        f"{error.translation_cm:.1f} ± {shift:.1f} cm (most of it {SHIFTS[along]}, {getattr(error, along):+.1f} cm)"
+    )
+
+
+def _most(error: PoseError, axes: dict[str, str]) -> str:
+    """The axis with the largest share of an error."""
+    return max(axes, key=lambda axis: abs(getattr(error, axis)))
+
+
+def _deviation(vector: Floats, covariance: Floats) -> float:
+    """Standard deviation in the direction of a vector, or the largest where it has none."""
+    length = float(np.linalg.norm(vector))
+    if length < 1e-9:
+        return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    direction = vector / length
+    return float(np.sqrt(direction @ covariance @ direction))
