@@ -40,7 +40,7 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
         serve_report(out)
 
 
-def write_report_of(recording: Path, out: Path) -> None:
+def write_report_of(recording: Path, out: Path, on_stderr: bool = False) -> None:
     """Make the report and say where it is."""
     from inspector.read.run import read_run
     from inspector.report.write import write_report
@@ -48,7 +48,7 @@ def write_report_of(recording: Path, out: Path) -> None:
     run = read_run(recording)
     if run.warning:
         click.echo(run.warning, err=True)
-    click.echo(f"Report: {write_report(run, out)}")
+    click.echo(f"Report: {write_report(run, out)}", err=on_stderr)
 
 
 def serve_report(folder: Path) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from calibnet.datasets import Sequence
     from inspector.cli.viewing import Viewing
     from inspector.record.outputs import Outputs
+    from inspector.run.session import Session
     from inspector.run.summary import Summary
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (
@@ -96,19 +99,31 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
+    options = checked(sequence, asked)
+    outputs = choose_outputs(options, viewing, report)
+    session = prepare(options, outputs)
+    with recording_to(outputs):
+        return finish(session.run(), outputs, report)
+
+
+def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
+    """The options of a run, which do not contradict each other and select some frames."""
     try:
         options = RunOptions(sequence=sequence, **asked)
     except OptionsError as error:
         raise click.UsageError(str(error)) from None
+    options.positions  # noqa: B018
+    return options
+
+
+def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Session:
+    """Load the cascade, say what is about to run, and hand back the run."""
     from rich.console import Console
 
     from calibnet.cascade.cascade import Cascade
     from inspector.record.recording import RunDescription
-    from inspector.record.stream import RecordingLostError
     from inspector.run.session import Session
 
-    positions = options.positions
-    outputs = choose_outputs(options, viewing, report)
     cascade = Cascade.load(
         options.preset, options.stages or options.start.stages, options.weights, wider=options.stages is None
     )
@@ -116,9 +131,9 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
     console = Console(stderr=True, highlight=False)
     announce(console, options, cascade)
     provenance = describe_provenance(options.preset, stages, options.weights)
-    session = Session(
-        sequence=sequence,
-        positions=positions,
+    return Session(
+        sequence=options.sequence,
+        positions=options.positions,
         cascade=cascade,
         skipped=cascade.skipped,
         start=options.start,
@@ -128,9 +143,17 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
         description=RunDescription(options.title, options.identity(stages), provenance),
         contents=options.contents,
         console=console,
+        verify=verify,
     )
+
+
+@contextmanager
+def recording_to(outputs: Outputs) -> Iterator[None]:
+    """Close the outputs in the end, whatever happens."""
+    from inspector.record.stream import RecordingLostError
+
     try:
-        return finish(session.run(), outputs, report)
+        yield
     except RecordingLostError as error:
         os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
@@ -173,23 +196,30 @@ def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> 
     return {"calib_inspect": __version__, **versions, "weights": json.dumps(records)}
 
 
-def finish(summary: Summary, outputs: Outputs, report: Path | None) -> int:
-    """Print the result and where it is, make the report, and serve until Ctrl-C where that was asked for."""
+def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: bool = False) -> int:
+    """Print the result and where it is, make the report, and serve until Ctrl-C where that was asked for.
+
+    The last line is the verdict. With ``on_stderr``, stdout is for something else.
+    """
+    say = partial(click.echo, err=on_stderr)
     for line in summary.lines():
-        click.echo(line)
+        say(line)
     if outputs.file is not None and summary.frames:
-        click.echo(size_line(outputs.file, summary.frames))
+        say(size_line(outputs.file, summary.frames))
         for line in saved_lines(outputs.file, summary.frames):
-            click.echo(line)
+            say(line)
         if report is not None:
             from inspector.cli.report import write_report_of
 
-            write_report_of(outputs.file, report)
+            write_report_of(outputs.file, report, on_stderr)
+    if outputs.page is not None and not summary.interrupted:
+        say(f"Serving at {outputs.page} until Ctrl-C.")
+    if summary.verdict:
+        say(summary.verdict)
     if summary.interrupted:
         click.echo("Interrupted: the frames above are all that was recorded.", err=True)
         return ExitCode.INTERRUPTED
     if outputs.page is not None:
-        click.echo(f"Serving at {outputs.page} until Ctrl-C.")
         outputs.wait_while_serving()
     return ExitCode.OK
 

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
+from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
 from inspector.read.file import RecordingError, RecordingFile
+from inspector.read.verdict import former_verdict, read_verdict
+from inspector.verdicts import of_frames
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
@@ -47,10 +50,11 @@ class RecordedFrame:
         source: name of its image file.
         camera: its own camera, at full size.
         initial: ``camera_from_lidar`` that the run started from, 4x4.
-        corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where the
-            picture did not confirm that.
+        corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where that is
+            rejected.
         stages: ``camera_from_lidar`` after every stage by its number, coarse to fine.
         reference: the true one, or None where nobody knows it.
+        verdict: whether the result is good; a recording without verdicts tells only whether it was applied.
     """
 
     index: int
@@ -61,11 +65,12 @@ class RecordedFrame:
     corrected: Extrinsic = field(repr=False)
     stages: dict[int, Extrinsic] = field(repr=False)
     reference: Extrinsic | None = field(repr=False)
+    verdict: Verdict = field(repr=False)
 
     @property
-    def confirmed(self) -> bool:
-        """Whether the picture confirmed what the last stage found, so that it is the result."""
-        return not self.stages or np.array_equal(self.corrected, self.stages[max(self.stages)])
+    def rejected(self) -> bool:
+        """Whether what the last stage found is taken to be wrong, so that the frame was left as it was."""
+        return self.verdict.word == REJECTED
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""
@@ -92,7 +97,10 @@ class RecordedRun:
         stages: the stages that ran, coarse to fine.
         has_reference: whether the frames have a reference, and with it errors.
         frames: the complete frames, in order; at least one.
+        skipped: frames that could not be used.
         drive: ``camera_from_lidar`` solved from all frames together; None where the run did not do that.
+        drive_verdict: whether that is good; None without it, and in recordings that keep no verdicts.
+        given_verdict: whether the calibration that the run started from is good; None where that was not asked.
         warning: one sentence when the file is cut off, to show the user; else empty.
     """
 
@@ -104,7 +112,10 @@ class RecordedRun:
     stages: tuple[RecordedStage, ...]
     has_reference: bool
     frames: tuple[RecordedFrame, ...] = field(repr=False)
+    skipped: tuple[BadFrame, ...] = field(repr=False)
     drive: Extrinsic | None = field(repr=False)
+    drive_verdict: Verdict | None = field(repr=False)
+    given_verdict: Verdict | None = field(repr=False)
     warning: str
     _file: RecordingFile = field(repr=False)
 
@@ -116,8 +127,19 @@ class RecordedRun:
 
     @property
     def results(self) -> list[Extrinsic]:
-        """The extrinsics that the picture confirmed; of all frames, if it confirmed none."""
-        return [frame.corrected for frame in self.frames if frame.confirmed] or [one.corrected for one in self.frames]
+        """The extrinsics that are not rejected; those of all frames, if all are."""
+        return [one.corrected for one in self.frames if not one.rejected] or [one.corrected for one in self.frames]
+
+    @property
+    def frames_verdict(self) -> Verdict:
+        """One verdict on all frames, see `inspector.verdicts.of_frames`."""
+        verdicts = {frame.index: frame.verdict for frame in self.frames}
+        return of_frames(verdicts, self.frames[0].initial, self.skipped)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the run was made for: on the calibration as given, else on the drive, else on the frames."""
+        return self.given_verdict or self.drive_verdict or self.frames_verdict
 
     def image(self, index: int) -> bytes:
         """The frame's image as JPEG."""
@@ -182,7 +204,10 @@ def read_run(path: Path) -> RecordedRun:
         stages=tuple(RecordedStage(*stage) for stage in zip(numbers, ranges, strict=True)),
         has_reference=has_reference,
         frames=frames,
+        skipped=tuple(BadFrame(row[entities.FRAME], row["TextLog:text"][0]) for row in _rows(tables[entities.SKIPPED])),
         drive=history[max(history)] if history else None,
+        drive_verdict=_verdict(tables[entities.VERDICT_DRIVE]),
+        given_verdict=_verdict(tables[entities.VERDICT_GIVEN]),
         warning=f"{path} is cut off: only its {len(frames)} complete frames are used." if file.cut else "",
         _file=file,
     )
@@ -190,7 +215,7 @@ def read_run(path: Path) -> RecordedRun:
 
 def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
     """Chunks by entity; of a file that is cut off the pictures too, for a frame may lack one of them."""
-    wanted = ("extrinsic/**", f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
+    wanted = ("extrinsic/**", "verdict/**", entities.SKIPPED, f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
     tables: dict[str, list[RecordBatch]] = defaultdict(list)
     for chunk in file.chunks(*wanted):
         entity, batch = chunk.entity_path.lstrip("/"), chunk.to_record_batch()
@@ -208,6 +233,12 @@ def _single(batches: list[RecordBatch]) -> dict[str, list[Any]]:
     }
 
 
+def _verdict(batches: list[RecordBatch]) -> Verdict | None:
+    """The one of static data."""
+    text = _single(batches).get(entities.VERDICT)
+    return read_verdict(text[0]) if text else None
+
+
 def _frames(
     tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool
 ) -> tuple[RecordedFrame, ...]:
@@ -218,22 +249,30 @@ def _frames(
     corrected = after[max(stages)] | _matrices(tables[entities.EXTRINSIC_CORRECTED])
     reference = _matrices(tables[entities.EXTRINSIC_REFERENCE])
     pictures = [{row[entities.FRAME] for row in _rows(tables[entity])} for entity in PICTURES] if cut else []
+    verdicts = {row[entities.FRAME]: row[entities.VERDICT][0] for row in _rows(tables[entities.VERDICT_FRAME])}
     cameras = {row[entities.FRAME]: row for row in _rows(tables[entities.CAMERA])}
     needed = [initial, *after.values(), *([reference] if has_reference else []), *pictures]
-    return tuple(
-        RecordedFrame(
-            index=index,
-            seconds=row[entities.TIME],
-            source=row["source"][0],
-            camera=PinholeCamera(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3))),
-            initial=initial[index],
-            corrected=corrected[index],
-            stages={number: matrices[index] for number, matrices in after.items()},
-            reference=reference.get(index),
+    frames = []
+    for index, row in sorted(cameras.items()):
+        if not all(index in known for known in needed):
+            continue
+        of_stages = {number: matrices[index] for number, matrices in after.items()}
+        frames.append(
+            RecordedFrame(
+                index=index,
+                seconds=row[entities.TIME],
+                source=row["source"][0],
+                camera=PinholeCamera(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3))),
+                initial=initial[index],
+                corrected=corrected[index],
+                stages=of_stages,
+                reference=reference.get(index),
+                verdict=read_verdict(verdicts[index])
+                if index in verdicts
+                else former_verdict(initial[index], corrected[index], of_stages),
+            )
         )
-        for index, row in sorted(cameras.items())
-        if all(index in known for known in needed)
-    )
+    return tuple(frames)
 
 
 def _matrices(batches: list[RecordBatch]) -> dict[int, Extrinsic]:

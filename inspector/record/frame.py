@@ -1,12 +1,14 @@
-"""What is recorded of every frame, whichever tabs are shown: image, table, extrinsics and camera."""
+"""What is recorded of every frame, whichever tabs are shown: image, table, verdict, extrinsics and camera."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 
+from calibnet.verdict.verdict import Verdict
 from inspector import entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Observation
@@ -23,8 +25,15 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
     rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
     table = stage_table(observation, rec.path if Part.OVERLAYS in contents.parts else None)
     rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
+    if observation.trace.verdict is not None:
+        rec.log(entities.VERDICT_FRAME, verdict_values(observation.trace.verdict))
     _log_extrinsics(rec, observation)
     _log_camera(rec, observation)
+
+
+def verdict_values(verdict: Verdict) -> rr.AnyValues:
+    """A verdict as the text that `inspector.read.verdict.read_verdict` reads."""
+    return rr.AnyValues(verdict_json=json.dumps(verdict.as_dict()))
 
 
 def _log_extrinsics(rec: Subtree, observation: Observation) -> None:

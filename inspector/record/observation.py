@@ -14,6 +14,7 @@ from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error
 from calibnet.geometry.projection import Projection
 from calibnet.geometry.types import Extrinsic, Vector3
 from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.verdict.verdict import Verdict
 from inspector.record.contents import Contents
 
 Xyz = tuple[float, float, float]
@@ -43,12 +44,14 @@ class Observation:
         trace: the run of the cascade on it.
         reference: the true ``camera_from_lidar``, or None where nobody knows it.
         skipped: stages that were asked for and have no weights.
+        given: the verdict on the extrinsic that the run started from, where this frame alone is to verify it.
     """
 
     frame: Frame
     trace: CascadeTrace
     reference: Extrinsic | None = field(default=None, repr=False)
     skipped: tuple[Skipped, ...] = ()
+    given: Verdict | None = field(default=None, repr=False)
 
     @property
     def start(self) -> str:

@@ -16,9 +16,9 @@ import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate
-from calibnet.verdict.verdict import BadFrame
+from calibnet.verdict.verdict import BadFrame, Verdict
 from inspector import entities
-from inspector.record.frame import log_frame
+from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation
 from inspector.record.stream import Stream
 from inspector.record.subtree import Subtree
@@ -101,9 +101,15 @@ class Recording:
             self._rec.set_frame(bad.frame, self._seconds.get(bad.frame, 0.0))
             self._rec.log(entities.SKIPPED, rr.TextLog(bad.why, level=rr.TextLogLevel.WARN))
 
-    def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
-        """Log what all frames together make of the extrinsic."""
-        log_drive(self._rec, estimate, reference, self._seconds)
+    def log_given(self, verdict: Verdict) -> None:
+        """Log whether the calibration that the run started from is good."""
+        self._rec.log_once(entities.VERDICT_GIVEN, verdict_values(verdict))
+
+    def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None = None) -> None:
+        """Log what all frames together make of the extrinsic and, shown beside it, the verdict on the given one."""
+        if estimate.verdict is not None:
+            self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
+        log_drive(self._rec, estimate, reference, self._seconds, given)
 
     def close(self) -> None:
         """Flush and write the footer; nothing, where nothing can be written any more."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from dataclasses import dataclass
 
@@ -24,6 +25,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict.verdict import BadFrame
+from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
@@ -31,6 +33,7 @@ from inspector.record.recording import Recording, RunDescription
 from inspector.record.tabs.drive import drive_sentence
 from inspector.run.start import Start
 from inspector.run.summary import Summary
+from inspector.verdicts import causes_of
 
 STOPPING = "Stopping after this frame; once more stops at once."
 
@@ -51,6 +54,7 @@ class Session:
         console: where progress is shown.
         drive: after the frames, also solve the drive's extrinsic from all of them.
         stop_on_bad_frame: end at the first frame that cannot be used, instead of going on with the next.
+        verify: also judge the calibration that the run starts from, by the only frame or by the drive.
     """
 
     sequence: Sequence
@@ -64,6 +68,12 @@ class Session:
     console: Console
     drive: bool = False
     stop_on_bad_frame: bool = False
+    verify: bool = False
+
+    @property
+    def frames(self) -> PickedFrames:
+        """The chosen frames."""
+        return PickedFrames(self.sequence, self.positions)
 
     def run(self) -> Summary:
         """Calibrate and record every frame that can be used.
@@ -78,7 +88,7 @@ class Session:
         summary = Summary()
         recording: Recording | None = None
         try:
-            with StopRequest(STOPPING) as stop, _progress(self.console) as progress:
+            with StopRequest(STOPPING) as stop, frame_progress(self.console) as progress:
                 for position in progress.track(self.positions, description=self.sequence.name):
                     if stop.requested:
                         summary.interrupted = True
@@ -93,11 +103,14 @@ class Session:
                     self.outputs.check_space()
                     recording.log(observation)
                     summary.add(observation)
+                    summary.given_verdict = observation.given
                 summary.check_enough()
                 if recording is not None:
                     recording.log_skipped(summary.skipped)
                     if self.drive and not summary.interrupted:
-                        summary.drive = self._solve_drive(recording, initial, reference, progress, stop)
+                        self._record_drive(recording, summary, initial, reference, progress, stop)
+                    if summary.given_verdict is not None:
+                        recording.log_given(summary.given_verdict)
         except KeyboardInterrupt:
             summary.interrupted = True
         except CalibnetError as error:
@@ -116,30 +129,36 @@ class Session:
             if self.stop_on_bad_frame or len(self.positions) == 1:
                 raise
             summary.skipped.append(BadFrame(position, str(error)))
+            summary.unread += isinstance(error, DatasetError) and not named_cause(error)
             self.console.print(f"Skipped: {error}", style="yellow", markup=False, soft_wrap=True)
             return None
-        return Observation(frame, trace, self.start.reference(frame), tuple(self.skipped))
+        given = None
+        if self.verify and not self.drive and trace.verdict is not None:
+            given = verify(trace.initial, trace.verdict, FRAME)
+        return Observation(frame, trace, self.start.reference(frame), tuple(self.skipped), given)
 
-    def _solve_drive(
+    def _record_drive(
         self,
         recording: Recording,
+        summary: Summary,
         initial: Extrinsic,
         reference: Extrinsic | None,
         progress: Progress,
         stop: StopRequest,
-    ) -> str:
-        """Solve the drive's extrinsic from all frames and log how it converges; returns the result in words."""
-        frames = PickedFrames(self.sequence, self.positions)
-        task = progress.add_task("whole drive", total=None)
-
-        def advance(read: int, total: int) -> None:
-            progress.update(task, completed=read, total=total)
-            if stop.requested:
-                raise KeyboardInterrupt
-
-        estimate = self.cascade.calibrate_drive(frames, initial, advance)
-        recording.log_drive(estimate, reference)
-        return drive_sentence(estimate, reference, initial)
+    ) -> None:
+        """Solve the drive's extrinsic from all frames, log how it converges, and say what came of it."""
+        try:
+            estimate = self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop))
+        except CalibrationError as error:
+            if not self.verify:
+                raise
+            summary.given_verdict = unfit(initial, str(error), causes_of(summary.verdicts.values()))
+            return
+        if self.verify and estimate.verdict is not None:
+            summary.given_verdict = verify(initial, estimate.verdict, DRIVE)
+        recording.log_drive(estimate, reference, summary.given_verdict)
+        summary.drive = drive_sentence(estimate, reference, initial)
+        summary.drive_verdict = estimate.verdict
 
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:
@@ -149,11 +168,24 @@ class Session:
         )
 
 
+def drive_observer(progress: Progress, stop: StopRequest) -> Callable[[int, int], None]:
+    """What shows how far the solving of a drive is, and ends it when a stop is requested."""
+    task = progress.add_task("whole drive", total=None)
+
+    def advance(read: int, total: int) -> None:
+        progress.update(task, completed=read, total=total)
+        if stop.requested:
+            raise KeyboardInterrupt
+
+    return advance
+
+
 class _FramesPerSecond(ProgressColumn):
     def render(self, task: Task) -> Text:
         return Text("" if task.speed is None else f"{task.speed:.1f} frames/s")
 
 
-def _progress(console: Console) -> Progress:
+def frame_progress(console: Console) -> Progress:
+    """A bar that counts frames."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _FramesPerSecond())
     return Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, speed_estimate_period=10.0)

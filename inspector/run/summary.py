@@ -7,21 +7,36 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from statistics import median
 
-from calibnet.errors import DatasetError
+from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import PoseError, pose_error
-from calibnet.verdict.verdict import BadFrame
+from calibnet.verdict.verdict import BadFrame, Verdict
 from inspector.record.observation import Observation
+from inspector.verdicts import counted, line
 
 
 @dataclass
 class Summary:
-    """Collects a few numbers a frame; constant memory is not needed for these."""
+    """Collects a few numbers a frame; constant memory is not needed for these.
+
+    Attributes:
+        frames: how many were recorded.
+        verdicts: on each of them by its number, from methods that give one.
+        skipped: frames that could not be read or calibrated.
+        unread: how many of these could not be read.
+        interrupted: whether the run was ended before its last frame.
+        drive: what all frames together came to, in words.
+        drive_verdict: whether that is good.
+        given_verdict: whether the calibration that the run started from is good, where it was to be verified.
+    """
 
     frames: int = 0
-    unconfirmed: int = 0
+    verdicts: dict[int, Verdict] = field(default_factory=dict, repr=False)
     skipped: list[BadFrame] = field(default_factory=list)
+    unread: int = 0
     interrupted: bool = False
     drive: str = ""
+    drive_verdict: Verdict | None = field(default=None, repr=False)
+    given_verdict: Verdict | None = field(default=None, repr=False)
     started: float = field(default_factory=time.monotonic)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
@@ -32,7 +47,8 @@ class Summary:
         """Take in one frame."""
         trace = observation.trace
         self.frames += 1
-        self.unconfirmed += trace.rejected
+        if trace.verdict is not None:
+            self.verdicts[observation.frame.index] = trace.verdict
         self._change.append(pose_error(trace.corrected, trace.initial))
         for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
             error = observation.error(extrinsic)
@@ -43,11 +59,17 @@ class Summary:
             self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
 
     def check_enough(self) -> None:
-        """Raise `DatasetError` where half of the frames or more could not be used."""
+        """See that fewer than half of the frames were left out.
+
+        Raises:
+            DatasetError: half of them or more could not be used, and some could not be read.
+            CalibrationError: all of these were read, but not calibrated.
+        """
         bad, tried = self.skipped, self.frames + len(self.skipped)
         if bad and 2 * len(bad) >= tried:
             each = " ".join(f"Frame {one.frame}: {one.why}" for one in bad)
-            raise DatasetError(f"{len(bad)} of {tried} frames cannot be used, which is half or more. {each}")
+            kind = DatasetError if self.unread else CalibrationError
+            raise kind(f"{len(bad)} of {tried} frames cannot be used, which is half or more. {each}")
 
     def lines(self) -> list[str]:
         """Sentences for the end of a run."""
@@ -61,10 +83,6 @@ class Summary:
             )
         else:
             lines.append(f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with.")
-        if self.unconfirmed:
-            lines.append(
-                f"{_frames(self.unconfirmed)} left as given: picture and scan do not fit together after the last stage."
-            )
         if self.skipped:
             numbers = ", ".join(str(bad.frame) for bad in self.skipped)
             lines.append(f"{_frames(len(self.skipped))} skipped, which could not be used: {numbers}.")
@@ -73,6 +91,16 @@ class Summary:
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
         lines.append(f"Cascade, median milliseconds: {times}.")
         return lines
+
+    @property
+    def verdict(self) -> str:
+        """The last line of a run: its verdict on what was given, on the drive or on the frames; empty without any."""
+        of_run = self.given_verdict or self.drive_verdict
+        if of_run is not None:
+            return line(of_run)
+        if len(self.verdicts) == 1:
+            return line(*self.verdicts.values())
+        return counted(self.verdicts) if self.verdicts else ""
 
 
 def _middle(errors: list[PoseError]) -> str:

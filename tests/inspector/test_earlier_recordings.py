@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from inspector.cli.main import cli
 from inspector.read.run import read_run
+from inspector.read.verdict import former_verdict
 
 KEPT = Path(__file__).parents[1] / "data" / "recording-of-version-0.1.0.rrd.xz"
 """Two frames of the fake car (`tests.support.fakes`), 5/0.5, seed 1, its drive solved as 2 cm off to the right."""
@@ -29,6 +30,16 @@ def test_its_frames_are_read(recording: Path) -> None:
     assert [frame.index for frame in run.frames] == [0, 1]
     errors = [frame.error(frame.corrected) for frame in run.frames]
     assert all(error is not None and error.rotation_deg < 1 for error in errors)
+
+
+def test_its_frames_are_judged_by_what_was_applied(recording: Path) -> None:
+    run = read_run(recording)
+    assert [frame.verdict.word for frame in run.frames] == ["accepted", "accepted"]
+    assert run.frames[0].verdict.reason == "Picture and scan fit together."
+    assert run.drive is not None and run.drive_verdict is None
+    frame = run.frames[0]
+    left = former_verdict(frame.initial, frame.initial, frame.stages)
+    assert left.word == "rejected"
 
 
 def test_check_passes_and_fails(recording: Path) -> None:

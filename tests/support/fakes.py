@@ -26,6 +26,7 @@ from calibnet.geometry import (
 )
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.trace import CascadeTrace, ScaleTrace, StageDetail, StageTrace
+from calibnet.verdict.verdict import Cause
 from tests.support.judged import judged
 
 LEFTOVER = 0.3
@@ -92,9 +93,11 @@ class FakeCascade:
         radius: int = 4,
         size: tuple[int, int] = (512, 160),
         doubted: tuple[int, ...] = (),
+        unsure: tuple[int, ...] = (),
+        causes: tuple[Cause, ...] = (),
     ) -> None:
-        """Frames whose index is in ``doubted`` are rejected."""
-        self.doubted = doubted
+        """Frames whose index is in ``doubted`` are rejected for ``causes``; of those in ``unsure`` nobody can tell."""
+        self.doubted, self.unsure, self.causes = doubted, unsure, causes
         self.stages = [FakeStage(number) for number in stages]
         self.strides, self.radius, self.size = strides, radius, size
 
@@ -112,7 +115,8 @@ class FakeCascade:
             range_, off = RANGES[number - 1], 6.0 if frame.index in self.doubted else 2.0
             stages.append(StageTrace(number, range_, camera, before, current, correction, timing, None, details, off))
         trace = CascadeTrace(initial, tuple(stages), {"features": 3.0}, match_error_limit_px=MATCH_ERROR_LIMIT)
-        return judged(trace, frame.index in self.doubted)
+        rejected = frame.index in self.doubted
+        return judged(trace, rejected, self.causes if rejected else (), frame.index in self.unsure)
 
     def _detail(self, frame: Frame, camera: PinholeCamera, before: NDArray[np.float64], seed: int) -> StageDetail:
         projection = project(frame.points, before, camera)

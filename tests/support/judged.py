@@ -5,12 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from calibnet.trace import CascadeTrace
-from calibnet.verdict.verdict import ACCEPTED, REJECTED, Cause, Verdict, moved
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, moved
 
 REASON = "Picture and scan do not fit together."
+UNSURE = "Picture and scan fit, but not well."
 
 
-def judged(trace: CascadeTrace, rejected: bool = False, causes: tuple[Cause, ...] = ()) -> CascadeTrace:
+def judged(
+    trace: CascadeTrace, rejected: bool = False, causes: tuple[Cause, ...] = (), unsure: bool = False
+) -> CascadeTrace:
     word, reason = (REJECTED, REASON) if rejected else (ACCEPTED, "Picture and scan fit together.")
+    if unsure:
+        word, reason = CANNOT_TELL, UNSURE
     verdict = Verdict(word, reason, trace.arrived, moved(trace.initial, trace.arrived), causes)
     return replace(trace, verdict=verdict)

@@ -1,6 +1,7 @@
 """Tab *Whole drive as one*: how each of the six parameters converges that are estimated from all frames of a drive.
 
-Each curve has its uncertainty band. It is there where `Layout.with_drive` says so, whatever else is recorded.
+Each curve has its uncertainty band, and beside them stands the verdict. The tab is there where `Layout.with_drive` says
+so, whatever else is recorded.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ import rerun.blueprint as rrb
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate, Estimate
+from calibnet.verdict.verdict import Verdict
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import View, curve_view
+from inspector.verdicts import OF_GIVEN, markdown_lines
 
 NAME = "Whole drive as one"
 
@@ -29,6 +32,12 @@ PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm",
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
 CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT}
 """Of every parameter, with their colours."""
+
+
+VERDICT_TEXT = "drive/verdict"
+"""Verdict on the estimate, how sure it is, and the frames that were left out, as text."""
+TEXT_SHARE = 0.24
+"""Of the tab's width that it takes."""
 
 
 def parameter(name: str) -> str:
@@ -59,7 +68,13 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     """Log nothing of a single frame: the estimate needs all of them, see `log_drive`."""
 
 
-def log_drive(rec: Subtree, estimate: DriveEstimate, reference: Extrinsic | None, seconds: Mapping[int, float]) -> None:
+def log_drive(
+    rec: Subtree,
+    estimate: DriveEstimate,
+    reference: Extrinsic | None,
+    seconds: Mapping[int, float],
+    given: Verdict | None = None,
+) -> None:
     """Log the estimate after each frame of its history, on the frames' own times.
 
     Args:
@@ -67,7 +82,11 @@ def log_drive(rec: Subtree, estimate: DriveEstimate, reference: Extrinsic | None
         estimate: of the drive.
         reference: that curves are relative to; without one, the estimate of all frames.
         seconds: time of every recorded frame by its index.
+        given: verdict on the extrinsic that the drive started from, where that was to be verified.
     """
+    lines = [] if given is None else markdown_lines(given, OF_GIVEN)
+    text = rr.TextDocument("\n".join([*lines, *_lines(estimate, reference)]), media_type=rr.MediaType.MARKDOWN)
+    rec.log_once(VERDICT_TEXT, text)
     origin = estimate.camera_from_lidar if reference is None else reference
     for frame, current in estimate.history:
         rec.set_frame(frame, seconds.get(frame, 0.0))
@@ -80,13 +99,26 @@ def log_drive(rec: Subtree, estimate: DriveEstimate, reference: Extrinsic | None
 
 
 def view(layout: Layout) -> View:
-    """Six plots: a good calibration runs into zero, inside its band."""
+    """The verdict beside six plots: a good calibration runs into zero, inside its band."""
     zero = "the reference" if layout.has_reference else "the estimate from all frames"
     views = [
         curve_view(f"{name.capitalize()} off {zero} [{unit}]", f"/{parameter(name)}")
         for name, unit in PARAMETERS.items()
     ]
-    return rrb.Grid(*views, grid_columns=3, name=NAME)
+    text = rrb.TextDocumentView(origin=VERDICT_TEXT, name="Verdict")
+    return rrb.Horizontal(text, rrb.Grid(*views, grid_columns=3), column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
+
+
+def _lines(estimate: DriveEstimate, reference: Extrinsic | None) -> list[str]:
+    """Verdict, frames and, where they are known, errors, as Markdown."""
+    lines = [] if estimate.verdict is None else markdown_lines(estimate.verdict)
+    lines += [f"Solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}.", ""]
+    if reference is not None:
+        error = pose_error(estimate.camera_from_lidar, reference)
+        lines += [f"Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm.", ""]
+    if estimate.skipped:
+        lines += ["Skipped:", "", *(f"- frame {bad.frame}: {bad.why}" for bad in estimate.skipped), ""]
+    return lines
 
 
 def offset(error: PoseError, name: str) -> float:

@@ -10,6 +10,8 @@ import math
 import rerun as rr
 import rerun.blueprint as rrb
 
+from calibnet.trace import CascadeTrace
+from calibnet.verdict.verdict import REJECTED
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation
@@ -60,13 +62,19 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     trace, reference = observation.trace, observation.reference
     overlays = frame_overlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
-    result = "corrected" if not trace.rejected else "left as it was: picture and scan do not fit"
-    overlays.log(rec, entities.OVERLAY_CORRECTED, result, trace.corrected)
+    overlays.log(rec, entities.OVERLAY_CORRECTED, _result(trace), trace.corrected)
     if reference is not None:
         overlays.log_reference(rec, entities.OVERLAY_REFERENCE, reference)
     if Part.CURVES in contents.parts:
         _log_errors(rec, observation)
         _log_fit(rec, observation)
+
+
+def _result(trace: CascadeTrace) -> str:
+    """What the corrected overlay shows, with the verdict on it."""
+    if trace.rejected:
+        return f"{REJECTED}, left as it was"
+    return "corrected" if trace.verdict is None else f"corrected, {trace.verdict.word}"
 
 
 def view(layout: Layout) -> View:

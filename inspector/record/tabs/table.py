@@ -13,6 +13,7 @@ from calibnet.geometry import RANGES, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from inspector import entities
 from inspector.record.observation import Observation
+from inspector.verdicts import OF_GIVEN, markdown_lines
 
 NOTHING = "–"
 READING_AID = (
@@ -29,10 +30,13 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
         path: gives the full path of an entity, so that the stages' names link to their overlays; None where these are
             not recorded.
     """
+    verdict = observation.trace.verdict
     lines = [
+        *([] if observation.given is None else markdown_lines(observation.given, OF_GIVEN)),
+        *([] if verdict is None else markdown_lines(verdict)),
         f"### {_headline(observation)}",
         "",
-        *_confirmation(observation),
+        *_match_error(observation),
         *_stages(observation, path),
         "",
         *_axes(observation),
@@ -48,7 +52,7 @@ def _headline(observation: Observation) -> str:
     """The result in a line."""
     frame, trace = observation.frame, observation.trace
     if trace.rejected:
-        return f"Frame {frame.index}: not corrected, picture and scan do not fit together"
+        return f"Frame {frame.index}: left as it was"
     before, after = observation.error(trace.initial), observation.error(trace.corrected)
     if before is None or after is None:
         change = pose_error(trace.corrected, trace.initial)
@@ -59,21 +63,18 @@ def _headline(observation: Observation) -> str:
     )
 
 
-def _confirmation(observation: Observation) -> list[str]:
-    """Whether the picture confirms the result: all that can be said where no reference is known."""
+def _match_error(observation: Observation) -> list[str]:
+    """How well picture and scan fit together after the last stage, in pixels of the frame's image."""
     trace = observation.trace
     if not trace.stages or math.isinf(trace.match_error_limit_px):
         return []
     last = trace.stages[-1]
-    found = f"its matches are expected to be {observation.image_px(last, last.match_error_px):.1f} px off"
+    found = f"{observation.image_px(last, last.match_error_px):.1f} px"
     limit = f"{observation.image_px(last, trace.match_error_limit_px):.1f} px"
-    if not trace.rejected:
-        return [f"The picture confirms it: after stage {last.number} {found} (of at most {limit}).", ""]
-    return [
-        f"**Left as it was**: after stage {last.number} {found}, more than {limit}. "
-        "Do picture and scan belong together, and is the start within the range of the first stage?",
-        "",
-    ]
+    lines = [f"After stage {last.number} matches are expected to be {found} off; at most {limit} are believed.", ""]
+    if not trace.fits:
+        lines += ["Do picture and scan belong together, and is the start within the range of the first stage?", ""]
+    return lines
 
 
 def _stages(observation: Observation, path: Callable[[str], str] | None) -> list[str]:

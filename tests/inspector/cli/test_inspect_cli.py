@@ -89,7 +89,9 @@ def test_without_display_and_save_the_recording_goes_to_recordings(invoke: Invok
     file = Path("recordings/folder-own.rrd")
     assert code == 0
     assert f"Saved {file}" in out
-    assert f"rerun {file}" in out.splitlines()[-1]
+    *_, command, last = out.splitlines()
+    assert f"rerun {file}" in command
+    assert last == "Verdict: accepted. Picture and scan fit together."
     assert file.is_file()
 
 

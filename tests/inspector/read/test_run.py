@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,10 +16,13 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from calibnet.geometry import MiscalibrationRange, project
+from calibnet.verdict.verdict import BadFrame, Cause, Verdict
 from inspector import entities
 from inspector.read.file import RecordingError
 from inspector.read.run import read_run
+from inspector.read.verdict import read_verdict
 from inspector.run.start import Start
+from tests.support.judged import REASON
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +59,28 @@ def test_extrinsics_come_back_exactly(full_recording: Path, fakes: ModuleType) -
     assert error.translation_cm < 0.1 * recorded.error(recorded.initial).translation_cm
 
 
-def test_a_frame_without_confirmation_keeps_its_start(record: Callable[..., Any], tmp_path: Path) -> None:
-    record(tmp_path / "doubted.rrd", detail="overview", strides=(32,), doubted=(1,))
+def test_verdicts_come_back_and_a_rejected_frame_keeps_its_start(record: Callable[..., Any], tmp_path: Path) -> None:
+    causes = (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
+    record(tmp_path / "doubted.rrd", detail="overview", strides=(32,), doubted=(1,), unsure=(2,), causes=causes)
     frames = read_run(tmp_path / "doubted.rrd").frames
-    assert [frame.confirmed for frame in frames] == [True, False, True]
+    assert [frame.verdict.word for frame in frames] == ["accepted", "rejected", "cannot tell"]
+    assert frames[1].verdict.causes == causes and frames[1].verdict.reason == REASON
     for frame in frames:
-        result = frame.stages[5] if frame.confirmed else frame.initial
+        np.testing.assert_array_equal(frame.verdict.camera_from_lidar, frame.stages[5])
+        result = frame.initial if frame.rejected else frame.stages[5]
         np.testing.assert_array_equal(frame.corrected, result)
         assert not np.array_equal(frame.stages[5], frame.initial)
+
+
+def test_a_verdict_is_read_as_it_was_written() -> None:
+    pose, covariance = np.arange(16.0).reshape(4, 4) / 7, np.diag(np.arange(1.0, 7.0)) / 3
+    skipped = (BadFrame(4, "It is cut short."),)
+    causes = (Cause("units", "Ranges are in millimetres.", "median 11000"),)
+    written = Verdict("cannot tell", "Who knows.", pose, (0.1, 2.5), causes, covariance, 9, skipped)
+    found = read_verdict(json.dumps(written.as_dict()))
+    assert found.as_dict() == written.as_dict()
+    assert found.causes == causes and found.skipped == skipped and found.moved == (0.1, 2.5)
+    np.testing.assert_array_equal(found.covariance, covariance)
 
 
 def test_pictures_come_back(full_recording: Path, fakes: ModuleType) -> None:

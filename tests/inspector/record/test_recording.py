@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from calibnet.verdict.verdict import Cause
 from inspector import entities
 from inspector.record.outputs import rerun_binary
 from inspector.record.tabs import cascade, cost_volumes
+from tests.support.judged import REASON, UNSURE
 
 STAGES, STRIDES, FRAMES = (3, 4, 5), (8, 16, 32), [0, 1, 2]
 Read = Callable[..., list[tuple[Any, Any]]]
@@ -27,6 +29,7 @@ def expected_streams() -> dict[str, str]:
     streams = {
         "image": encoded,
         "table": "TextDocument:text",
+        "verdict/frame": "verdict_json",
         "overlay/miscalibrated": points,
         "overlay/corrected": points,
         "overlay/reference": points,
@@ -164,13 +167,15 @@ def test_without_reference_nothing_claims_to_know_it(record: Callable[..., Any],
     assert "No reference" in row.as_py()[0]
 
 
-def test_a_frame_without_confirmation_is_shown_as_it_was(
+def test_a_rejected_frame_is_shown_as_it_was(
     record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
 ) -> None:
     file = tmp_path / "doubted.rrd"
-    summary = record(file, detail="overview", doubted=(1,))
+    causes = (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
+    summary = record(file, detail="overview", doubted=(1,), unsure=(2,), causes=causes)
     captions = [row.as_py()[0] for _, row in read(file, "overlay/corrected/caption", "Points2D:labels")]
-    assert [caption.startswith("left as it was: picture and scan do not fit") for caption in captions] == [0, 1, 0]
+    told = [caption.partition(":")[0] for caption in captions]
+    assert told == ["corrected, accepted", "rejected, left as it was", "corrected, cannot tell"]
     shown, given = (
         [row.as_py() for _, row in read(file, f"overlay/{name}", "Points2D:positions")]
         for name in ("corrected", "miscalibrated")
@@ -181,11 +186,17 @@ def test_a_frame_without_confirmation_is_shown_as_it_was(
     assert fit == pytest.approx([2.0 * scale, 6.0 * scale, 2.0 * scale])
     assert read(file, "fit/limit", "Scalars:scalars")[0][1].as_py() == pytest.approx([4.0 * scale])
     texts = [row.as_py()[0] for _, row in read(file, "table", "TextDocument:text")]
-    assert (
-        "The picture confirms it: after stage 5 its matches are expected to be 1.6 px off (of at most 3.1" in texts[0]
+    assert texts[0].startswith("# Accepted\n\nPicture and scan fit together.\n")
+    assert "After stage 5 matches are expected to be 1.6 px off; at most 3.1 px are believed." in texts[0]
+    assert texts[1].startswith(
+        f"# Rejected\n\n{REASON}\n\n- **mirrored**: The picture looks mirrored. *(1.2 px, not 7.1 px)*\n"
     )
-    assert "Frame 1: not corrected, picture and scan do not fit together" in texts[1]
-    assert any(line.startswith("1 frame left as given") for line in summary.lines())
+    assert "### Frame 1: left as it was" in texts[1]
+    assert texts[2].startswith(f"# Cannot tell\n\n{UNSURE}\n")
+    assert summary.verdict == (
+        f"Verdict: 1 accepted, 1 rejected (frame 1: {REASON} The picture looks mirrored), "
+        f"1 cannot tell (frame 2: {UNSURE[:-1]})."
+    )
 
 
 def test_overview_keeps_every_view_but_the_raw_volumes_and_coarse_scales(

@@ -1,0 +1,136 @@
+"""Judging the calibration that a session starts from, with a recording or without."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.selection import PickedFrames
+from calibnet.drive.convergence import spread
+from calibnet.errors import CalibrationError, DatasetError
+from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.interruption import StopRequest
+from calibnet.verdict.verdict import Cause, Verdict
+from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
+from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
+from inspector.run.summary import Summary
+from inspector.verdicts import causes_of
+
+SUSPECTS = 5
+"""Frames, spread over a drive that cannot be solved, that are asked for the cause."""
+UNKNOWN = np.full((4, 4), np.nan)
+"""The extrinsic where the input cannot even be made into a frame."""
+
+
+@dataclass(frozen=True)
+class Readable:
+    """Frames, and which of them could not be read."""
+
+    frames: PickedFrames
+    stop: bool = False
+    unread: dict[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read a frame, and note where that fails; input that is read and cannot be right counts as read."""
+        try:
+            return self.frames[position]
+        except DatasetError as error:
+            if not named_cause(error):
+                self.unread[self.frames.positions[position]] = str(error)
+            raise
+
+    def first(self) -> Frame:
+        """The first one that can be read.
+
+        Raises:
+            DatasetError: half of them or more cannot.
+        """
+        for position in range(len(self)):
+            try:
+                return self[position]
+            except DatasetError as error:
+                if named_cause(error):
+                    raise
+                self.check()
+        raise AssertionError("without frames there is nothing to read")
+
+    def check(self) -> None:
+        """See that enough frames could be read.
+
+        Raises:
+            DatasetError: half of them or more could not, or one where ``stop`` is set.
+        """
+        if not self.unread or not (self.stop or 2 * len(self.unread) >= len(self)):
+            return
+        each = " ".join(f"Frame {position}: {why}" for position, why in self.unread.items())
+        share = "" if self.stop else ", which is half or more"
+        raise DatasetError(f"{len(self.unread)} of {len(self)} frames cannot be read{share}. {each}")
+
+
+def verify_session(session: Session, record: bool) -> tuple[Verdict, Summary | None]:
+    """Judge the calibration that a session starts from, by its only frame or by the drive.
+
+    Args:
+        session: with ``verify`` set.
+        record: run it as it is, recording included; otherwise only what the verdict needs is computed.
+
+    Returns:
+        The verdict, and the summary of a recorded run.
+
+    Raises:
+        DatasetError: half of the frames or more cannot be read.
+        KeyboardInterrupt: the run was interrupted before there was a verdict.
+    """
+    frames = Readable(session.frames, session.stop_on_bad_frame)
+    given, summary = UNKNOWN, None
+    try:
+        given = session.start.initial(frames.first())
+        if not record:
+            return _judge(session, frames, given), None
+        summary = session.run()
+        if summary.given_verdict is None:
+            raise KeyboardInterrupt
+        return summary.given_verdict, summary
+    except (CalibrationError, DatasetError) as error:
+        causes = named_cause(error)
+        if not causes:
+            frames.check()
+            if record and isinstance(error, DatasetError):
+                raise
+        return unfit(given, str(error), causes or _suspected(session, frames, given)), summary
+
+
+def as_json(verdict: Verdict) -> dict[str, object]:
+    """The verdict's JSON object; null for an extrinsic that is not known."""
+    content = verdict.as_dict()
+    return content if np.isfinite(verdict.camera_from_lidar).all() else content | {"camera_from_lidar": None}
+
+
+def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
+    if len(frames) == 1:
+        found, tolerance = session.cascade.calibrate(frames[0], given).verdict, FRAME
+    else:
+        with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
+            observer = drive_observer(progress, stop)
+            found, tolerance = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
+        frames.check()
+    assert found is not None, "the cascade judges what it finds"
+    return verify(given, found, tolerance)
+
+
+def _suspected(session: Session, frames: Readable, given: Extrinsic) -> tuple[Cause, ...]:
+    """What some frames of a drive, each by itself, say is wrong with the input."""
+    verdicts = []
+    for position in spread(len(frames), SUSPECTS) if len(frames) > 1 else []:
+        try:
+            verdict = session.cascade.calibrate(frames[position], given).verdict
+        except (CalibrationError, DatasetError) as error:
+            verdicts.append(unfit(given, str(error), named_cause(error)))
+        else:
+            verdicts += [] if verdict is None else [verdict]
+    return causes_of(verdicts)

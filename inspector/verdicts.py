@@ -1,0 +1,115 @@
+"""A verdict in words, for the terminal and the viewer, and that on several frames together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from calibnet.geometry.median import median_pose
+from calibnet.geometry.types import Extrinsic
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
+
+OF_GIVEN = "Calibration as given"
+"""What `verify` judges, in a heading."""
+
+
+def line(verdict: Verdict) -> str:
+    """The last line of a run."""
+    return f"Verdict: {verdict.word}. {explained(verdict)}"
+
+
+def explained(verdict: Verdict) -> str:
+    """The reason, and what is likely to be wrong with the input."""
+    return " ".join([verdict.reason, *further_causes(verdict)])
+
+
+def further_causes(verdict: Verdict) -> list[str]:
+    """The causes' sentences that the reason does not say already."""
+    return [cause.text for cause in verdict.causes if cause.text not in verdict.reason]
+
+
+def certainty(verdict: Verdict) -> str:
+    """How sure the result is, in degrees and centimetres; empty where nothing states it."""
+    if verdict.covariance is None:
+        return ""
+    return (
+        f"Sure to {verdict.sigma_rotation_deg:.2f}° / {verdict.sigma_translation_cm:.1f} cm (one standard deviation)."
+    )
+
+
+def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
+    """The word as a heading, the reason, the causes with their evidence, and how sure the result is.
+
+    Args:
+        verdict: what to say.
+        of: what it is on, where that is not the result of the run.
+    """
+    heading = f"{of}: {verdict.word}" if of else verdict.word.capitalize()
+    lines = [f"# {heading}", "", verdict.reason, ""]
+    lines += [f"- **{cause.name}**: {cause.text} *({cause.evidence})*" for cause in verdict.causes]
+    lines += [""] if verdict.causes else []
+    return [*lines, certainty(verdict), ""] if certainty(verdict) else lines
+
+
+def counted(verdicts: Mapping[int, Verdict]) -> str:
+    """How many frames have each verdict, which do not pass, and why the first of them does not."""
+    parts = []
+    for word in WORDS:
+        frames = [frame for frame, verdict in verdicts.items() if verdict.word == word]
+        parts.append(f"{len(frames)} {word}")
+        if frames and word != ACCEPTED:
+            others = f"frames {', '.join(map(str, frames))}; " if len(frames) > 1 else ""
+            reason = explained(verdicts[frames[0]]).removesuffix(".")
+            parts[-1] += f" ({others}frame {frames[0]}: {reason})"
+    return f"Verdict: {', '.join(parts)}."
+
+
+def of_frames(verdicts: Mapping[int, Verdict], initial: Extrinsic, skipped: Iterable[BadFrame] = ()) -> Verdict:
+    """One verdict on several frames.
+
+    It is rejected if half of them or more are, accepted if more than half are, and else cannot be told. A single
+    frame's is its own.
+
+    Args:
+        verdicts: of the frames by their number, at least one.
+        initial: ``camera_from_lidar`` that the first of them started from, 4x4.
+        skipped: frames that could not be used.
+
+    Returns:
+        The verdict on the median of the frames that are not rejected, or of all if all are; it states no covariance,
+        for what frames get wrong alike only a drive's estimate knows.
+    """
+    single, *others = verdicts.values()
+    if not others:
+        return replace(single, skipped=tuple(skipped))
+    believed = [one for one in verdicts.values() if one.word != REJECTED] or list(verdicts.values())
+    median = median_pose([one.camera_from_lidar for one in believed])
+    reason = counted(verdicts).removeprefix("Verdict: ")
+    return Verdict(
+        majority(verdicts.values()),
+        f"Of {len(verdicts)} frames {reason}",
+        median,
+        moved(initial, median),
+        causes_of(verdicts.values()),
+        used=len(verdicts),
+        skipped=tuple(skipped),
+    )
+
+
+def majority(verdicts: Iterable[Verdict]) -> Word:
+    """Rejected if half or more are, accepted if more than half are, else cannot tell."""
+    counts = Counter(verdict.word for verdict in verdicts)
+    total = counts.total()
+    if 2 * counts[REJECTED] >= total:
+        return REJECTED
+    return ACCEPTED if 2 * counts[ACCEPTED] > total else CANNOT_TELL
+
+
+def causes_of(verdicts: Iterable[Verdict]) -> tuple[Cause, ...]:
+    """One cause of each name, that of most frames first."""
+    found: dict[str, list[Cause]] = {}
+    for verdict in verdicts:
+        for cause in verdict.causes:
+            found.setdefault(cause.name, []).append(cause)
+    return tuple(same[0] for same in sorted(found.values(), key=len, reverse=True))
