@@ -1,4 +1,4 @@
-"""Bounds that a recorded run has to keep, and the verdict on each as text and as JUnit XML."""
+"""What a recorded run has to stand: its verdict, and limits on its errors; as text and as JUnit XML."""
 
 from __future__ import annotations
 
@@ -7,25 +7,27 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from calibnet.evaluation.metrics import Distribution, Metrics
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
+from inspector.verdicts import explained
 
 SUITE = "calib-inspect check"
 STATISTICS = {"median": "median", "p95": "95th percentile"}
 
 
 @dataclass(frozen=True)
-class Bound:
+class Limit:
     """The largest value allowed of one kind of error.
 
     Attributes:
         kind: ``"rotation"`` or ``"translation"``.
-        limit: in degrees or centimetres.
+        largest: in degrees or centimetres.
         statistic: over the frames, one of `STATISTICS`, that must not exceed it.
     """
 
     kind: str
-    limit: float
+    largest: float
     statistic: str
 
     def say(self, value: float) -> str:
@@ -34,75 +36,92 @@ class Bound:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """A bound and what was found, in its unit."""
+class Outcome:
+    """A limit and what was found, in its unit."""
 
-    bound: Bound
+    limit: Limit
     value: float
 
     @property
     def passed(self) -> bool:
-        """Whether the bound is kept; a value that is no number keeps none."""
-        return self.value <= self.bound.limit
+        """Whether the limit is kept; a value that is no number keeps none."""
+        return self.value <= self.limit.largest
 
     @property
     def sentence(self) -> str:
         """What was found, and by how much it is too much."""
-        bound = self.bound
-        found = f"{STATISTICS[bound.statistic]} {bound.kind} error {bound.say(self.value)}"
+        limit = self.limit
+        found = f"{STATISTICS[limit.statistic]} {limit.kind} error {limit.say(self.value)}"
         if self.passed:
-            return f"{found} (allowed {bound.say(bound.limit)})"
-        return f"{found} exceeds {bound.say(bound.limit)} by {bound.say(self.value - bound.limit)}"
+            return f"{found} (allowed {limit.say(limit.largest)})"
+        return f"{found} exceeds {limit.say(limit.largest)} by {limit.say(self.value - limit.largest)}"
 
 
-def check_run(run: RecordedRun, bounds: Sequence[Bound]) -> list[Verdict]:
-    """Hold the corrected extrinsics of all frames against bounds.
+def check_run(run: RecordedRun, limits: Sequence[Limit]) -> list[Outcome]:
+    """Hold the corrected extrinsics of all frames against limits; none need no reference.
 
     Raises:
         RecordingError: the recording has no reference to measure errors against.
     """
+    if not limits:
+        return []
     if not run.has_reference:
         raise RecordingError(
-            f"{run.path} has no reference extrinsic, so its errors are unknown; check a run on calibrated data, "
-            "or give the folder command --range to take its calibration for the reference."
+            f"{run.path} has no reference extrinsic, so its errors are unknown; check it without limits, check a run "
+            "on calibrated data, or give the folder command --range to take its calibration for the reference."
         )
     errors = [error for frame in run.frames if (error := frame.error(frame.corrected)) is not None]
     metrics = Metrics.of(errors)
     kinds: dict[str, Distribution] = {"rotation": metrics.rotation_deg, "translation": metrics.translation_cm}
-    return [Verdict(bound, float(getattr(kinds[bound.kind], bound.statistic))) for bound in bounds]
+    return [Outcome(limit, float(getattr(kinds[limit.kind], limit.statistic))) for limit in limits]
 
 
-def summary(run: RecordedRun, verdicts: Sequence[Verdict]) -> str:
-    """The outcome in one line; of a failure only what failed."""
+def summary(run: RecordedRun, outcomes: Sequence[Outcome]) -> str:
+    """The limits in one line; of a failure only what failed."""
     frames = "1 frame" if len(run.frames) == 1 else f"{len(run.frames)} frames"
-    failed = [verdict.sentence for verdict in verdicts if not verdict.passed]
+    failed = [outcome.sentence for outcome in outcomes if not outcome.passed]
     if failed:
         return f"Failed: {'; '.join(failed)} ({run.path}, {frames})."
-    return f"Passed: {'; '.join(verdict.sentence for verdict in verdicts)} ({run.path}, {frames})."
+    return f"Passed: {'; '.join(outcome.sentence for outcome in outcomes)} ({run.path}, {frames})."
 
 
-def junit(run: RecordedRun, verdicts: Sequence[Verdict]) -> bytes:
-    """The verdicts as JUnit XML, one test case a bound."""
+def junit(run: RecordedRun, outcomes: Sequence[Outcome]) -> bytes:
+    """JUnit XML: a test case for the verdict, which is skipped where it cannot be told, and one a limit."""
+    word = run.verdict.word
     counts = {
         "name": SUITE,
-        "tests": str(len(verdicts)),
-        "failures": str(sum(not verdict.passed for verdict in verdicts)),
+        "tests": str(1 + len(outcomes)),
+        "failures": str((word == REJECTED) + sum(not outcome.passed for outcome in outcomes)),
         "errors": "0",
-        "skipped": "0",
+        "skipped": str(int(word == CANNOT_TELL)),
         "time": "0",
     }
     suites = ElementTree.Element("testsuites", counts)
     suite = ElementTree.SubElement(suites, "testsuite", counts)
-    for verdict in verdicts:
-        bound = verdict.bound
-        name = f"{STATISTICS[bound.statistic]} {bound.kind} error is at most {bound.say(bound.limit)}"
-        attributes = {"classname": f"calib-inspect.{run.path.stem}", "name": name, "time": "0"}
-        case = ElementTree.SubElement(suite, "testcase", attributes)
-        if verdict.passed:
-            ElementTree.SubElement(case, "system-out").text = f"{run.title}: {verdict.sentence}"
+    _add_verdict(suite, run)
+    for outcome in outcomes:
+        limit = outcome.limit
+        name = f"{STATISTICS[limit.statistic]} {limit.kind} error is at most {limit.say(limit.largest)}"
+        case = _case(suite, run, name)
+        if outcome.passed:
+            ElementTree.SubElement(case, "system-out").text = f"{run.title}: {outcome.sentence}"
         else:
-            failure = {"type": "BoundExceeded", "message": verdict.sentence}
-            ElementTree.SubElement(case, "failure", failure).text = f"{run.title}: {verdict.sentence}"
+            failure = {"type": "LimitExceeded", "message": outcome.sentence}
+            ElementTree.SubElement(case, "failure", failure).text = f"{run.title}: {outcome.sentence}"
     ElementTree.indent(suites)
     text: bytes = ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
+
+
+def _add_verdict(suite: ElementTree.Element, run: RecordedRun) -> None:
+    case, reason = _case(suite, run, "verdict is accepted"), explained(run.verdict)
+    if run.verdict.word == ACCEPTED:
+        ElementTree.SubElement(case, "system-out").text = f"{run.title}: {reason}"
+    elif run.verdict.word == REJECTED:
+        ElementTree.SubElement(case, "failure", type="Rejected", message=reason).text = f"{run.title}: {reason}"
+    else:
+        ElementTree.SubElement(case, "skipped", message=f"Cannot tell: {reason}")
+
+
+def _case(suite: ElementTree.Element, run: RecordedRun, name: str) -> ElementTree.Element:
+    return ElementTree.SubElement(suite, "testcase", classname=f"calib-inspect.{run.path.stem}", name=name, time="0")

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from calibnet.runtime.whole_file import write_whole
-from inspector.cli.errors import ExitCode
+from inspector.cli.errors import VERDICT_CODES, ExitCode
+from inspector.cli.output import JSON_FILE, write_json
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
 LIMIT = click.FloatRange(min=0.0)
@@ -22,29 +23,38 @@ LIMIT = click.FloatRange(min=0.0)
     type=click.Choice(["median", "p95"]),
     default="median",
     show_default=True,
-    help="Over the frames: which of their errors must keep the bounds.",
+    help="Over the frames: which of their errors must keep the limits.",
 )
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")
 def check(
     recording: Path,
     max_rotation: float | None,
     max_translation: float | None,
     statistic: str,
+    json_file: str | None,
     junit_file: Path | None,
 ) -> int:
-    """Hold the errors of a recorded run against bounds; exits with 1 when one is exceeded.
+    """Hold a recorded run against its verdict and, where they are given, against limits on its errors.
 
-    Give one bound or both. Errors are those of the corrected extrinsics against the reference.
+    Exits with 1 when the verdict is rejected or a limit is exceeded, and with 4 when it cannot be told. The verdict is
+    that of the drive; of a run without --drive it is on the frames: rejected if half of them or more are, accepted if
+    more than half are. Errors are those of the frames' corrected extrinsics against the reference.
     """
-    if max_rotation is None and max_translation is None:
-        raise click.UsageError("Give --max-rotation, --max-translation or both: without a bound nothing is checked.")
-    from inspector.check import Bound, check_run, junit, summary
+    from inspector.check import Limit, check_run, junit, summary
+    from inspector.verdicts import line
 
-    limits = {"rotation": max_rotation, "translation": max_translation}
-    bounds = [Bound(kind, limit, statistic) for kind, limit in limits.items() if limit is not None]
+    largest = {"rotation": max_rotation, "translation": max_translation}
+    limits = [Limit(kind, value, statistic) for kind, value in largest.items() if value is not None]
     run = open_run(recording)
-    verdicts = check_run(run, bounds)
+    outcomes = check_run(run, limits)
+    verdict = run.verdict
     if junit_file is not None:
-        write_whole(junit_file, junit(run, verdicts))
-    click.echo(summary(run, verdicts))
-    return ExitCode.OK if all(verdict.passed for verdict in verdicts) else ExitCode.CHECK_FAILED
+        write_whole(junit_file, junit(run, outcomes))
+    write_json(json_file, verdict.as_dict())
+    if outcomes:
+        click.echo(summary(run, outcomes), err=json_file == "-")
+    click.echo(line(verdict), err=json_file == "-")
+    if not all(outcome.passed for outcome in outcomes):
+        return ExitCode.CHECK_FAILED
+    return VERDICT_CODES[verdict.word]

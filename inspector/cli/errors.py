@@ -25,14 +25,23 @@ SYSTEM_PACKAGES = {
 
 
 class ExitCode(IntEnum):
-    """What the process tells its caller; a command whose check failed exits through ``ctx.exit(1)``."""
+    """What the process tells its caller."""
 
     OK = 0
     CHECK_FAILED = 1
     USAGE = 2
     BAD_INPUT = 3
+    CANNOT_TELL = 4
     INTERRUPTED = 130
     BROKEN_PIPE = 141
+
+
+VERDICT_CODES = {
+    "accepted": ExitCode.OK,
+    "rejected": ExitCode.CHECK_FAILED,
+    "cannot tell": ExitCode.CANNOT_TELL,
+}
+"""What a command that judges ends with, by the word of its verdict."""
 
 
 def run(command: click.Command, arguments: list[str] | None = None) -> int:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from calibnet.runtime.whole_file import write_whole
+from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 from inspector.export.registry import FORMATS, export_as
@@ -27,6 +28,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default]")
 @click.option("--drive", is_flag=True, help="The extrinsic of the drive, of a run with --drive.")
+@click.option("--force", is_flag=True, help="Write it although it is rejected.")
 @click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
 @click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
@@ -44,15 +46,19 @@ def export(
     frame: int | None,
     median: bool,
     drive: bool,
+    force: bool,
     output: Path | None,
     camera_frame: str,
     lidar_frame: str,
     parent: str,
-) -> None:
+) -> int:
     """Write the corrected extrinsic as KITTI calib.txt, ROS 2 static transform, OpenCV YAML or JSON.
 
     By default the median of all frames: the rotation and the translation with the smallest sum of
     distances to those of the frames, which outliers hardly move. Every file says its convention.
+
+    What is rejected is not written, and the exit code is 1, unless --force is given. What is rejected or cannot be told
+    says so on stderr and in the file.
     """
     if (recording is None) == (folder is None):
         raise click.UsageError("Give a recording or --from FOLDER.")
@@ -69,12 +75,28 @@ def export(
 
     frames = FrameNames(camera_frame, lidar_frame, parent == "lidar")
     exported = replace(chosen(recording, folder, frame, drive), frames=frames)
+    if not may_be_written(exported, force):
+        return ExitCode.CHECK_FAILED
     text = export_as(form, exported)
     if output is None:
         click.echo(text, nl=False)
     else:
         write_whole(output, text.encode())
-        click.echo(f"Saved {output}: {exported.origin}.", err=True)
+        click.echo(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
+    return ExitCode.OK
+
+
+def may_be_written(exported: Exported, force: bool) -> bool:
+    """Say on stderr what is wrong with a calibration that is not accepted; false where it must not be written."""
+    verdict = exported.verdict
+    if verdict is None or verdict.word == "accepted":
+        return True
+    from inspector.verdicts import explained
+
+    written = force or verdict.word != "rejected"
+    what = "Written all the same." if written else "Nothing is written; --force writes it all the same."
+    click.echo(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
+    return written
 
 
 def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool) -> Exported:

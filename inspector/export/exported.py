@@ -10,10 +10,11 @@ import numpy as np
 
 from calibnet.datasets.folder_calibration import read_folder_calibration
 from calibnet.geometry import PinholeCamera
-from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
+from calibnet.verdict.verdict import ACCEPTED, Verdict
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
+from inspector.verdicts import explained
 
 
 class FrameNames(NamedTuple):
@@ -32,8 +33,9 @@ class Exported:
         camera_from_lidar: 4x4, metres.
         camera: intrinsics; of the rectified images.
         distortion: OpenCV's coefficients of the raw images; zeros where the images are rectified already.
-        origin: where it comes from, for the file's comment.
+        origin: where it comes from, for the file's comment; says so where that is not accepted.
         frames: names of the two coordinate frames.
+        verdict: whether it is good, of a recording; None where nothing says.
     """
 
     camera_from_lidar: Extrinsic = field(repr=False)
@@ -41,28 +43,25 @@ class Exported:
     distortion: Floats = field(repr=False)
     origin: str
     frames: FrameNames = field(default_factory=FrameNames)
+    verdict: Verdict | None = field(default=None, repr=False)
 
 
 def exported_frame(run: RecordedRun, index: int) -> Exported:
-    """The corrected extrinsic of one frame, exactly.
+    """The extrinsic that was found in one frame, exactly, whether or not it is accepted.
 
     Raises:
         RecordingError: the recording has no such frame.
     """
     for frame in run.frames:
         if frame.index == index:
-            if not frame.confirmed:
-                raise RecordingError(
-                    f"Picture and scan of frame {index} of {run.path} do not fit together, so it has no result; "
-                    "choose another frame."
-                )
-            return Exported(frame.corrected, frame.camera, np.zeros(5), f"{run.title}, frame {index}")
+            found = frame.verdict.camera_from_lidar
+            return _judged(found, frame.camera, f"{run.title}, frame {index}", frame.verdict)
     first, last = run.frames[0].index, run.frames[-1].index
     raise RecordingError(f"{run.path} has no complete frame {index}, only frames from {first} to {last}; choose one.")
 
 
 def exported_median(run: RecordedRun) -> Exported:
-    """The median of the corrected extrinsics of all frames, see `median_pose`.
+    """The median of what was found in the frames that are not rejected, or in all if all are; see `median_pose`.
 
     Raises:
         RecordingError: the frames are not all of one camera on one mount.
@@ -70,14 +69,10 @@ def exported_median(run: RecordedRun) -> Exported:
     camera = run.frames[0].camera
     if not (run.one_mount and all(_same_camera(camera, frame.camera) for frame in run.frames)):
         raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
-    count = sum(frame.confirmed for frame in run.frames)
-    if not count:
-        raise RecordingError(
-            f"In no frame of {run.path} do picture and scan fit together, so there is no result to export; check that "
-            "they belong together, and record again from a wider --range."
-        )
+    count = sum(not frame.rejected for frame in run.frames) or len(run.frames)
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
-    return Exported(median_pose(run.results), camera, np.zeros(5), origin)
+    verdict = run.frames_verdict
+    return _judged(verdict.camera_from_lidar, camera, origin, verdict)
 
 
 def exported_drive(run: RecordedRun) -> Exported:
@@ -90,7 +85,8 @@ def exported_drive(run: RecordedRun) -> Exported:
         raise RecordingError(
             f"{run.path} has no estimate from the whole drive; record it with --drive, or use --median."
         )
-    return Exported(run.drive, run.frames[0].camera, np.zeros(5), f"{run.title}, all frames solved together")
+    origin = f"{run.title}, all frames solved together"
+    return _judged(run.drive, run.frames[0].camera, origin, run.drive_verdict)
 
 
 def exported_folder(folder: Path) -> Exported:
@@ -103,6 +99,13 @@ def exported_folder(folder: Path) -> Exported:
     content = read_folder_calibration(path)
     camera = PinholeCamera(content.width, content.height, content.calibration.matrix)
     return Exported(content.calibration.camera_from_lidar, camera, content.distortion, f"{folder.name}/{path.name}")
+
+
+def _judged(extrinsic: Extrinsic, camera: PinholeCamera, origin: str, verdict: Verdict | None) -> Exported:
+    """What a recording says, of rectified images."""
+    if verdict is not None and verdict.word != ACCEPTED:
+        origin = f"{origin}; {verdict.word}: {explained(verdict)}"
+    return Exported(extrinsic, camera, np.zeros(5), origin, verdict=verdict)
 
 
 def _same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:

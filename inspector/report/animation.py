@@ -87,12 +87,12 @@ def steps_of(run: RecordedRun, frame: RecordedFrame) -> Iterator[Step]:
     start = "miscalibrated" if run.has_reference else "as given"
     yield Step(entities.OVERLAY_MISCALIBRATED, start, _error(frame, frame.initial), FIRST_MS)
     for stage in run.stages:
-        last = frame.confirmed and stage == run.stages[-1]
+        last = not frame.rejected and stage == run.stages[-1]
         name = f"after stage {stage.number} (for {MiscalibrationRange.parse(stage.range).label})"
         error = _error(frame, frame.stages[stage.number])
         yield Step(entities.overlay_stage(stage.number), name, error, LAST_MS if last else STAGE_MS)
-    if not frame.confirmed:
-        name = "left as it was: picture and scan do not fit"
+    if frame.rejected:
+        name = "rejected, left as it was"
         yield Step(entities.OVERLAY_CORRECTED, name, _error(frame, frame.corrected), LAST_MS)
 
 

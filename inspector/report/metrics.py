@@ -13,6 +13,7 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
+from calibnet.verdict.verdict import WORDS
 from inspector.read.run import RecordedFrame, RecordedRun
 
 DISTANCE_M = 10.0
@@ -62,8 +63,8 @@ class Figures:
 
     Attributes:
         run: the recording.
-        states: initial first, then every stage that ran; the last is the corrected one, which frames that the
-            picture did not confirm leave where they started.
+        states: initial first, then every stage that ran; the last is the corrected one, where frames that
+            are rejected stand as they started.
         changes: from the initial to the corrected extrinsic, a frame each.
         median: extrinsic in the middle of all corrected ones; None where the frames are of several mounts.
         median_error: of that extrinsic; None without reference or median.
@@ -131,9 +132,9 @@ class Figures:
         return Metrics.of(self.changes)
 
     @property
-    def unconfirmed(self) -> int:
-        """Frames whose picture and scan did not fit together after the last stage."""
-        return sum(not frame.confirmed for frame in self.run.frames)
+    def rejected(self) -> int:
+        """Frames that were left as they were."""
+        return sum(frame.rejected for frame in self.run.frames)
 
     def ranking(self) -> list[int]:
         """Positions of the frames, best corrected first."""
@@ -156,7 +157,10 @@ class Figures:
             "versions": run.provenance,
             "weights": {str(number): record for number, record in run.weights.items()},
             "frames": len(run.frames),
-            "unconfirmed": self.unconfirmed,
+            "unconfirmed": self.rejected,  # its former name
+            "verdicts": self._verdicts(),
+            "verdict_of_given": None if run.given_verdict is None else run.given_verdict.as_dict(),
+            "verdict_of_drive": None if run.drive_verdict is None else run.drive_verdict.as_dict(),
             "measured_against": "reference" if self.has_reference else "median of the corrected extrinsics",
             "initial": self._summary(self.initial),
             "stages": [
@@ -170,6 +174,11 @@ class Figures:
             "per_frame": [self._frame(position, frame) for position, frame in enumerate(run.frames)],
         }
 
+    def _verdicts(self) -> dict[str, int]:
+        """How many frames have each verdict."""
+        words = [frame.verdict.word for frame in self.run.frames]
+        return {word.replace(" ", "_"): words.count(word) for word in WORDS}
+
     def _summary(self, state: State) -> dict[str, Any]:
         return state.metrics.as_dict() if self.has_reference else _distributions(state.metrics)
 
@@ -180,6 +189,7 @@ class Figures:
             "source": frame.source,
             "errors": {state.key: _rounded(state.errors[position]) for state in self.states},
             "change": _rounded(self.changes[position]),
+            "verdict": frame.verdict.as_dict(),
             "initial_camera_from_lidar": frame.initial.tolist(),
             "corrected_camera_from_lidar": frame.corrected.tolist(),
         }

@@ -15,7 +15,7 @@ from inspector.report.charts import charts, series_styles
 from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.pictures import depth_scale
 from inspector.report.tables import axes_table, stages_table
-from inspector.report.verdict import ROTATION, TRANSLATION, count, headline, verdict
+from inspector.report.verdict import GRADES, ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
 
 SETTING_NAMES = {
     "sequence": "data",
@@ -83,9 +83,10 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         style=_template("page.css").substitute(series_styles(figures.states)),
         headline=escape(headline(figures)),
         warning=f'<p class="warning">{escape(run.warning)}</p>' if run.warning else "",
-        verdict="\n".join(
-            f'<li class="{finding.grade}">{escape(finding.sentence)}</li>' for finding in verdict(figures)
-        ),
+        word=run.verdict.word.capitalize(),
+        grade=GRADES[run.verdict.word],
+        reasons=_items(verdict(run)),
+        findings=_items(findings(figures)),
         about=escape(f"{run.title} · {count(len(run.frames))}"),
         recording=escape(recording),
         serve_command=escape(SERVE_COMMAND.format(recording=recording)),
@@ -102,6 +103,10 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         size=f"{recording_bytes / 1e6:.1f} MB",
         script=_resource("page.js"),
     )
+
+
+def _items(found: Sequence[Finding]) -> str:
+    return "\n".join(f'<li class="{finding.grade}">{escape(finding.sentence)}</li>' for finding in found)
 
 
 def _coloring(run: RecordedRun) -> Coloring:

@@ -1,4 +1,4 @@
-"""What the figures mean, in plain words: one sentence of result and a short verdict."""
+"""The verdict on a run, and what its figures mean, in plain words: one sentence of result and a few findings."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from calibnet.evaluation.metrics import Distribution, Metrics
+from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Word
+from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures, State
+from inspector.verdicts import certainty
 
 Grade = Literal["good", "fair", "bad", "note"]
 
 
 class Finding(NamedTuple):
-    """One sentence of the verdict and how it is to be taken."""
+    """One sentence and how it is to be taken."""
 
     grade: Grade
     sentence: str
@@ -56,7 +59,7 @@ class Quantity:
 
 ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
 TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 2.5, 5.0, 1)
-NO_FIT = "Picture and scan do not fit together after the last stage"
+GRADES: dict[Word, Grade] = {ACCEPTED: "good", CANNOT_TELL: "fair", REJECTED: "bad"}
 CLEAR_CHANGE = 2.0
 """A change that is not so many times larger than the frames' disagreement is no evidence of anything."""
 
@@ -76,16 +79,25 @@ def headline(figures: Figures) -> str:
     return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected.metrics)}."
 
 
-def verdict(figures: Figures) -> list[Finding]:
-    """What is good and what is not."""
+def verdict(run: RecordedRun) -> list[Finding]:
+    """The reason of the run's verdict, likely causes, how sure the result is, and the frames left out."""
+    found = run.verdict
+    lines = [Finding(GRADES[found.word], found.reason)]
+    lines += [Finding("bad", f"{cause.text} ({cause.name}: {cause.evidence})") for cause in found.causes]
+    lines += [Finding("note", certainty(found))] if certainty(found) else []
+    return lines + [Finding("note", f"Frame {bad.frame} was skipped: {bad.why}") for bad in found.skipped]
+
+
+def findings(figures: Figures) -> list[Finding]:
+    """What is good in the figures and what is not."""
     if not figures.run.stages:
         return [Finding("bad", "No stage ran, so nothing was corrected.")]
-    if figures.unconfirmed == len(figures.run.frames):
-        return [Finding("bad", f"{NO_FIT}: nothing was corrected.")]
+    if figures.rejected == len(figures.run.frames):
+        return [Finding("bad", "Every frame is rejected: nothing was corrected.")]
     if figures.has_reference:
-        findings = [_judge_error(quantity, figures) for quantity in (ROTATION, TRANSLATION)]
-        return _confirmation(figures) + findings + _together(figures)
-    return _confirmation(figures) + _judge_agreement(figures)
+        errors = [_judge_error(quantity, figures) for quantity in (ROTATION, TRANSLATION)]
+        return _rejected(figures) + errors + _together(figures)
+    return _rejected(figures) + _judge_agreement(figures)
 
 
 def pair(metrics: Metrics) -> str:
@@ -139,12 +151,12 @@ def _worse(quantity: Quantity, figures: Figures) -> str:
     return f" In {worse} of {count(total)} it is worse than before." if worse and total > 1 else ""
 
 
-def _confirmation(figures: Figures) -> list[Finding]:
+def _rejected(figures: Figures) -> list[Finding]:
     """How many frames were left as they were; nothing if none."""
-    if not figures.unconfirmed:
+    if not figures.rejected:
         return []
-    share = f"{figures.unconfirmed} of {count(len(figures.run.frames))}"
-    return [Finding("bad", f"{NO_FIT} in {share}, which were left as they were.")]
+    were = "is rejected and was left as it was" if figures.rejected == 1 else "are rejected and were left as they were"
+    return [Finding("bad", f"{figures.rejected} of {count(len(figures.run.frames))} {were}.")]
 
 
 def _together(figures: Figures) -> list[Finding]:

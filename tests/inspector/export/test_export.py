@@ -24,6 +24,7 @@ from inspector.export.exported import exported_drive, exported_median
 from inspector.export.formats import quaternion_xyzw
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun, read_run
+from tests.support.judged import REASON, UNSURE
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_opencv_yaml_is_read_by_file_storage(
     assert "# camera_from_lidar maps LiDAR points" in file.read_text()
 
 
-def test_only_results_that_the_picture_confirmed_are_exported(
+def test_what_is_rejected_is_exported_by_force_alone(
     export: Callable[..., str], record: Callable[..., Any], tmp_path: Path
 ) -> None:
     some, none = tmp_path / "some.rrd", tmp_path / "none.rrd"
@@ -146,8 +147,26 @@ def test_only_results_that_the_picture_confirmed_are_exported(
         content["camera_from_lidar"], median_pose([frames[0].corrected, frames[2].corrected]), atol=1e-12
     )
     assert "median of 2 frames" in json.dumps(content)
-    assert "frame 1" in export(some, "--format", "json", "--frame", 1, code=3)
-    assert "In no frame" in export(none, "--format", "json", code=3)
+    refusal = f"calib-inspect: Rejected. {REASON} Nothing is written; --force writes it all the same.\n"
+    assert export(some, "--format", "json", "--frame", 1, "--output", tmp_path / "out.json", code=1) == refusal
+    assert not (tmp_path / "out.json").exists()
+    forced = json.loads(export(some, "--format", "json", "--frame", 1, "--force"))
+    np.testing.assert_array_equal(forced["camera_from_lidar"], frames[1].stages[5])  # what was found, not the start
+    assert forced["source"].endswith(f"frame 1; rejected: {REASON}")
+    assert "Rejected. Of 3 frames 0 accepted, 3 rejected" in export(none, "--format", "json", code=1)
+    assert "median of 3 frames; rejected: " in json.loads(export(none, "--format", "json", "--force"))["source"]
+
+
+@pytest.mark.parametrize("form", ["kitti", "ros", "opencv", "json"])
+def test_what_cannot_be_told_is_exported_with_a_warning_in_the_file(
+    record: Callable[..., Any], tmp_path: Path, capsys: pytest.CaptureFixture[str], form: str
+) -> None:
+    file, out = tmp_path / "unsure.rrd", tmp_path / "out"
+    record(file, length=1, detail="overview", strides=(32,), unsure=(0,))
+    assert run(cli, ["export", str(file), "--format", form, "--frame", "0", "--output", str(out)]) == 0
+    assert capsys.readouterr().err.startswith(f"calib-inspect: Cannot tell. {UNSURE} Written all the same.\n")
+    (line,) = [line for line in out.read_text().splitlines() if UNSURE in line]
+    assert "frame 0; cannot tell: " in line and (form == "json" or line.startswith("#"))
 
 
 def test_json_is_the_median_unless_a_frame_is_named(

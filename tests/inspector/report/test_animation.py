@@ -20,7 +20,7 @@ from inspector.report.animation import CAPTION_HEIGHT, FIRST_MS, LAST_MS, STAGE_
 
 @pytest.fixture(scope="module")
 def recorded(record: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
-    """Five frames with the overlays of three stages; the picture does not confirm frame 1."""
+    """Five frames with the overlays of three stages; frame 1 is rejected."""
     file = tmp_path_factory.mktemp("animated") / "run.rrd"
     record(file, length=5, detail="overview", strides=(32,), doubted=(1,))
     return read_run(file)
@@ -57,7 +57,7 @@ def test_the_steps_of_a_frame_name_every_stage_with_its_error(recorded: Recorded
 
 def test_a_frame_that_was_left_as_it_was_ends_so(recorded: RecordedRun) -> None:
     *_, fifth, last = steps_of(recorded, recorded.frames[1])
-    assert last.name == "left as it was: picture and scan do not fit"
+    assert last.name == "rejected, left as it was"
     assert last.error == next(steps_of(recorded, recorded.frames[1])).error  # the initial one
     assert (last.overlay, fifth.milliseconds) == (entities.OVERLAY_CORRECTED, STAGE_MS)
 

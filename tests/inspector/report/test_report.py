@@ -20,7 +20,7 @@ from inspector.cli.main import cli
 from inspector.read.run import RecordedRun, read_run
 from inspector.report.metrics import Figures, misplacement_cm
 from inspector.report.pictures import PICTURE_WIDTH, draw_overlay
-from inspector.report.verdict import headline, verdict
+from inspector.report.verdict import findings, headline, verdict
 from inspector.report.write import write_report
 
 
@@ -54,15 +54,25 @@ def page_of(run: RecordedRun, folder: Path) -> str:
     return write_report(run, folder).read_text(encoding="utf-8")
 
 
-def test_frames_that_the_picture_does_not_confirm_are_told(record: Callable[..., Any], tmp_path: Path) -> None:
+def test_rejected_frames_are_told(record: Callable[..., Any], tmp_path: Path) -> None:
     for doubted in ((1,), (0, 1, 2)):
         record(tmp_path / "run.rrd", detail="overview", strides=(32,), doubted=doubted)
         figures = Figures.of(read_run(tmp_path / "run.rrd"))
-        assert figures.unconfirmed == figures.as_dict()["unconfirmed"] == len(doubted)
+        assert figures.rejected == figures.as_dict()["unconfirmed"] == len(doubted)
+        content = figures.as_dict()
+        assert content["verdicts"] == {"accepted": 3 - len(doubted), "rejected": len(doubted), "cannot_tell": 0}
+        assert content["verdict_of_drive"] is None
+        told = [frame["verdict"]["verdict"] for frame in content["per_frame"]]
+        assert told == ["rejected" if index in doubted else "accepted" for index in range(3)]
         assert figures.corrected.errors[1] == figures.initial.errors[1]
-        first = verdict(figures)[0]
-        assert first.grade == "bad" and "do not fit together" in first.sentence
+        first = findings(figures)[0]
+        assert first.grade == "bad" and "rejected" in first.sentence
         assert ("nothing was corrected" in first.sentence) == (len(doubted) == 3)
+        (reason,) = verdict(figures.run)
+        assert reason.grade == ("good" if len(doubted) == 1 else "bad") and "do not fit together" in reason.sentence
+        page = page_of(figures.run, tmp_path / str(len(doubted)))
+        word = "Accepted" if len(doubted) == 1 else "Rejected"
+        assert f'<p class="word {reason.grade}">{word}</p>' in page
 
 
 def test_page_states_the_figures_of_the_run(known: RecordedRun, tmp_path: Path, fakes: ModuleType) -> None:
@@ -110,14 +120,14 @@ def test_without_reference_it_says_change_and_agreement_only(unknown: RecordedRu
     assert "No reference is known" in page
     assert "Frames within" not in page
     assert "corrected extrinsics, so the figures say how far the frames scatter" in page
-    grades = {finding.sentence.partition(":")[0]: finding.grade for finding in verdict(Figures.of(run))}
+    grades = {finding.sentence.partition(":")[0]: finding.grade for finding in findings(Figures.of(run))}
     assert grades["Translation"] == "good"
 
 
 def test_frames_that_disagree_are_not_called_good(unknown: RecordedRun) -> None:
-    findings = verdict(Figures.of(moved(unknown, [-0.2, 0.0, 0.3])))
-    assert any(finding.grade == "bad" and "do not agree" in finding.sentence for finding in findings)
-    assert any("may have been right" in finding.sentence for finding in findings)
+    found = findings(Figures.of(moved(unknown, [-0.2, 0.0, 0.3])))
+    assert any(finding.grade == "bad" and "do not agree" in finding.sentence for finding in found)
+    assert any("may have been right" in finding.sentence for finding in found)
 
 
 def test_what_got_worse_is_called_so(known: RecordedRun) -> None:
@@ -126,7 +136,7 @@ def test_what_got_worse_is_called_so(known: RecordedRun) -> None:
         for frame in known.frames
     )
     worse = replace(known, frames=frames, stages=known.stages[-1:])
-    sentences = [finding.sentence for finding in verdict(Figures.of(worse)) if finding.grade == "bad"]
+    sentences = [finding.sentence for finding in findings(Figures.of(worse)) if finding.grade == "bad"]
     assert [sentence.partition(" ")[0] for sentence in sentences] == ["Rotation", "Translation"]
     assert all("is not corrected" in s and "In 5 of 5\u00a0frames it is worse" in s for s in sentences)
 
