@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from inspector.cli.run import calibrate, run_options
 from inspector.cli.viewing import RECORDINGS
 
 if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
     from inspector.cli.viewing import Viewing
 
 DEMO_LENGTH = 12
@@ -22,6 +24,16 @@ DEMO_LENGTH = 12
 root_option = click.option("--root", type=FOLDER, envvar="KITTI_ROOT", help="The dataset's folder.  [env: KITTI_ROOT]")
 camera_option = click.option(
     "--camera", type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
+)
+split_option = click.option(
+    "--split", default="training", show_default=True, help="training, testing, or a list in ImageSets."
+)
+dataset_option = click.option(
+    "--dataset",
+    type=click.Choice([name for name in dataset_names() if not name.startswith("kitti-")]),
+    default="folder",
+    show_default=True,
+    help="What the folder holds; packages can add to these.",
 )
 
 
@@ -35,10 +47,7 @@ def seq(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
 
     --root is the folder that holds `sequences`.
     """
-    from calibnet.datasets import open_sequence
-
-    opened = open_sequence("kitti-odometry", require_root(root, "odometry"), sequence=sequence, camera=camera)
-    return calibrate(opened, camera=camera, **asked)
+    return calibrate(open_odometry(sequence, root, camera), camera=camera, **asked)
 
 
 @click.command()
@@ -52,14 +61,11 @@ def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) ->
 
     --root is the folder that holds the dates.
     """
-    from calibnet.datasets import open_sequence
-
-    opened = open_sequence("kitti-raw", require_root(root, "raw"), date=date, drive=number, camera=camera)
-    return calibrate(opened, camera=camera, **asked)
+    return calibrate(open_raw(date, number, root, camera), camera=camera, **asked)
 
 
 @click.command("object")
-@click.option("--split", default="training", show_default=True, help="training, testing, or a list in ImageSets.")
+@split_option
 @root_option
 @camera_option
 @run_options
@@ -68,21 +74,12 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
     --root is the folder that holds `training`.
     """
-    from calibnet.datasets import open_sequence
-
-    opened = open_sequence("kitti-object", require_root(root, "object detection"), split=split, camera=camera)
-    return calibrate(opened, camera=camera, **asked)
+    return calibrate(open_object(split, root, camera), camera=camera, **asked)
 
 
 @click.command()
 @click.argument("directory", type=FOLDER)
-@click.option(
-    "--dataset",
-    type=click.Choice([name for name in dataset_names() if not name.startswith("kitti-")]),
-    default="folder",
-    show_default=True,
-    help="What the folder holds; packages can add to these.",
-)
+@dataset_option
 @run_options
 def folder(directory: Path, dataset: str, **asked: Any) -> int:
     """Calibrate your own images/, clouds/ and calibration.yaml.
@@ -92,7 +89,7 @@ def folder(directory: Path, dataset: str, **asked: Any) -> int:
     """
     from calibnet.datasets import open_sequence
 
-    as_is = asked["range"] is None and asked["miscalibration"] is None
+    as_is = not disturbed(asked)
     return calibrate(open_sequence(dataset, directory), as_is=as_is, **asked)
 
 
@@ -110,6 +107,32 @@ def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> in
         viewing = replace(viewing, save=viewing.save or RECORDINGS / "demo.rrd")
     drive = SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE)
     return calibrate(drive, viewing=viewing, report=report, **asked)
+
+
+def open_odometry(sequence: str, root: Path | None, camera: int) -> Sequence:
+    """A sequence of KITTI odometry."""
+    from calibnet.datasets import open_sequence
+
+    return open_sequence("kitti-odometry", require_root(root, "odometry"), sequence=sequence, camera=camera)
+
+
+def open_raw(date: str, number: str, root: Path | None, camera: int) -> Sequence:
+    """A drive of KITTI raw."""
+    from calibnet.datasets import open_sequence
+
+    return open_sequence("kitti-raw", require_root(root, "raw"), date=date, drive=number, camera=camera)
+
+
+def open_object(split: str, root: Path | None, camera: int) -> Sequence:
+    """The frames of KITTI object detection."""
+    from calibnet.datasets import open_sequence
+
+    return open_sequence("kitti-object", require_root(root, "object detection"), split=split, camera=camera)
+
+
+def disturbed(asked: Mapping[str, Any]) -> bool:
+    """Whether the options of a run put a miscalibration on the dataset's extrinsic."""
+    return asked["range"] is not None or asked["miscalibration"] is not None
 
 
 def require_root(root: Path | None, part: str) -> Path:

@@ -35,10 +35,11 @@ COMMANDS = {
     "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
     "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
+    "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),
     "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
     "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),
     "export": LazyCommand("inspector.cli.export:export", "The extrinsic for KITTI, ROS 2 or OpenCV, or as JSON."),
-    "check": LazyCommand("inspector.cli.check:check", "Fail when a recording's errors exceed bounds; for CI."),
+    "check": LazyCommand("inspector.cli.check:check", "Fail when a recording is rejected or exceeds limits; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
@@ -97,8 +98,8 @@ COMPLETION = (
 def cli() -> None:
     """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
 
-    Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 a check failed, 2 wrong
-    usage, 3 bad input or environment, 130 interrupted.
+    Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 rejected or a limit
+    exceeded, 2 wrong usage, 3 bad input or environment, 4 cannot tell, 130 interrupted.
     """
 
 
