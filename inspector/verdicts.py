@@ -12,6 +12,8 @@ from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, Bad
 
 OF_GIVEN = "Calibration as given"
 """What `verify` judges, in a heading."""
+OF_RESULT = "What was found"
+"""What it is held against."""
 
 
 def line(verdict: Verdict) -> str:
@@ -47,9 +49,14 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
     """
     heading = f"{of}: {verdict.word}" if of else verdict.word.capitalize()
     lines = [f"# {heading}", "", verdict.reason, ""]
-    lines += [f"- **{cause.name}**: {cause.text} *({cause.evidence})*" for cause in verdict.causes]
+    lines += [f"- **{cause.name}**: {_once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
     lines += [""] if verdict.causes else []
     return [*lines, certainty(verdict), ""] if certainty(verdict) else lines
+
+
+def _once(cause: Cause, verdict: Verdict) -> str:
+    """A cause's sentence and a space, unless the reason says it already."""
+    return "" if cause.text in verdict.reason else f"{cause.text} "
 
 
 def counted(verdicts: Mapping[int, Verdict]) -> str:

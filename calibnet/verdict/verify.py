@@ -126,13 +126,13 @@ def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance
 
     Each is tested alone: a small turn that is very sure says nothing of a large shift that is not.
     """
-    too_far = {
-        ROTATION: error.rotation_deg > tolerance.rotation_deg,
-        TRANSLATION: error.translation_cm > tolerance.translation_cm,
-    }
+    too_far = (
+        (ROTATION, error.rotation_deg > tolerance.rotation_deg),
+        (TRANSLATION, error.translation_cm > tolerance.translation_cm),
+    )
     return any(
         far and offset[rows] @ np.linalg.solve(covariance[rows, rows], offset[rows]) > SIGNIFICANT
-        for rows, far in too_far.items()
+        for rows, far in too_far
     )
 
 

@@ -121,12 +121,14 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
     from rich.console import Console
 
     from calibnet.cascade.cascade import Cascade
+    from calibnet.geometry.miscalibration import stages_within
     from inspector.record.recording import RunDescription
     from inspector.run.session import Session
 
-    cascade = Cascade.load(
-        options.preset, options.stages or options.start.stages, options.weights, wider=options.stages is None
-    )
+    numbers = options.stages or options.start.stages
+    if verify and options.stages is None:  # how far off the calibration is, is what is asked
+        numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
+    cascade = Cascade.load(options.preset, numbers, options.weights, wider=options.stages is None)
     stages = [stage.number for stage in cascade.stages]
     console = Console(stderr=True, highlight=False)
     announce(console, options, cascade)

@@ -83,7 +83,7 @@ def verdict(run: RecordedRun) -> list[Finding]:
     """The reason of the run's verdict, likely causes, how sure the result is, and the frames left out."""
     found = run.verdict
     lines = [Finding(GRADES[found.word], found.reason)]
-    lines += [Finding("bad", f"{cause.text} ({cause.name}: {cause.evidence})") for cause in found.causes]
+    lines += [Finding("bad", f"{cause.name.capitalize()}: {cause.text} ({cause.evidence})") for cause in found.causes]
     lines += [Finding("note", certainty(found))] if certainty(found) else []
     return lines + [Finding("note", f"Frame {bad.frame} was skipped: {bad.why}") for bad in found.skipped]
 

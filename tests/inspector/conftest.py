@@ -41,6 +41,7 @@ def record() -> Callable[..., None]:
         per_frame: bool = False,
         provenance: dict[str, Any] | None = None,
         stop_on_bad_frame: bool = False,
+        drive: bool = False,
         **cascade: Any,
     ) -> Any:
         session = Session(
@@ -54,6 +55,7 @@ def record() -> Callable[..., None]:
             contents=Contents.of(Detail(detail), frozenset(map(Part, parts)), Coloring(color)),
             console=Console(quiet=True),
             stop_on_bad_frame=stop_on_bad_frame,
+            drive=drive,
         )
         return session.run()
 

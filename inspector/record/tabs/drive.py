@@ -21,7 +21,7 @@ from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import View, curve_view
-from inspector.verdicts import OF_GIVEN, markdown_lines
+from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NAME = "Whole drive as one"
 
@@ -84,8 +84,7 @@ def log_drive(
         seconds: time of every recorded frame by its index.
         given: verdict on the extrinsic that the drive started from, where that was to be verified.
     """
-    lines = [] if given is None else markdown_lines(given, OF_GIVEN)
-    text = rr.TextDocument("\n".join([*lines, *_lines(estimate, reference)]), media_type=rr.MediaType.MARKDOWN)
+    text = rr.TextDocument("\n".join(_lines(estimate, reference, given)), media_type=rr.MediaType.MARKDOWN)
     rec.log_once(VERDICT_TEXT, text)
     origin = estimate.camera_from_lidar if reference is None else reference
     for frame, current in estimate.history:
@@ -109,9 +108,11 @@ def view(layout: Layout) -> View:
     return rrb.Horizontal(text, rrb.Grid(*views, grid_columns=3), column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
 
 
-def _lines(estimate: DriveEstimate, reference: Extrinsic | None) -> list[str]:
-    """Verdict, frames and, where they are known, errors, as Markdown."""
-    lines = [] if estimate.verdict is None else markdown_lines(estimate.verdict)
+def _lines(estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None) -> list[str]:
+    """Verdicts, frames and, where they are known, errors, as Markdown."""
+    lines = [] if given is None else markdown_lines(given, OF_GIVEN)
+    if estimate.verdict is not None:
+        lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
     lines += [f"Solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}.", ""]
     if reference is not None:
         error = pose_error(estimate.camera_from_lidar, reference)

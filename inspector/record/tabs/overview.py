@@ -85,7 +85,7 @@ def view(layout: Layout) -> View:
     ]
     if layout.has_reference:
         overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE, layout.image))
-    below: View = rrb.TextDocumentView(origin=entities.TABLE, name="What every stage did to this frame")
+    below: View = rrb.TextDocumentView(origin=entities.TABLE, name="Verdict, and what every stage did to this frame")
     if layout.stages and Part.CURVES in layout.contents.parts:
         below = rrb.Horizontal(rrb.Vertical(*_curve_views(layout)), below, column_shares=[1.0, 1.0])
     width, height = layout.image

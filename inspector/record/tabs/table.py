@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable
 
 from calibnet.geometry import RANGES, PoseError, pose_error
-from calibnet.geometry.types import Extrinsic
+from calibnet.trace import CascadeTrace
 from inspector import entities
 from inspector.record.observation import Observation
-from inspector.verdicts import OF_GIVEN, markdown_lines
+from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NOTHING = "–"
 READING_AID = (
@@ -30,10 +30,8 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
         path: gives the full path of an entity, so that the stages' names link to their overlays; None where these are
             not recorded.
     """
-    verdict = observation.trace.verdict
     lines = [
-        *([] if observation.given is None else markdown_lines(observation.given, OF_GIVEN)),
-        *([] if verdict is None else markdown_lines(verdict)),
+        *_verdicts(observation),
         f"### {_headline(observation)}",
         "",
         *_match_error(observation),
@@ -45,7 +43,14 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
     lines += [f"{stage.reason}\n" for stage in observation.skipped]
     if observation.reference is None:
         lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
-    return "\n".join([*lines, *_extrinsic(observation.trace.corrected), "", READING_AID, ""])
+    return "\n".join([*lines, *_extrinsic(observation.trace), "", READING_AID, ""])
+
+
+def _verdicts(observation: Observation) -> list[str]:
+    """On the extrinsic that the run started from, where that is verified, and on what was found."""
+    given, found = observation.given, observation.trace.verdict
+    lines = [] if given is None else markdown_lines(given, OF_GIVEN)
+    return lines if found is None else lines + markdown_lines(found, "" if given is None else OF_RESULT)
 
 
 def _headline(observation: Observation) -> str:
@@ -119,9 +124,9 @@ def _per_axis(error: PoseError) -> list[str]:
     return [f"{angle:+.2f}°" for angle in angles] + [f"{offset:+.1f} cm" for offset in offsets]
 
 
-def _extrinsic(camera_from_lidar: Extrinsic) -> list[str]:
-    rows = (" ".join(f"{value:9.5f}" for value in row) for row in camera_from_lidar[:3])
-    return ["Corrected `camera_from_lidar` (metres)", "```", *rows, "```"]
+def _extrinsic(trace: CascadeTrace) -> list[str]:
+    rows = (" ".join(f"{value:9.5f}" for value in row) for row in trace.corrected[:3])
+    return [f"{'Uncorrected' if trace.rejected else 'Corrected'} `camera_from_lidar` (metres)", "```", *rows, "```"]
 
 
 def _error(error: PoseError | None) -> list[str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +15,11 @@ from rerun.chunk import RrdReader
 from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
 from calibnet.trace import DriveEstimate, Estimate
-from calibnet.verdict.verdict import BadFrame
+from calibnet.verdict.verdict import BadFrame, Cause, Verdict
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive
+from inspector.record.tabs.drive import VERDICT_TEXT, curve, deviation, drive_sentence, log_drive
+from tests.support.fakes import FakeCascade
 
 REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.0, -0.1, -0.2])
 SIGMA = np.array([0.02, 0.03, 0.06, *np.radians([0.1, 0.2, 0.2])])
@@ -63,6 +67,34 @@ def test_deviations_have_the_units_of_their_curves() -> None:
     one = estimate(aligned=True)
     found_units = [deviation(one, name) for name in ("x", "y", "z", "pitch", "yaw", "roll")]
     assert found_units == pytest.approx([2, 3, 6, 0.1, 0.2, 0.2])
+
+
+def shown(file: Path) -> str:
+    """The text beside the curves."""
+    (chunk,) = RrdReader(file).store().stream().filter(content=f"/{VERDICT_TEXT}")
+    text: str = chunk.to_record_batch()["TextDocument:text"].to_pylist()[0][0]
+    return text
+
+
+def test_the_verdict_is_recorded_and_shown_with_what_was_skipped(
+    tmp_path: Path, record: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = estimate(aligned=True)
+    cause = Cause("time-offset", "Scans seem 0.1 s later than their pictures.", "best at 0.09 s")
+    verdict = Verdict(
+        "cannot tell", "Edges disagree.", one.camera_from_lidar, (1.0, 9.0), (cause,), one.covariance, 3, one.skipped
+    )
+    monkeypatch.setattr(FakeCascade, "calibrate_drive", lambda *_: replace(one, verdict=verdict), raising=False)
+    summary = record(tmp_path / "drive.rrd", detail="overview", strides=(32,), drive=True)
+    assert summary.verdict == "Verdict: cannot tell. Edges disagree. Scans seem 0.1 s later than their pictures."
+    recorded = read_run(tmp_path / "drive.rrd")
+    assert recorded.drive_verdict is not None and recorded.verdict is recorded.drive_verdict
+    assert recorded.drive_verdict.as_dict() == verdict.as_dict()
+    assert recorded.drive_verdict.skipped == (BadFrame(1, "It is cut short."),)
+    text = shown(tmp_path / "drive.rrd")
+    assert text.startswith("# Cannot tell\n\nEdges disagree.\n\n- **time-offset**: Scans seem 0.1 s later")
+    assert "Sure to 0.30° / 7.0 cm (one standard deviation)." in text
+    assert "- frame 1: It is cut short." in text
 
 
 def test_curves_and_the_result_are_recorded(tmp_path: Path, full_recording: Path) -> None:

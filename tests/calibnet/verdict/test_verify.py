@@ -1,0 +1,110 @@
+"""Whether a given calibration is good: by offset, covariance and the estimate's own verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibnet.errors import CalibrationError, DatasetError
+from calibnet.geometry import miscalibration
+from calibnet.geometry.se3 import invert, pose_vector
+from calibnet.geometry.types import Matrix6
+from calibnet.verdict.verdict import BadFrame, Cause, Verdict
+from calibnet.verdict.verify import DRIVE, FRAME, named_cause, probability_within, unfit, verify
+from tests.support.fakes import REFERENCE
+
+MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
+
+
+def covariance(degrees: float, centimetres: float) -> Matrix6:
+    """So much standard deviation on each axis."""
+    return np.diag([*[(centimetres / 100) ** 2] * 3, *[np.radians(degrees) ** 2] * 3])
+
+
+def found(degrees: float = 0.05, centimetres: float = 1.0) -> Verdict:
+    return Verdict("accepted", "12 frames agree.", REFERENCE, covariance=covariance(degrees, centimetres), used=12)
+
+
+def off(*, pitch: float = 0.0, yaw: float = 0.0, z: float = 0.0) -> np.ndarray:
+    """The reference, off by so many degrees and metres."""
+    return miscalibration([0.0, pitch, yaw], [0.0, 0.0, z]) @ REFERENCE
+
+
+def test_a_calibration_that_is_off_is_rejected_with_axis_and_uncertainty() -> None:
+    verdict = verify(off(yaw=2.7), found(0.1, 3.0), DRIVE)
+    assert verdict.word == "rejected"
+    assert verdict.reason.startswith("The calibration is off by 2.70° ± 0.20° (most of it yaw, +2.70°) and ")
+    assert verdict.reason.endswith("0.3° / 8 cm are tolerated.")
+    assert verdict.moved[0] == pytest.approx(2.7) and verdict.used == 12
+    np.testing.assert_array_equal(verdict.camera_from_lidar, REFERENCE)  # where it should be
+
+
+def test_a_shift_is_rejected_along_its_axis() -> None:
+    verdict = verify(off(z=-0.3), found(0.05, 4.0), DRIVE)
+    assert verdict.word == "rejected"
+    assert "30.0 ± 7.8 cm (most of it z (ahead), -30.0 cm)" in verdict.reason
+    assert verify(off(z=-0.15), found(0.05, 4.0), FRAME).word == "accepted"  # a frame tolerates 25 cm
+
+
+@pytest.mark.parametrize(
+    ("given", "sure", "word"),
+    [
+        (off(), (0.05, 1.0), "accepted"),
+        (off(yaw=0.15, z=0.03), (0.05, 1.0), "accepted"),
+        (off(), (0.05, 8.0), "cannot tell"),  # 8 cm on each axis: within 8 cm with 20 %
+        (off(yaw=0.29), (0.05, 1.0), "cannot tell"),  # as likely beyond as within
+        (off(z=0.12), (0.05, 4.0), "cannot tell"),  # beyond, at 3 sigma: chi-square 9, not 16.27
+        (off(z=0.17), (0.05, 4.0), "rejected"),  # chi-square 18
+        (off(yaw=0.2, z=0.1), (0.01, 8.0), "cannot tell"),  # a very sure turn does not make the shift sure
+    ],
+)
+def test_the_word_follows_offset_and_certainty(given: np.ndarray, sure: tuple[float, float], word: str) -> None:
+    assert verify(given, found(*sure), DRIVE).word == word
+
+
+def test_the_probability_is_that_of_the_normal_distribution() -> None:
+    """Three axes of 4 cm: within 8 cm with the chi distribution's 73.9 %; the rotation is sure."""
+    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), DRIVE)
+    assert inside == pytest.approx(0.7385, abs=0.005)
+    offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
+    assert probability_within(offset, covariance(0.001, 0.01), DRIVE) == pytest.approx(0.5, abs=0.01)
+
+
+def test_what_is_not_accepted_itself_is_no_measure() -> None:
+    doubted = replace(found(), word="rejected", reason="Picture and scan do not fit together.")
+    verdict = verify(off(), doubted, DRIVE)
+    assert verdict.word == "cannot tell"
+    assert verdict.reason.endswith("Picture and scan do not fit together.")
+    caused = verify(off(), replace(doubted, causes=(MIRRORED,)), DRIVE)
+    assert (caused.word, caused.reason, caused.causes) == ("rejected", doubted.reason, (MIRRORED,))
+    unsure = verify(off(), replace(doubted, word="cannot tell", causes=(MIRRORED,)), DRIVE)
+    assert (unsure.word, unsure.causes) == ("cannot tell", (MIRRORED,))
+
+
+def test_without_covariance_nobody_can_tell() -> None:
+    verdict = verify(off(yaw=3.0), replace(found(), covariance=None), FRAME)
+    assert verdict.word == "cannot tell" and "3.00° / " in verdict.reason
+
+
+def test_a_drive_whose_frames_mostly_do_not_fit_tells_nothing() -> None:
+    skipped = tuple(BadFrame(frame, "It does not fit.") for frame in range(12))
+    verdict = verify(off(), replace(found(), skipped=skipped), DRIVE)
+    assert verdict.word == "cannot tell" and "12 of 24 frames" in verdict.reason
+    assert verify(off(), replace(found(), skipped=skipped[:11]), DRIVE).word == "accepted"
+
+
+def test_what_cannot_even_be_run_is_rejected_where_the_cause_is_known() -> None:
+    assert unfit(REFERENCE, "No point falls into the image.").word == "cannot tell"
+    verdict = unfit(REFERENCE, "The focal length is in millimetres.", (MIRRORED,))
+    assert verdict.word == "rejected" and verdict.as_dict()["causes"] == [MIRRORED.as_dict()]
+
+
+def test_an_error_may_name_its_cause() -> None:
+    error = DatasetError("The focal length is in millimetres.")
+    assert named_cause(error) == ()
+    error.cause = "focal-length"  # type: ignore[attr-defined]
+    again = CalibrationError("The focal length is in millimetres. It is in run.rrd.")
+    again.__cause__ = error
+    assert [cause.name for cause in named_cause(again)] == ["focal-length"]
