@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from calibnet.datasets.selection import spread
 from calibnet.trace import Estimate
 
 POINTS = 12
@@ -53,9 +54,3 @@ class Convergence:
         if self.points and self.points[-1][0] == self._frame:
             self.points.pop()
         self.points.append((self._frame, estimate))
-
-
-def spread(count: int, most: int) -> list[int]:
-    """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
-    chosen = min(count, most)
-    return [(number + 1) * count // chosen - 1 for number in range(chosen)]

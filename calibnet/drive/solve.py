@@ -9,8 +9,9 @@ from typing import Any, Protocol
 from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.datasets.plausibility import suspicion
+from calibnet.datasets.selection import spread
 from calibnet.drive.consensus import Consensus
-from calibnet.drive.convergence import Convergence, Due, spread
+from calibnet.drive.convergence import Convergence, Due
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.types import Extrinsic, Matrix6

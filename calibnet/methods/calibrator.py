@@ -1,4 +1,4 @@
-"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive as well."""
+"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive, `Explainer` of what is wrong."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, DriveEstimate
+from calibnet.verdict.verdict import ACCEPTED, Verdict
 
 
 @runtime_checkable
@@ -50,3 +51,24 @@ class DriveCalibrator(Calibrator, Protocol):
             CalibrationError: no frame could be calibrated.
         """
         ...
+
+
+@runtime_checkable
+class Explainer(Protocol):
+    """A method that can also find out what is wrong with a frame, at many times the price of calibrating it."""
+
+    def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
+        """The verdict on a frame, with the causes of what does not fit.
+
+        Args:
+            frame: image, scan and camera; its own extrinsic must not be looked at.
+            initial: ``camera_from_lidar`` to start from, 4x4.
+        """
+        ...
+
+
+def with_causes(calibrator: Calibrator, frame: Frame, initial: Extrinsic, verdict: Verdict) -> Verdict:
+    """The verdict on a frame with causes, where it is not accepted, names none yet, and the method can find them."""
+    if verdict.word == ACCEPTED or verdict.causes or not isinstance(calibrator, Explainer):
+        return verdict
+    return calibrator.explain(frame, initial)

@@ -65,7 +65,7 @@ def import_folder(found: Recognised) -> None:
 
     from calibnet.cascade.cascade import Cascade
     from calibnet.datasets import open_sequence
-    from calibnet.drive.convergence import spread
+    from calibnet.datasets.selection import spread
     from calibnet.geometry import MiscalibrationRange
     from inspector.record.contents import Contents, Detail
     from inspector.record.outputs import Outputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence as Positions
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rich.console import Console
 from rich.progress import (
@@ -22,7 +22,7 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import DriveCalibrator
+from calibnet.methods.calibrator import DriveCalibrator, with_causes
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict.verdict import BadFrame
 from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
@@ -35,6 +35,8 @@ from inspector.run.start import Start
 from inspector.run.summary import Summary
 from inspector.verdicts import causes_of
 
+MOST_EXPLAINED = 1
+"""Frames of a run that causes are looked for in; it takes as long as a dozen frames, and one frame mostly tells."""
 STOPPING = "Stopping after this frame; once more stops at once."
 
 
@@ -124,7 +126,12 @@ class Session:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
         try:
             frame = self.sequence[position]
-            trace = self.cascade.calibrate(frame, self.start.initial(frame), detail=self.contents.inside)
+            initial = self.start.initial(frame)
+            trace = self.cascade.calibrate(frame, initial, detail=self.contents.inside)
+            if trace.verdict is not None and summary.explained < MOST_EXPLAINED:
+                verdict = with_causes(self.cascade, frame, initial, trace.verdict)
+                summary.explained += verdict is not trace.verdict
+                trace = replace(trace, verdict=verdict)
         except (CalibrationError, DatasetError) as error:
             if self.stop_on_bad_frame or len(self.positions) == 1:
                 raise

@@ -23,6 +23,7 @@ class Summary:
         verdicts: on each of them by its number, from methods that give one.
         skipped: frames that could not be read or calibrated.
         unread: how many of these could not be read.
+        explained: frames whose causes were looked for.
         interrupted: whether the run was ended before its last frame.
         drive: what all frames together came to, in words.
         drive_verdict: whether that is good.
@@ -34,6 +35,7 @@ class Summary:
     skipped: list[BadFrame] = field(default_factory=list)
     unread: int = 0
     interrupted: bool = False
+    explained: int = 0
     drive: str = ""
     drive_verdict: Verdict | None = field(default=None, repr=False)
     given_verdict: Verdict | None = field(default=None, repr=False)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.selection import PickedFrames
-from calibnet.drive.convergence import spread
+from calibnet.datasets.selection import PickedFrames, spread
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import with_causes
 from calibnet.runtime.interruption import StopRequest
-from calibnet.verdict.verdict import Cause, Verdict
+from calibnet.verdict.verdict import ACCEPTED, Cause, Verdict
 from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
 from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
 from inspector.run.summary import Summary
 from inspector.verdicts import causes_of
 
-SUSPECTS = 5
+SUSPECTS = 3
 """Frames, spread over a drive that cannot be solved, that are asked for the cause."""
 UNKNOWN = np.full((4, 4), np.nan)
 """The extrinsic where the input cannot even be made into a frame."""
@@ -114,11 +114,14 @@ def as_json(verdict: Verdict) -> dict[str, object]:
 def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
     if len(frames) == 1:
         found, tolerance = session.cascade.calibrate(frames[0], given).verdict, FRAME
+        found = found and with_causes(session.cascade, frames[0], given, found)
     else:
         with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
             observer = drive_observer(progress, stop)
             found, tolerance = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
         frames.check()
+        if found is not None and found.word != ACCEPTED:
+            found = replace(found, causes=found.causes or _suspected(session, frames, given))
     assert found is not None, "the cascade judges what it finds"
     return verify(given, found, tolerance)
 
@@ -128,9 +131,9 @@ def _suspected(session: Session, frames: Readable, given: Extrinsic) -> tuple[Ca
     verdicts = []
     for position in spread(len(frames), SUSPECTS) if len(frames) > 1 else []:
         try:
-            verdict = session.cascade.calibrate(frames[position], given).verdict
+            frame = frames[position]
+            verdict = session.cascade.calibrate(frame, given).verdict
+            verdicts += [] if verdict is None else [with_causes(session.cascade, frame, given, verdict)]
         except (CalibrationError, DatasetError) as error:
             verdicts.append(unfit(given, str(error), named_cause(error)))
-        else:
-            verdicts += [] if verdict is None else [verdict]
     return causes_of(verdicts)
