@@ -9,8 +9,9 @@ from pathlib import Path
 import torch
 
 from calibnet.cascade.image_views import ImageViews, image_branches
+from calibnet.cascade.prepared import PreparedFrames, prepared
 from calibnet.cascade.stage import Stage, load_stage
-from calibnet.cascade.upright import Upright, UprightFrames
+from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
@@ -108,7 +109,7 @@ class Cascade:
         clock, limit, upright = Clock(self.device), self.stages[-1].match_error_limit_px, Upright.of(initial)
         start = upright.extrinsic(initial)
         with torch.inference_mode(), autocast(self.device):
-            views = ImageViews(upright.frame(frame), clock)
+            views = ImageViews(prepared(frame, upright), clock)
             trace = CascadeTrace(start, self._run(self.stages, views, start, detail), clock.parts, limit)
             if wider := self._covering(trace.arrived @ invert(start)):
                 before = self._run(wider, views, start)
@@ -152,10 +153,10 @@ class Cascade:
             ValueError: there are no frames.
         """
         upright = Upright.of(initial)
-        start, turned = upright.extrinsic(initial), UprightFrames(frames, upright)
-        estimate = solve_drive(self.stages, turned, start, self.common, observer)
+        start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
+        estimate = solve_drive(self.stages, frames, start, self.common, observer)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
-            estimate = solve_drive([*wider, *self.stages], turned, start, self.common, observer)
+            estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer)
         verdict = judge_drive(estimate, start, self.stages[0].range)
         return upright.undo_drive(replace(estimate, verdict=verdict))
 

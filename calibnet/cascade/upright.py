@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame
 from calibnet.geometry import PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
@@ -123,21 +123,6 @@ class Upright:
         axes = np.kron(np.eye(2), self.rotation)
         real: Matrix6 = axes.T @ of_pose @ axes
         return real
-
-
-@dataclass(frozen=True)
-class UprightFrames:
-    """The frames of a drive, each turned as it is read."""
-
-    frames: Frames
-    upright: Upright
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __getitem__(self, position: int, /) -> Frame:
-        """Read one frame."""
-        return self.upright.frame(self.frames[position])
 
 
 def roll_of(camera_from_lidar: Extrinsic) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from calibnet.errors import ImplausibleError
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Extrinsic
+from calibnet.geometry.visibility import is_accumulated
 
 VIEW_DEG = (8.0, 150.0)
 """Angle across the picture; beyond the second a pinhole camera spends its pixels on the corners."""
@@ -48,7 +49,8 @@ class Implausible:
     """Something that cannot be right, or hardly.
 
     Attributes:
-        name: ``focal-length``, ``principal-point``, ``picture-size``, ``units``, ``axes`` or ``bit-depth``.
+        name: ``focal-length``, ``principal-point``, ``picture-size``, ``units``, ``axes``, ``accumulated``
+            or ``bit-depth``.
         text: a sentence without its full stop: what is seen; what to do.
         certain: whether no sensor has it, so that the input is refused.
     """
@@ -88,7 +90,7 @@ def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:
 
 def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
     """All checks of a scan ``[N, 4]``."""
-    return [ranges(points), up(points)]
+    return [ranges(points), up(points), several(points)]
 
 
 def focal_length(camera: PinholeCamera) -> Implausible | None:
@@ -198,6 +200,17 @@ def up(points: NDArray[np.float32]) -> Implausible | None:
         "give points with x forward, y left and z up"
     )
     return Implausible("axes", text)
+
+
+def several(points: NDArray[np.float32]) -> Implausible | None:
+    """Whether the cloud is a map rather than a scan."""
+    if not is_accumulated(points):
+        return None
+    text = (
+        "the cloud seems to be several scans put together, of which only what one scan would see is used; "
+        "give the one scan that was taken with the picture"
+    )
+    return Implausible("accumulated", text)
 
 
 def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:

@@ -41,6 +41,11 @@ class Projection:
         keys.sort()
         return (keys & np.uint64(0xFFFFFFFF)).astype(np.int64)
 
+    def sorted(self) -> Projection:
+        """The same points, far to near."""
+        order = self.far_to_near()
+        return Projection(self.pixels[order], self.depth[order], self.index[order], self.points[order])
+
 
 def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera) -> Projection:
     """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""

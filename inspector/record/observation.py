@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -62,11 +62,8 @@ class Observation:
         """The scan in the frame's image, rows far to near; each extrinsic of the run is projected once."""
         key = camera_from_lidar.tobytes()
         if key not in self._projections:
-            seen = project(self.frame.points[self._in_front], camera_from_lidar, self.frame.camera)
-            order = seen.far_to_near()
-            self._projections[key] = Projection(
-                seen.pixels[order], seen.depth[order], self._in_front[seen.index[order]], seen.points[order]
-            )
+            seen = project(self.frame.points[self._in_front], camera_from_lidar, self.frame.camera).sorted()
+            self._projections[key] = replace(seen, index=self._in_front[seen.index])
         return self._projections[key]
 
     @cached_property
@@ -84,7 +81,9 @@ class Observation:
 
     def image_px(self, stage: StageTrace, pixels: float) -> float:
         """A length in a stage's input image as one in the frame's own."""
-        return pixels * self.frame.camera.width / stage.camera.width
+        if stage.upright is None:
+            return pixels * self.frame.camera.width / stage.camera.width
+        return pixels * self.frame.camera.focal[0] / stage.camera.focal[0]  # it was cut as well
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""

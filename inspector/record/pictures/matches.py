@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import PinholeCamera
+from calibnet.geometry import PinholeCamera, project, transform
 from calibnet.geometry.projection import Projection, nearest_per_cell
 from calibnet.trace import StageDetail, StageTrace
 from inspector.record.observation import Observation
@@ -29,12 +29,18 @@ class StartingPoints:
 
     @classmethod
     def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
-        """The scan as the stage found it; the network's image is the frame's, resized."""
+        """The scan as the stage found it; the network's image is the frame's, turned upright and resized."""
         camera, reference, frame = stage.camera, observation.reference, observation.frame
-        projection = observation.projected(stage.before)
-        scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
-        pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers
-        projection = replace(projection, pixels=pixels)
+        if stage.upright is None:
+            projection = observation.projected(stage.before)
+            scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
+            pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers
+            projection = replace(projection, pixels=pixels)
+        else:
+            upright = transform(stage.upright, np.zeros(3))
+            reference = None if reference is None else upright @ reference
+            projection = project(frame.points, upright @ stage.before, camera).sorted()
+            pixels = projection.pixels
         if reference is None:
             return cls(camera, projection, None)
         to_image = (camera.matrix @ reference[:3]).astype(np.float32)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from calibnet.cascade import Cascade, Stage
-from calibnet.cascade.upright import FILLED, TOLERATED, Upright, UprightFrames, roll_of
+from calibnet.cascade.prepared import PreparedFrames, prepared
+from calibnet.cascade.upright import FILLED, TOLERATED, Upright, roll_of
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import (
     RANGES,
@@ -20,7 +21,9 @@ from calibnet.geometry import (
     rotation_from_vector,
     transform,
 )
+from calibnet.geometry.visibility import as_one_scan
 from calibnet.trace import CascadeTrace
+from tests.support.pillars import scan
 from tests.support.scene import REFERENCE, make_frame
 from tests.support.tiny import tiny_network
 
@@ -182,9 +185,18 @@ def test_a_drive_of_a_camera_on_its_head_is_solved_as_one_that_stands():
     assert pose_error(lying.networks.camera_from_lidar, turn @ standing.networks.camera_from_lidar).rotation_deg < 1e-2
 
 
-def test_frames_of_a_drive_are_turned_as_they_are_read():
+def test_frames_of_a_drive_are_prepared_as_they_are_read():
     frames = [make_frame(1), make_frame(2)]
-    upright = Upright(1)
-    turned = UprightFrames(frames, upright)
+    turned = PreparedFrames(frames, Upright(1))
     assert len(turned) == 2
     assert turned[1].image.shape == (*frames[1].image.shape[1::-1], 3)
+    assert PreparedFrames(frames, Upright())[1] is frames[1]
+
+
+def test_a_cloud_of_several_scans_is_prepared_as_one():
+    one, several = scan(0.0, 0.0), np.concatenate([scan(ahead, 0.5 * ahead) for ahead in (0.0, -2.0, 2.0, 4.0)])
+    frame = replace(make_frame(1), points=one)
+    assert prepared(frame, Upright()) is frame
+    points = prepared(replace(frame, points=several), Upright()).points
+    np.testing.assert_array_equal(points, as_one_scan(several))
+    assert len(points) < 0.5 * len(several)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
+import pytest
 from PIL import Image
 
-from calibnet.geometry import project
+from calibnet.geometry import PinholeCamera, project
 from inspector.colors import EMPTY, depth_colors, flow_colors
 from inspector.record.contents import Coloring
 from inspector.record.observation import Observation
@@ -136,3 +138,27 @@ def test_a_projection_keeps_its_points_and_goes_far_to_near(fakes: ModuleType) -
     assert set(projection.index) == set(exact.index)
     order = np.argsort(projection.index)
     np.testing.assert_array_equal(projection.pixels[order], exact.pixels)
+
+
+def test_the_volumes_of_a_camera_on_its_head_speak_of_the_upright_picture(fakes: ModuleType) -> None:
+    """The frame is the same, but for its picture and extrinsics, which are turned: so are not the cells."""
+    frame = fakes.make_frame(0)
+    trace = fakes.FakeCascade().calibrate(frame, fakes.DELTA @ frame.camera_from_lidar)
+    stage = trace.stages[0]
+    standing = StartingPoints.of(Observation(frame, trace, frame.camera_from_lidar), stage)
+    turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    matrix = frame.camera.matrix.copy()
+    matrix[:2, 2] = frame.camera.width - 1 - matrix[0, 2], frame.camera.height - 1 - matrix[1, 2]
+    lying = replace(
+        frame,
+        image=np.ascontiguousarray(frame.image[::-1, ::-1]),
+        camera=PinholeCamera(frame.camera.width, frame.camera.height, matrix),
+        camera_from_lidar=turn @ frame.camera_from_lidar,
+    )
+    turned = replace(stage, before=turn @ stage.before, after=turn @ stage.after, upright=turn[:3, :3])
+    observation = Observation(lying, trace, lying.camera_from_lidar)
+    points = StartingPoints.of(observation, turned)
+    np.testing.assert_allclose(points.projection.pixels, standing.projection.pixels, atol=1e-2)
+    assert points.displacement is not None and standing.displacement is not None
+    np.testing.assert_allclose(points.displacement, standing.displacement, atol=2e-2)
+    assert observation.image_px(turned, 2.0) == pytest.approx(observation.image_px(stage, 2.0), rel=1e-6)
