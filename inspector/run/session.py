@@ -31,9 +31,9 @@ from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
 from inspector.record.recording import Recording, RunDescription
 from inspector.record.tabs.drive import drive_sentence
+from inspector.run.given import judge_given, suspected
 from inspector.run.start import Start
 from inspector.run.summary import Summary
-from inspector.verdicts import causes_of
 
 MOST_EXPLAINED = 1
 """Frames of a run that causes are looked for in; it takes as long as a dozen frames, and one frame mostly tells."""
@@ -159,10 +159,10 @@ class Session:
         except CalibrationError as error:
             if not self.verify:
                 raise
-            summary.given_verdict = unfit(initial, str(error), causes_of(summary.verdicts.values()))
+            summary.given_verdict = unfit(initial, str(error), suspected(self.cascade, self.frames, initial))
             return
         if self.verify and estimate.verdict is not None:
-            summary.given_verdict = verify(initial, estimate.verdict, DRIVE)
+            summary.given_verdict = judge_given(self.cascade, self.frames, initial, estimate.verdict, DRIVE)
         recording.log_drive(estimate, reference, summary.given_verdict)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict

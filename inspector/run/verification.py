@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.selection import PickedFrames, spread
+from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import with_causes
 from calibnet.runtime.interruption import StopRequest
-from calibnet.verdict.verdict import ACCEPTED, Cause, Verdict
-from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
+from calibnet.verdict.verdict import Verdict
+from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit
+from inspector.run.given import judge_given, suspected
 from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
 from inspector.run.summary import Summary
-from inspector.verdicts import causes_of
 
-SUSPECTS = 3
-"""Frames, spread over a drive that cannot be solved, that are asked for the cause."""
 UNKNOWN = np.full((4, 4), np.nan)
 """The extrinsic where the input cannot even be made into a frame."""
 
@@ -102,7 +99,7 @@ def verify_session(session: Session, record: bool) -> tuple[Verdict, Summary | N
             frames.check()
             if record and isinstance(error, DatasetError):
                 raise
-        return unfit(given, str(error), causes or _suspected(session, frames, given)), summary
+        return unfit(given, str(error), causes or suspected(session.cascade, frames, given)), summary
 
 
 def as_json(verdict: Verdict) -> dict[str, object]:
@@ -114,26 +111,10 @@ def as_json(verdict: Verdict) -> dict[str, object]:
 def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
     if len(frames) == 1:
         found, tolerance = session.cascade.calibrate(frames[0], given).verdict, FRAME
-        found = found and with_causes(session.cascade, frames[0], given, found)
     else:
         with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
             observer = drive_observer(progress, stop)
             found, tolerance = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
         frames.check()
-        if found is not None and found.word != ACCEPTED:
-            found = replace(found, causes=found.causes or _suspected(session, frames, given))
     assert found is not None, "the cascade judges what it finds"
-    return verify(given, found, tolerance)
-
-
-def _suspected(session: Session, frames: Readable, given: Extrinsic) -> tuple[Cause, ...]:
-    """What some frames of a drive, each by itself, say is wrong with the input."""
-    verdicts = []
-    for position in spread(len(frames), SUSPECTS) if len(frames) > 1 else []:
-        try:
-            frame = frames[position]
-            verdict = session.cascade.calibrate(frame, given).verdict
-            verdicts += [] if verdict is None else [with_causes(session.cascade, frame, given, verdict)]
-        except (CalibrationError, DatasetError) as error:
-            verdicts.append(unfit(given, str(error), named_cause(error)))
-    return causes_of(verdicts)
+    return judge_given(session.cascade, frames, given, found, tolerance)

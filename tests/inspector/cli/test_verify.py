@@ -34,6 +34,7 @@ class Cascade(FakeCascade):
 
     word = "accepted"
     causes: tuple[Cause, ...] = ()
+    causes_of_frames: tuple[Cause, ...] = ()
     failure: Exception | None = None
 
     def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
@@ -50,6 +51,9 @@ class Cascade(FakeCascade):
             raise self.failure
         history = ((0, Estimate(REFERENCE, COVARIANCE, len(frames))),)
         return DriveEstimate(REFERENCE, COVARIANCE, len(frames), history, verdict=self.verdict(len(frames)))
+
+    def explain(self, frame: Any, initial: Any) -> Verdict:
+        return replace(self.verdict(1), causes=self.causes_of_frames)
 
     def verdict(self, frames: int) -> Verdict:
         return Verdict(self.word, "Who knows.", REFERENCE, (0.0, 0.0), self.causes, COVARIANCE, frames)  # type: ignore[arg-type]
@@ -148,11 +152,23 @@ def test_what_does_not_fit_is_a_verdict_with_json(
     cascade.failure = CalibrationError("Picture and scan do not fit together.")
     code, out, _ = invoke("folder", str(own_folder), "--json", "-", *save)
     assert (code, json.loads(out)["verdict"]) == (4, "cannot tell")
-    cascade.causes = (MIRRORED,)  # as its frames say
+    cascade.causes_of_frames = (MIRRORED,)
     code, out, _ = invoke("folder", str(own_folder), "--json", "-", *save)
     content = json.loads(out)
     assert (code, content["verdict"], content["reason"]) == (1, "rejected", str(cascade.failure))
     assert content["causes"] == [MIRRORED.as_dict()]
+
+
+@pytest.mark.parametrize("save", [(), ("--save", "why.rrd")])
+@pytest.mark.parametrize("frames", [":", "1"])
+def test_on_doubt_frames_are_asked_for_the_cause(
+    invoke: Invoke, own_folder: Path, cascade: Cascade, frames: str, save: tuple[str, ...]
+) -> None:
+    cascade.causes_of_frames = (MIRRORED,)
+    assert invoke("folder", str(own_folder), "--frames", frames, *save)[0] == 0  # accepted: nobody is asked
+    cascade.word = "rejected"
+    code, out, _ = invoke("folder", str(own_folder), "--frames", frames, *save)
+    assert code == 1 and out.endswith(f"Verdict: rejected. Who knows. {MIRRORED.text}\n")
 
 
 def test_what_is_refused_for_a_cause_is_a_verdict_too(

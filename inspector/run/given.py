@@ -1,0 +1,48 @@
+"""The verdict on the calibration that a run starts from; on doubt some frames are asked for the cause."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+from calibnet.datasets.frame import Frames
+from calibnet.datasets.selection import spread
+from calibnet.errors import CalibrationError, DatasetError
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import Explainer
+from calibnet.verdict.verdict import ACCEPTED, Cause, Verdict
+from calibnet.verdict.verify import Tolerance, named_cause, unfit, verify
+from inspector.verdicts import causes_of
+
+SUSPECTS = 3
+"""Frames, spread over a drive, that are asked for the cause: each runs stages some thirty times."""
+
+
+def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict, tolerance: Tolerance) -> Verdict:
+    """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
+
+    Args:
+        method: that found it, asked for causes if it is one of `calibnet.methods.calibrator.Explainer`.
+        frames: where it was found.
+        given: ``camera_from_lidar`` to verify, 4x4.
+        found: verdict on what was found.
+        tolerance: how far off is good.
+    """
+    verdict = verify(given, found, tolerance)
+    if verdict.word == ACCEPTED or found.causes:
+        return verdict
+    return verify(given, replace(found, causes=suspected(method, frames, given)), tolerance)
+
+
+def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, ...]:
+    """The causes that half or more of some frames, each by itself, name; those of most frames first."""
+    if not isinstance(method, Explainer):
+        return ()
+    verdicts: list[Verdict] = []
+    for position in spread(len(frames), SUSPECTS):
+        try:
+            verdicts.append(method.explain(frames[position], given))
+        except (CalibrationError, DatasetError) as error:
+            verdicts.append(unfit(given, str(error), named_cause(error)))
+    named = Counter(name for verdict in verdicts for name in {cause.name for cause in verdict.causes})
+    return tuple(cause for cause in causes_of(verdicts) if 2 * named[cause.name] >= len(verdicts))
