@@ -28,7 +28,8 @@ def explained(verdict: Verdict) -> str:
 
 def further_causes(verdict: Verdict) -> list[str]:
     """The causes' sentences that the reason does not say already."""
-    return [cause.text for cause in verdict.causes if cause.text not in verdict.reason]
+    texts = dict.fromkeys(cause.text for cause in verdict.causes)  # two names may have the same sentence
+    return [text for text in texts if text not in verdict.reason]
 
 
 def certainty(verdict: Verdict) -> str:
