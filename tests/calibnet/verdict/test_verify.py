@@ -12,10 +12,13 @@ from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
 from calibnet.verdict.verdict import BadFrame, Cause, Verdict
-from calibnet.verdict.verify import DRIVE, FRAME, named_cause, probability_within, unfit, verify
+from calibnet.verdict.verify import DRIVE, FRAME, Tolerance, named_cause, probability_within, unfit, verify
 from tests.support.fakes import REFERENCE
 
 MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
+
+
+TIGHT, WIDE = Tolerance(0.3, 8.0), Tolerance(1.0, 25.0)
 
 
 def covariance(degrees: float, centimetres: float) -> Matrix6:
@@ -33,7 +36,7 @@ def off(*, pitch: float = 0.0, yaw: float = 0.0, z: float = 0.0) -> np.ndarray:
 
 
 def test_a_calibration_that_is_off_is_rejected_with_axis_and_uncertainty() -> None:
-    verdict = verify(off(yaw=2.7), found(0.1, 3.0), DRIVE)
+    verdict = verify(off(yaw=2.7), found(0.1, 3.0), TIGHT)
     assert verdict.word == "rejected"
     assert verdict.reason.startswith("The calibration is off by 2.70° ± 0.20° (most of it yaw, +2.70°) and ")
     assert verdict.reason.endswith("0.3° / 8 cm are tolerated.")
@@ -42,10 +45,10 @@ def test_a_calibration_that_is_off_is_rejected_with_axis_and_uncertainty() -> No
 
 
 def test_a_shift_is_rejected_along_its_axis() -> None:
-    verdict = verify(off(z=-0.3), found(0.05, 4.0), DRIVE)
+    verdict = verify(off(z=-0.3), found(0.05, 4.0), TIGHT)
     assert verdict.word == "rejected"
     assert "30.0 ± 7.8 cm (most of it z (ahead), -30.0 cm)" in verdict.reason
-    assert verify(off(z=-0.15), found(0.05, 4.0), FRAME).word == "accepted"  # a frame tolerates 25 cm
+    assert verify(off(z=-0.15), found(0.05, 4.0), WIDE).word == "accepted"  # a frame tolerates 25 cm
 
 
 @pytest.mark.parametrize(
@@ -61,38 +64,38 @@ def test_a_shift_is_rejected_along_its_axis() -> None:
     ],
 )
 def test_the_word_follows_offset_and_certainty(given: np.ndarray, sure: tuple[float, float], word: str) -> None:
-    assert verify(given, found(*sure), DRIVE).word == word
+    assert verify(given, found(*sure), TIGHT).word == word
 
 
 def test_the_probability_is_that_of_the_normal_distribution() -> None:
     """Three axes of 4 cm: within 8 cm with the chi distribution's 73.9 %; the rotation is sure."""
-    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), DRIVE)
+    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT)
     assert inside == pytest.approx(0.7385, abs=0.005)
     offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
-    assert probability_within(offset, covariance(0.001, 0.01), DRIVE) == pytest.approx(0.5, abs=0.01)
+    assert probability_within(offset, covariance(0.001, 0.01), TIGHT) == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
     doubted = replace(found(), word="rejected", reason="Picture and scan do not fit together.")
-    verdict = verify(off(), doubted, DRIVE)
+    verdict = verify(off(), doubted, TIGHT)
     assert verdict.word == "cannot tell"
     assert verdict.reason.endswith("Picture and scan do not fit together.")
-    caused = verify(off(), replace(doubted, causes=(MIRRORED,)), DRIVE)
+    caused = verify(off(), replace(doubted, causes=(MIRRORED,)), TIGHT)
     assert (caused.word, caused.reason, caused.causes) == ("rejected", doubted.reason, (MIRRORED,))
-    unsure = verify(off(), replace(doubted, word="cannot tell", causes=(MIRRORED,)), DRIVE)
+    unsure = verify(off(), replace(doubted, word="cannot tell", causes=(MIRRORED,)), TIGHT)
     assert (unsure.word, unsure.causes) == ("cannot tell", (MIRRORED,))
 
 
 def test_without_covariance_nobody_can_tell() -> None:
-    verdict = verify(off(yaw=3.0), replace(found(), covariance=None), FRAME)
+    verdict = verify(off(yaw=3.0), replace(found(), covariance=None), WIDE)
     assert verdict.word == "cannot tell" and "3.00° / " in verdict.reason
 
 
 def test_a_drive_whose_frames_mostly_do_not_fit_tells_nothing() -> None:
     skipped = tuple(BadFrame(frame, "It does not fit.") for frame in range(12))
-    verdict = verify(off(), replace(found(), skipped=skipped), DRIVE)
+    verdict = verify(off(), replace(found(), skipped=skipped), TIGHT)
     assert verdict.word == "cannot tell" and "12 of 24 frames" in verdict.reason
-    assert verify(off(), replace(found(), skipped=skipped[:11]), DRIVE).word == "accepted"
+    assert verify(off(), replace(found(), skipped=skipped[:11]), TIGHT).word == "accepted"
 
 
 def test_what_cannot_even_be_run_is_rejected_where_the_cause_is_known() -> None:
@@ -108,3 +111,8 @@ def test_an_error_may_name_its_cause() -> None:
     again = CalibrationError("The focal length is in millimetres. It is in run.rrd.")
     again.__cause__ = error
     assert [cause.name for cause in named_cause(again)] == ["focal-length"]
+
+
+def test_what_a_drive_and_a_frame_usually_state_is_sure_enough_to_accept_what_is_right() -> None:
+    assert verify(off(), found(0.12, 3.5), DRIVE).word == "accepted", "0.2 degrees and 6 cm over the axes"
+    assert verify(off(), found(0.35, 10.0), FRAME).word == "accepted", "0.6 degrees and 17 cm"
