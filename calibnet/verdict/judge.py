@@ -42,7 +42,9 @@ def judge(
         doubt: how witnesses are summed up; by default as it was fitted to the weights that ship with the package.
     """
     checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan(frame.points), bit_depth(frame.image)]
-    remarks = [remark for remark in checks if remark is not None]
+    seen = [remark for remark in checks if remark is not None]
+    known = {remark.name for remark in seen}
+    remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in known)]  # those of when it was read
     suspects = tuple(map(_suspect, remarks))
 
     def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
