@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform
-from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
+from calibnet.verdict import REJECTED, BadFrame, Verdict
 
 MARGIN = 1.2
 """How far a calibration may end from its start, relative to the range that was searched, to be believed."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from calibnet.evaluation.metrics import Distribution, Metrics
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
 from inspector.verdicts import explained

@@ -31,7 +31,7 @@ VERDICT_DRIVE = "verdict/drive"
 VERDICT_GIVEN = "verdict/given"
 """The same of the calibration that the run started from, where that was to be verified."""
 VERDICT = "verdict_json"
-"""Component of these: the JSON object of `calibnet.verdict.verdict.Verdict` as text."""
+"""Component of these: the JSON object of `calibnet.verdict.Verdict` as text."""
 
 IMAGE = "image"
 TABLE = "table"

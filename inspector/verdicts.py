@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
 
 OF_GIVEN = "Calibration as given"
 """What `verify` judges, in a heading."""

@@ -17,14 +17,14 @@ from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+from calibnet.judging.causes import match_error_of, misfit_of
+from calibnet.judging.drive import judge_drive
+from calibnet.judging.judge import judge
 from calibnet.network.config import load_preset
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
 from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
-from calibnet.verdict.causes import match_error_of, misfit_of
-from calibnet.verdict.drive import judge_drive
-from calibnet.verdict.judge import judge
-from calibnet.verdict.verdict import ACCEPTED, Verdict
+from calibnet.verdict import ACCEPTED, Verdict
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
 
 

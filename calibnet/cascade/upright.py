@@ -20,7 +20,7 @@ from calibnet.geometry import PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
 from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
-from calibnet.verdict.verdict import Verdict
+from calibnet.verdict import Verdict
 
 AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
 

@@ -16,7 +16,7 @@ from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.types import Extrinsic, Matrix6
 from calibnet.trace import DriveEstimate, Estimate, StageTrace
-from calibnet.verdict.verdict import BadFrame
+from calibnet.verdict import BadFrame
 
 FRAMES_UNTIL_LAST_LOOK = 24
 """Frames, spread over the drive, that all looks but the last one see."""

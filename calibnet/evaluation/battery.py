@@ -17,7 +17,7 @@ from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import Calibrator
 from calibnet.trace import CascadeTrace
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, Verdict
 
 FRAME_LIMITS, DRIVE_LIMITS = (1.0, 25.0), (0.3, 8.0)
 """Degrees and centimetres beyond which the extrinsic of a frame, and of a drive, is wrong."""

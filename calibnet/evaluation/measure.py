@@ -13,7 +13,7 @@ from calibnet.evaluation.runner import Evaluation, evaluate_frames
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator
 from calibnet.methods.edge_alignment import EdgeAlignment
-from calibnet.verdict.verdict import REJECTED
+from calibnet.verdict import REJECTED
 
 NO_CORRECTION = "no correction"
 

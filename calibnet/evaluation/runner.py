@@ -14,7 +14,7 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
 from calibnet.methods.calibrator import Calibrator
-from calibnet.verdict.verdict import ACCEPTED, REJECTED, WORDS
+from calibnet.verdict import ACCEPTED, REJECTED, WORDS
 
 
 @dataclass(frozen=True)

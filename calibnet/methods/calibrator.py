@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, DriveEstimate
-from calibnet.verdict.verdict import ACCEPTED, Verdict
+from calibnet.verdict import ACCEPTED, Verdict
 
 
 @runtime_checkable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from calibnet.verdict.verdict import ACCEPTED
+from calibnet.verdict import ACCEPTED
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -27,7 +27,7 @@ from inspector.cli.run import checked, choose_outputs, finish, prepare, recordin
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
-    from calibnet.verdict.verdict import Verdict
+    from calibnet.verdict import Verdict
     from inspector.cli.viewing import Viewing
     from inspector.run.options import RunOptions
 
@@ -111,7 +111,7 @@ def verify_sequence(
     if asked["per_frame"]:
         raise click.UsageError("verify judges one calibration; --per-frame draws another for every frame.")
     prepare_json(json_file)
-    from calibnet.verdict.verify import named_cause, unfit
+    from calibnet.judging.verify import named_cause, unfit
     from inspector.run.verification import UNKNOWN
 
     try:

@@ -11,7 +11,7 @@ import numpy as np
 from calibnet.datasets.folder_calibration import read_folder_calibration
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Extrinsic, Floats
-from calibnet.verdict.verdict import ACCEPTED, Verdict
+from calibnet.verdict import ACCEPTED, Verdict
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
 from inspector.verdicts import explained

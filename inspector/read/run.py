@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import PinholeCamera, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.verdict.verdict import REJECTED, BadFrame, Verdict
+from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
 from inspector.read.file import RecordingError, RecordingFile
 from inspector.read.verdict import former_verdict, read_verdict

@@ -1,4 +1,4 @@
-"""Verdicts of a recording: the JSON object that `calibnet.verdict.verdict.Verdict.as_dict` makes, back to its type."""
+"""Verdicts of a recording: the JSON object that `calibnet.verdict.Verdict.as_dict` makes, back to its type."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from calibnet.geometry.types import Extrinsic
-from calibnet.verdict.verdict import ACCEPTED, REJECTED, BadFrame, Cause, Verdict, moved
+from calibnet.verdict import ACCEPTED, REJECTED, BadFrame, Cause, Verdict, moved
 
 
 def read_verdict(text: str) -> Verdict:

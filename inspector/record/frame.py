@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from calibnet.verdict.verdict import Verdict
+from calibnet.verdict import Verdict
 from inspector import entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Observation

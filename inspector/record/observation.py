@@ -14,7 +14,7 @@ from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error
 from calibnet.geometry.projection import Projection
 from calibnet.geometry.types import Extrinsic, Vector3
 from calibnet.trace import CascadeTrace, StageTrace
-from calibnet.verdict.verdict import Verdict
+from calibnet.verdict import Verdict
 from inspector.record.contents import Contents
 
 Xyz = tuple[float, float, float]

@@ -16,7 +16,7 @@ import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate
-from calibnet.verdict.verdict import BadFrame, Verdict
+from calibnet.verdict import BadFrame, Verdict
 from inspector import entities
 from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation

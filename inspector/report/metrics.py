@@ -13,7 +13,7 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
-from calibnet.verdict.verdict import WORDS
+from calibnet.verdict import WORDS
 from inspector.read.run import RecordedFrame, RecordedRun
 
 DISTANCE_M = 10.0

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from calibnet.evaluation.metrics import Distribution, Metrics
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Word
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Word
 from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures, State
 from inspector.verdicts import certainty

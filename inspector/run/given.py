@@ -9,9 +9,9 @@ from calibnet.datasets.frame import Frames
 from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.verify import Tolerance, named_cause, unfit, verify
 from calibnet.methods.calibrator import Explainer
-from calibnet.verdict.verdict import ACCEPTED, Cause, Verdict
-from calibnet.verdict.verify import Tolerance, named_cause, unfit, verify
+from calibnet.verdict import ACCEPTED, Cause, Verdict
 from inspector.verdicts import causes_of
 
 SUSPECTS = 3

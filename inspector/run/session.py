@@ -22,10 +22,10 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import DriveCalibrator, with_causes
 from calibnet.runtime.interruption import StopRequest
-from calibnet.verdict.verdict import BadFrame
-from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit, verify
+from calibnet.verdict import BadFrame
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs

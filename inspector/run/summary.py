@@ -9,7 +9,7 @@ from statistics import median
 
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import PoseError, pose_error
-from calibnet.verdict.verdict import BadFrame, Verdict
+from calibnet.verdict import BadFrame, Verdict
 from inspector.record.observation import Observation
 from inspector.verdicts import counted, line
 

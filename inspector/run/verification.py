@@ -10,9 +10,9 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit
 from calibnet.runtime.interruption import StopRequest
-from calibnet.verdict.verdict import Verdict
-from calibnet.verdict.verify import DRIVE, FRAME, named_cause, unfit
+from calibnet.verdict import Verdict
 from inspector.run.given import judge_given, suspected
 from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
 from inspector.run.summary import Summary

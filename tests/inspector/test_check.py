@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from calibnet.verdict.verdict import Cause
+from calibnet.verdict import Cause
 from inspector.check import Limit, Outcome, check_run
 from inspector.cli.errors import run
 from inspector.cli.main import cli

@@ -26,7 +26,7 @@ from calibnet.geometry import (
 )
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.trace import CascadeTrace, ScaleTrace, StageDetail, StageTrace
-from calibnet.verdict.verdict import Cause
+from calibnet.verdict import Cause
 from tests.support.judged import judged
 
 LEFTOVER = 0.3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from calibnet.trace import CascadeTrace
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, moved
 
 REASON = "Picture and scan do not fit together."
 UNSURE = "Picture and scan fit, but not well."

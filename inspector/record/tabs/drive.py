@@ -15,7 +15,7 @@ import rerun.blueprint as rrb
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate, Estimate
-from calibnet.verdict.verdict import Verdict
+from calibnet.verdict import Verdict
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation

@@ -11,7 +11,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from calibnet.trace import CascadeTrace
-from calibnet.verdict.verdict import REJECTED
+from calibnet.verdict import REJECTED
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation

@@ -13,7 +13,7 @@ from calibnet.evaluation.corruptions import Corruption, grey, unaltered
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, range_of, transform
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, StageTrace
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict
 from tests.support.drive import CAMERA, REFERENCE, Drive
 
 MIRRORED = Corruption("mirrored", "", "mirrored", unaltered)

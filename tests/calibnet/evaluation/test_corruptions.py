@@ -10,7 +10,7 @@ from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 from calibnet.evaluation import corruptions as faults
 from calibnet.evaluation.corruptions import Corruption, corruptions
 from calibnet.geometry import PinholeCamera, project, transform
-from calibnet.verdict.verdict import CAUSES
+from calibnet.verdict import CAUSES
 from tests.support.boxes import boxes
 from tests.support.drive import Drive
 

@@ -16,7 +16,7 @@ import yaml
 
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.trace import DriveEstimate, Estimate
-from calibnet.verdict.verdict import Cause, Verdict
+from calibnet.verdict import Cause, Verdict
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.read.run import read_run

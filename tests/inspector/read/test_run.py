@@ -16,7 +16,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from calibnet.geometry import MiscalibrationRange, project
-from calibnet.verdict.verdict import BadFrame, Cause, Verdict
+from calibnet.verdict import BadFrame, Cause, Verdict
 from inspector import entities
 from inspector.read.file import RecordingError
 from inspector.read.run import read_run

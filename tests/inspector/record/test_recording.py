@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from calibnet.verdict.verdict import Cause
+from calibnet.verdict import Cause
 from inspector import entities
 from inspector.record.outputs import rerun_binary
 from inspector.record.tabs import cascade, cost_volumes

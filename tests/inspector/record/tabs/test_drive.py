@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
 from calibnet.trace import DriveEstimate, Estimate
-from calibnet.verdict.verdict import BadFrame, Cause, Verdict
+from calibnet.verdict import BadFrame, Cause, Verdict
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.drive import VERDICT_TEXT, curve, deviation, drive_sentence, log_drive

@@ -11,8 +11,8 @@ from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
-from calibnet.verdict.verdict import BadFrame, Cause, Verdict
-from calibnet.verdict.verify import DRIVE, FRAME, Tolerance, named_cause, probability_within, unfit, verify
+from calibnet.judging.verify import DRIVE, FRAME, Tolerance, named_cause, probability_within, unfit, verify
+from calibnet.verdict import BadFrame, Cause, Verdict
 from tests.support.fakes import REFERENCE
 
 MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, miscalibration
-from calibnet.verdict.verdict import BadFrame, Cause, Verdict, moved
-from calibnet.verdict.witnesses import Doubt, Witnesses, lens_gain, load_doubt, misfit, reach, witnesses
+from calibnet.judging.witnesses import Doubt, Witnesses, lens_gain, load_doubt, misfit, reach, witnesses
+from calibnet.verdict import BadFrame, Cause, Verdict, moved
 from tests.support.drive import REFERENCE
 from tests.support.matches import matches, run
 

@@ -9,7 +9,7 @@ import numpy as np
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
 
 SIGNIFICANT = 16.27
 """99.9 % quantile of chi-square with three degrees of freedom: those of the rotation, or of the translation."""

@@ -19,9 +19,9 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Extrinsic, Floats
+from calibnet.judging.witnesses import misfit
 from calibnet.trace import CascadeTrace, StageTrace
-from calibnet.verdict.verdict import Cause
-from calibnet.verdict.witnesses import misfit
+from calibnet.verdict import Cause
 
 Measure = Callable[[Frame, Extrinsic], float]
 """How badly picture and scan of a frame fit, from a guess; raises `CalibrationError` where that cannot be told."""
@@ -111,7 +111,7 @@ def match_error_of(stage: Looking) -> Measure:
 
 
 def misfit_of(calibrate: Callable[[Frame, Extrinsic], CascadeTrace]) -> Measure:
-    """The misfit of the last stage's matches after a run, see `calibnet.verdict.witnesses.misfit`."""
+    """The misfit of the last stage's matches after a run, see `calibnet.judging.witnesses.misfit`."""
 
     def measure(frame: Frame, guess: Extrinsic) -> float:
         return misfit(calibrate(frame, guess).stages[-1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from calibnet.geometry import MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import MARGIN, DriveEstimate
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word, moved
 
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Standard deviations, over all axes, beyond which the frames agree on too little."""

@@ -5,7 +5,7 @@ import pytest
 
 from calibnet.geometry import miscalibration, pose_error
 from calibnet.geometry.se3 import pose_from_vector, transform_points
-from calibnet.verdict.lens import LENSES, PINHOLE, Lens, fit, view
+from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit, view
 from tests.support.drive import REFERENCE
 from tests.support.matches import CAMERA, matches
 

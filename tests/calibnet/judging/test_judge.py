@@ -7,10 +7,10 @@ import pytest
 
 from calibnet.evaluation import corruptions as faults
 from calibnet.geometry import miscalibration, pose_error
-from calibnet.verdict.covariance import covariance
-from calibnet.verdict.judge import judge
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED
-from calibnet.verdict.witnesses import Doubt
+from calibnet.judging.covariance import covariance
+from calibnet.judging.judge import judge
+from calibnet.judging.witnesses import Doubt
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from tests.support.boxes import REFERENCE, boxes
 from tests.support.matches import matches, run
 

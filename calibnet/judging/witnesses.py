@@ -15,8 +15,8 @@ import numpy as np
 
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.lens import LENSES, PINHOLE, Fit, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
-from calibnet.verdict.lens import LENSES, PINHOLE, Fit, Lens, fit
 
 AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
 """What the axes of a correction are to a user: turns about the camera's x, y and z, then moves along them."""
@@ -144,7 +144,7 @@ def load_doubt(again: bool = True) -> Doubt:
     Args:
         again: whether the last stage looked again from where it had arrived.
     """
-    content = tomllib.loads(files("calibnet.verdict").joinpath("doubt.toml").read_text(encoding="utf-8"))
+    content = tomllib.loads(files("calibnet.judging").joinpath("doubt.toml").read_text(encoding="utf-8"))
     part = content["again" if again else "once"]
     unknown = part["weights"].keys() - {field.name for field in fields(Witnesses)}
     assert not unknown, unknown

@@ -7,11 +7,11 @@ import math
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.plausibility import Implausible, bit_depth, of_camera, of_extrinsic, of_scan
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
+from calibnet.judging.covariance import covariance
+from calibnet.judging.witnesses import Doubt, load_doubt, reach, witnesses
 from calibnet.trace import MARGIN, CascadeTrace, StageTrace
-from calibnet.verdict.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
-from calibnet.verdict.covariance import covariance
-from calibnet.verdict.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
-from calibnet.verdict.witnesses import Doubt, load_doubt, reach, witnesses
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
 
 FARTHEST_REACH = 1.6
 """Ranges searched beyond which a run is surely wrong; between `MARGIN` and this it may have started outside them."""
@@ -37,8 +37,8 @@ def judge(
         guess: ``camera_from_lidar`` that it started from, 4x4.
         trace: of the run; None where it could not be run because too few points fall into the picture.
         again: one more look of the last stage from where the run arrived; without it less is accepted.
-        match_error: where picture and scan do not fit, finds out why by `calibnet.verdict.causes.PICTURE_AND_SCAN`.
-        misfit: where they fit, but not well enough, finds out why by `calibnet.verdict.causes.LENSES`.
+        match_error: where picture and scan do not fit, finds out why by `calibnet.judging.causes.PICTURE_AND_SCAN`.
+        misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
         doubt: how witnesses are summed up; by default as it was fitted to the weights that ship with the package.
     """
     checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan(frame.points), bit_depth(frame.image)]

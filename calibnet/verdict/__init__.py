@@ -1,1 +1,0 @@
-"""Whether a calibration is good, and what is wrong where it is not."""
