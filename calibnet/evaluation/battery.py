@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from calibnet.cascade import Cascade
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
 from calibnet.errors import CalibrationError
-from calibnet.evaluation.corruptions import Corruption, unaltered
+from calibnet.evaluation.audit import other_drive
+from calibnet.evaluation.corruptions import Corruption, corruptions, unaltered
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
@@ -181,3 +183,35 @@ def judged(cascade: Calibrator, judge: Judge, frame: Frame, guess: Extrinsic) ->
     except CalibrationError:
         trace = None
     return judge(frame, guess, trace)
+
+
+def measure_battery(
+    cascade: Cascade,
+    sequences: list[FrameSequence],
+    range_: MiscalibrationRange,
+    repeats: int = 1,
+    seed: int = 0,
+    beside: Callable[[], Iterable[FrameSequence]] = lambda: (),
+    observer: Callable[[BatteryRun], None] | None = None,
+) -> Battery:
+    """Put every fault into every frame, and see whether the cascade knows, and says why.
+
+    Args:
+        cascade: what calibrates and judges; causes are looked for where it does not accept.
+        sequences: where the frames come from; their own extrinsics are the truth.
+        range_: range of the miscalibrations.
+        repeats: miscalibrations a frame and fault.
+        seed: of the miscalibrations.
+        beside: opens what else pictures of other places may be taken from; the synthetic world by default.
+        observer: called after every run.
+    """
+    donors = {id(one): [other_drive(one, list(sequences), beside)[0]] for one in sequences}
+
+    def faults(sequence: FrameSequence, position: int) -> Iterable[Corruption]:
+        return corruptions(sequence, position, donors[id(sequence)])
+
+    def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None) -> Verdict:
+        verdict = None if trace is None else trace.verdict
+        return verdict if verdict is not None and verdict.word == ACCEPTED else cascade.explain(frame, guess)
+
+    return run_battery(cascade, judge, sequences, faults, range_, repeats, seed, observer)

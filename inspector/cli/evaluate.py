@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,7 @@ from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
+    from calibnet.cascade import Cascade
     from calibnet.evaluation.measure import Step
     from calibnet.geometry import MiscalibrationRange
 
@@ -39,6 +42,11 @@ if TYPE_CHECKING:
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
 @click.option("--audit", is_flag=True, help="Again with the image swapped, with a grey one, and with fewer rings.")
+@click.option(
+    "--battery",
+    is_flag=True,
+    help="Instead of all else: put some 70 faults into every frame, and see whether the verdict knows, and why.",
+)
 @click.option("--drives/--no-drives", default=True, help="Also solve every drive from all its frames.  [default: yes]")
 @click.option("--classical/--no-classical", default=True, help="Also a refinement without training.  [default: yes]")
 @click.option(
@@ -63,6 +71,7 @@ def evaluate(
     preset: str,
     weights: Path | None,
     audit: bool,
+    battery: bool,
     drives: bool,
     classical: bool,
     methods: tuple[str, ...],
@@ -91,6 +100,9 @@ def evaluate(
     cascade = Cascade.load(preset, stages or stages_within(range_), weights, wider=stages is None)
     for skipped in cascade.skipped:
         click.echo(skipped.reason, err=True)
+    if battery:
+        run_battery(cascade, opened, range_, repeats, seed, lambda: find_sequences(dataset, root), json_file)
+        return
     references = measuring.classical(range_) if classical else {}
     references |= {name: open_method(name, range_) for name in methods}
     console = console_beside(json_file)
@@ -109,6 +121,31 @@ def evaluate(
         )
     print_evaluation(evaluation, console)
     write_json(json_file, evaluation.as_dict())
+
+
+def run_battery(
+    cascade: Cascade,
+    sequences: list[Sequence],
+    range_: MiscalibrationRange,
+    repeats: int,
+    seed: int,
+    beside: Callable[[], Iterable[Sequence]],
+    json_file: str | None,
+) -> None:
+    """Run the battery of faults; print its table and write its JSON."""
+    from calibnet.evaluation.battery import measure_battery
+    from calibnet.evaluation.measure import Step
+    from inspector.cli.evaluation_tables import print_battery
+
+    done = itertools.count(1)
+
+    def show(run: BatteryRun) -> None:
+        bars.show(Step("battery", next(done), None, f"{run.corruption.name} {run.corruption.strength}"))
+
+    with Bars() as bars:
+        measured = measure_battery(cascade, sequences, range_, repeats, seed, beside, show)
+    print_battery(measured, console_beside(json_file))
+    write_json(json_file, measured.as_dict())
 
 
 def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:

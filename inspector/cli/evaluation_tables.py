@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from calibnet.evaluation.battery import Battery
     from calibnet.evaluation.metrics import Metrics
     from calibnet.evaluation.runner import Evaluation
 
@@ -47,6 +48,23 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
             style="yellow",
         )
+
+
+def print_battery(battery: Battery, console: Console) -> None:
+    """Print a row a fault and strength, and the two rates that matter."""
+    table = plain_table("Battery: what the verdict said of frames with a fault")
+    for heading in ("runs", "accepted, right", "accepted, wrong", "rejected", "cannot tell", "cause right"):
+        table.add_column(heading, justify="right")
+    for row in battery.rows:
+        counts = (row.runs, row.accepted_right, row.accepted_wrong, row.rejected, row.cannot_tell, row.cause_right)
+        table.add_row(f"{row.corruption} {row.strength}".strip(), *map(str, counts))
+    console.print(table)
+    rotation, translation = battery.limits
+    console.print(
+        f"Accepted though more than {rotation:g}° or {translation:g} cm off: {battery.false_accept_rate:.1%} of "
+        f"{len(battery.runs)} runs. Accepted of the runs without fault that end within that: "
+        f"{battery.acceptance_of_good:.0%}."
+    )
 
 
 def audit_sentence(evaluation: Evaluation) -> str:

@@ -18,6 +18,7 @@ from calibnet.datasets import Frame, Sequence
 from calibnet.geometry import RANGES, invert, miscalibration
 from calibnet.geometry.types import Transform
 from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
+from calibnet.verdict import Cause, Verdict
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 
@@ -45,6 +46,11 @@ class KnownCascade:
             for number in self.loaded["stages"]
         ]
         return CascadeTrace(initial, tuple(stages))
+
+    def explain(self, frame: Frame, initial: Transform) -> Verdict:
+        """Rejects everything, and takes everything for a mirrored picture."""
+        mirrored = Cause("mirrored", "The picture is mirrored.", "so a test wants it")
+        return Verdict("rejected", "It does not fit.", self.calibrate(frame, initial).arrived, causes=(mirrored,))
 
     def calibrate_drive(
         self, frames: Sequence, initial: Transform, observer: Callable[[int, int], None] | None = None
@@ -163,3 +169,16 @@ def test_bad_input_is_one_message(
     assert message in printed.err
     assert "Traceback" not in printed.err
     assert printed.out == ""
+
+
+def test_the_battery_is_a_table_and_its_json_the_object_of_its_rows(rig: Path, tmp_path: Path) -> None:
+    file = tmp_path / "battery.json"
+    arguments = ["--dataset", "folder", "--root", str(rig), "--range", "5/0.5", "--frames", "0:2", "--battery"]
+    code = run(cli, ["evaluate", *arguments, "--json", str(file)])
+    content = json.loads(file.read_text())
+    assert code == 0 and content.keys() == {"rows", "false_accept_rate", "acceptance_of_good"}
+    rows = {(row["corruption"], row["strength"]): row for row in content["rows"]}
+    assert {"none", "mirrored", "focal-length", "late-scan", "units"} <= {name for name, _ in rows}
+    assert rows["mirrored", ""]["runs"] == rows["mirrored", ""]["rejected"] == rows["mirrored", ""]["cause_right"] == 2
+    assert rows["none", ""]["cause_right"] == 0 and rows["late-scan", "+1"]["runs"] == 1
+    assert content["false_accept_rate"] == 0.0
