@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from calibnet.cascade import Cascade
+    from calibnet.evaluation.battery import BatteryRun
     from calibnet.evaluation.measure import Step
     from calibnet.geometry import MiscalibrationRange
 
