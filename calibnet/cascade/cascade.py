@@ -106,7 +106,11 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, limit, upright = Clock(self.device), self.stages[-1].match_error_limit_px, Upright.of(initial)
+        clock, limit, upright = (
+            Clock(self.device),
+            self.stages[-1].match_error_limit_px,
+            Upright.of(initial, self.stages[0].range),
+        )
         start = upright.extrinsic(initial)
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(prepared(frame, upright), clock)
@@ -127,7 +131,7 @@ class Cascade:
             frame: image, scan and camera; its own extrinsic is not looked at.
             initial: ``camera_from_lidar`` to start from.
         """
-        upright = Upright.of(initial)
+        upright = Upright.of(initial, self.stages[0].range)
         frame, start = upright.frame(frame), upright.extrinsic(initial)
         try:
             trace = self.calibrate(frame, start)
@@ -152,7 +156,7 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        upright = Upright.of(initial)
+        upright = Upright.of(initial, self.stages[0].range)
         start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
         estimate = solve_drive(self.stages, frames, start, self.common, observer)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):

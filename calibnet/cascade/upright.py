@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import PinholeCamera, transform
+from calibnet.geometry import MiscalibrationRange, PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
 from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
@@ -24,8 +24,10 @@ from calibnet.verdict import Verdict
 
 AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
 
-TOLERATED = np.radians(8.0)
+TOLERATED_DEG = 8.0
 """Roll up to which nothing is resampled: training had as much, and a picture that is turned loses its corners."""
+BEYOND_RANGE_DEG = 3.0
+"""Roll beyond the range searched from which on it is the mount's: less may be what the guess gets wrong."""
 LEVEL = 0.5
 """Length, seen by the camera, of an upward unit vector below which the camera looks up or down and has no roll."""
 QUARTER = np.pi / 2
@@ -47,12 +49,13 @@ class Upright:
     rest: float = 0.0
 
     @classmethod
-    def of(cls, camera_from_lidar: Extrinsic) -> Upright:
-        """The turn that a guess of the extrinsic asks for."""
+    def of(cls, camera_from_lidar: Extrinsic, searched: MiscalibrationRange) -> Upright:
+        """The turn that a guess of the extrinsic asks for, which may be wrong by the range that is searched."""
         turn = -roll_of(camera_from_lidar)
         quarters = round(turn / QUARTER)
         rest = turn - quarters * QUARTER
-        return cls(quarters, rest if abs(rest) > TOLERATED else 0.0)
+        tolerated = np.radians(max(TOLERATED_DEG, searched.rotation_deg + BEYOND_RANGE_DEG))
+        return cls(quarters, rest if abs(rest) > tolerated else 0.0)
 
     def __bool__(self) -> bool:
         """Whether anything is turned."""

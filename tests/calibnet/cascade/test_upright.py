@@ -10,7 +10,7 @@ import pytest
 
 from calibnet.cascade import Cascade, Stage
 from calibnet.cascade.prepared import PreparedFrames, prepared
-from calibnet.cascade.upright import FILLED, TOLERATED, Upright, roll_of
+from calibnet.cascade.upright import FILLED, TOLERATED_DEG, Upright, roll_of
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import (
     RANGES,
@@ -29,6 +29,9 @@ from tests.support.tiny import tiny_network
 
 MATRIX = np.array([[150.0, 0.0, 131.0], [0.0, 155.0, 44.0], [0.0, 0.0, 1.0]])
 DELTA = miscalibration([2.0, -1.0, 3.0], [0.2, -0.1, 0.3])
+
+NARROW = RANGES[2]
+"""Of most guesses: 5 degrees."""
 
 
 def roll(degrees: float) -> np.ndarray:
@@ -59,7 +62,7 @@ def test_the_roll_of_a_camera_is_read_off_its_extrinsic(degrees):
 def test_a_camera_that_looks_up_or_down_has_no_roll():
     for pitch in (-80, 80):
         turned = transform(rotation_from_vector([np.radians(pitch), 0.0, 0.0]), np.zeros(3)) @ REFERENCE
-        assert not Upright.of(roll(40) @ turned)
+        assert not Upright.of(roll(40) @ turned, NARROW)
 
 
 @pytest.mark.parametrize(
@@ -68,11 +71,11 @@ def test_a_camera_that_looks_up_or_down_has_no_roll():
      (180, -2, 0), (120, -1, -30), (-50, 1, -40)],
 )  # fmt: skip
 def test_a_camera_is_turned_by_quarters_and_by_the_rest_where_that_is_not_small(degrees, quarters, rest):
-    upright = Upright.of(roll(degrees) @ REFERENCE)
+    upright = Upright.of(roll(degrees) @ REFERENCE, NARROW)
     assert upright.quarters % 4 == quarters % 4
     assert np.degrees(upright.rest) == pytest.approx(rest)
     left = roll_of(upright.extrinsic(roll(degrees) @ REFERENCE))
-    assert abs(left) <= TOLERATED + 1e-9
+    assert abs(left) <= np.radians(TOLERATED_DEG) + 1e-9
     assert left == pytest.approx(0.0) or not rest
 
 
@@ -80,7 +83,7 @@ def test_a_camera_is_turned_by_quarters_and_by_the_rest_where_that_is_not_small(
 def test_points_stay_on_their_dots(degrees):
     """The turned camera with the turned extrinsic projects every point onto the dot that was drawn for it."""
     frame = dots(degrees)
-    upright = Upright.of(frame.camera_from_lidar).frame(frame)
+    upright = Upright.of(frame.camera_from_lidar, NARROW).frame(frame)
     seen = project(upright.points, upright.camera_from_lidar, upright.camera)
     before = project(frame.points, frame.camera_from_lidar, frame.camera)
     assert set(seen.index) <= set(before.index) and len(seen.index) >= 2
@@ -94,7 +97,7 @@ def test_points_stay_on_their_dots(degrees):
 @pytest.mark.parametrize(("degrees", "clockwise"), [(90, -1), (-90, 1), (180, 2)])
 def test_quarter_turns_keep_every_pixel(degrees, clockwise):
     frame = dots(degrees)
-    upright = Upright.of(frame.camera_from_lidar).frame(frame)
+    upright = Upright.of(frame.camera_from_lidar, NARROW).frame(frame)
     np.testing.assert_array_equal(upright.image, np.rot90(frame.image, -clockwise))
     focal, center = {-1: ((155, 150), (44, 124)), 1: ((155, 150), (51, 131)), 2: ((150, 155), (124, 51))}[clockwise]
     assert upright.camera.focal == focal and upright.camera.center == center
@@ -105,7 +108,7 @@ def test_a_turned_picture_is_cut_to_where_it_mostly_is():
     image = np.full((300, 400, 3), 200, np.uint8)
     matrix = np.array([[300.0, 0, 199.5], [0, 300.0, 149.5], [0, 0, 1.0]])
     frame = Frame(0, 0.0, image, np.zeros((1, 4), np.float32), PinholeCamera(400, 300, matrix), roll(30) @ REFERENCE)
-    upright = Upright.of(frame.camera_from_lidar).frame(frame)
+    upright = Upright.of(frame.camera_from_lidar, NARROW).frame(frame)
     assert (upright.image == 200).all(), "beyond its border the picture goes on"
     # 400x300 turned by 30 degrees is 496x460; rows of a third of the fullest begin where its corners are as wide
     widest = 400 / np.cos(np.radians(30))
@@ -125,16 +128,22 @@ def test_black_borders_are_no_picture():
     rotation = rotation_from_vector([0.0, 0.0, np.radians(30)])
     image = cv2.warpPerspective(canvas, matrix @ rotation @ np.linalg.inv(matrix), (256, 256))
     tilted = replace(frame, image=image, camera=camera, camera_from_lidar=roll(30) @ REFERENCE)
-    upright = Upright.of(tilted.camera_from_lidar).frame(tilted)
+    upright = Upright.of(tilted.camera_from_lidar, NARROW).frame(tilted)
     assert upright.camera.height == pytest.approx(96, abs=6)
     assert upright.camera.width == pytest.approx(256, abs=20)
+
+
+def test_a_roll_within_the_range_that_is_searched_may_be_the_guess_s_error():
+    turns = [Upright.of(roll(degrees) @ REFERENCE, RANGES[0]).rest for degrees in (12.0, 22.9, 23.1)]
+    np.testing.assert_allclose(np.degrees(turns), [0.0, 0.0, -23.1])
+    assert Upright.of(roll(70) @ REFERENCE, RANGES[0]) == Upright(-1, 0.0), "20 degrees short of a quarter"
 
 
 @pytest.mark.parametrize("degrees", [0.0, 5.0, -7.9])
 def test_an_upright_camera_is_left_as_it_is(degrees):
     frame = make_frame(3)
     initial = roll(degrees) @ REFERENCE
-    upright = Upright.of(initial)
+    upright = Upright.of(initial, NARROW)
     assert upright.frame(frame) is frame and upright.extrinsic(initial) is initial
     trace = CascadeTrace(initial, ())
     assert upright.undo(trace, initial) is trace
