@@ -34,15 +34,12 @@ def _word(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationR
     if not searched.contains(estimate.camera_from_lidar @ invert(initial), MARGIN):
         return REJECTED, (
             f"It lies {turned:.2g}° and {shifted:.0f} cm from the start, out of the range that was to be searched, "
-            f"{searched.label}: a wrong lens or late scans look like that. If the start may be that far off, search a "
-            "wider range."
+            f"{searched.label}: a wrong lens or late scans look like that. If the start may be that far off, let all "
+            "stages run (--stages 1-5)."
         )
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
         return CANNOT_TELL, (
             f"The frames leave it open to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.0f} cm (one "
             "standard deviation); more frames of other places help."
         )
-    return ACCEPTED, (
-        f"{used} frames agree, to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.1f} cm (one standard "
-        "deviation)."
-    )
+    return ACCEPTED, f"{used} frames agree."
