@@ -184,7 +184,10 @@ class Cascade:
         if not trace.fits or not self.stages[0].range.contains(moved, MARGIN):
             return None
         last, branch = self.stages[-1], self.image_branches[len(self.stages) - 1]
-        return last.look(views.frame, views.of(last, branch), trace.arrived)
+        try:
+            return last.look(views.frame, views.of(last, branch), trace.arrived)
+        except CalibrationError:  # too few points are left in the picture: the run itself was fine
+            return None
 
     def _covering(self, moved: Transform) -> list[Stage]:
         """The wider stages with which to start again after moving so far; none where the first stage's range covers it.

@@ -543,3 +543,14 @@ def test_wider_stages_are_loaded_where_they_are_wanted(tmp_path: Path) -> None:
     loaded = Cascade.load("compact", (3, 5), tmp_path, wider=True)
     assert [stage.number for stage in loaded.stages] == [3, 5] and [stage.number for stage in loaded.wider] == [1]
     assert Cascade.load("compact", (3, 5), tmp_path).wider == []
+
+
+def test_a_look_again_that_fails_costs_no_result(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    def blind(*_: Any, **__: Any) -> StageTrace:
+        raise CalibrationError("Only 3 cells hold a LiDAR point.")
+
+    wandering(monkeypatch, {3: [0.1], 4: [0.0], 5: [0.0]})
+    monkeypatch.setattr(Stage, "look", blind)
+    trace = cascade((3, 4, 5)).calibrate(frame, INITIAL)
+    np.testing.assert_allclose(trace.arrived, miscalibration([0, 0, 0], [0.1, 0, 0]) @ INITIAL, atol=1e-12)
+    assert trace.verdict is not None and trace.verdict.word == "cannot tell"
