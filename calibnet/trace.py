@@ -141,7 +141,7 @@ class CascadeTrace:
     Attributes:
         initial: ``camera_from_lidar`` the run started from, 4x4.
         stages: the stages that ran, coarse to fine.
-        milliseconds: wall time shared by the stages (resizing, image features).
+        milliseconds: wall time shared by the stages (preparation, resizing, image features).
         wider: stages of wider ranges that ran before them, because a first try left the range it searched.
         verdict: whether the result is good; None from a method that does not say.
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.

@@ -114,6 +114,7 @@ class Cascade:
         start = upright.extrinsic(initial)
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(prepared(frame, upright), clock)
+            clock("preparation")
             trace = CascadeTrace(start, self._run(self.stages, views, start, detail), clock.parts, limit)
             if wider := self._covering(trace.arrived @ invert(start)):
                 before = self._run(wider, views, start)
@@ -132,7 +133,7 @@ class Cascade:
             initial: ``camera_from_lidar`` to start from.
         """
         upright = Upright.of(initial, self.stages[0].range)
-        frame, start = upright.frame(frame), upright.extrinsic(initial)
+        frame, start = prepared(frame, upright), upright.extrinsic(initial)
         try:
             trace = self.calibrate(frame, start)
         except CalibrationError:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import torch
 
 from calibnet.cascade.stage import Stage, View
 from calibnet.datasets.frame import Frame
 from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.clock import Clock
 
 
 class ImageViews:
     """A frame's image as stages see it; those that share image size and image branch have one view."""
 
-    def __init__(self, frame: Frame, clock: Callable[[str], None]) -> None:
+    def __init__(self, frame: Frame, clock: Clock) -> None:
         """Of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
         self.frame, self.clock = frame, clock
         self._views: dict[tuple[int, int, int], View] = {}
@@ -24,6 +25,7 @@ class ImageViews:
         camera = stage.camera(self.frame)
         key = branch, camera.width, camera.height
         if key not in self._views:
+            self.clock.skip()  # stages ran since the last view, and time themselves
             self._views[key] = stage.view(self.frame, self.clock)
         return self._views[key]
 

@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.geometry.visibility import as_one_scan, is_accumulated
+from calibnet.datasets.plausibility import several
+from calibnet.geometry.visibility import as_one_scan
 
 
 def prepared(frame: Frame, upright: Upright) -> Frame:
     """The frame, turned as `upright` says, and of a cloud of several scans what one would have; else the very same."""
-    if is_accumulated(frame.points):
-        frame = replace(frame, points=as_one_scan(frame.points))
+    if remark := several(frame.points):
+        known = any(other.name == remark.name for other in frame.remarks)  # to whoever read the frame
+        remarks = frame.remarks if known else (*frame.remarks, remark)
+        frame = replace(frame, points=as_one_scan(frame.points), remarks=remarks)
     return upright.frame(frame)
 
 

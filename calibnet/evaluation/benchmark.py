@@ -53,7 +53,7 @@ class Benchmark:
 
     Attributes:
         cascade: milliseconds from frame to extrinsic, all stages, median.
-        shared: medians of what is done once a frame: resizing and, where stages share it, the image branch.
+        shared: medians of what is done once a frame: preparation, resizing and, where stages share it, image features.
         stages: one by one.
         frames: number of runs that the medians are over.
         machine: CPU or GPU, threads and precision.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.plausibility import Implausible, bit_depth, of_camera, of_extrinsic, of_scan
+from calibnet.datasets.plausibility import ROW_STEP, Implausible, bit_depth, of_camera, of_extrinsic, ranges, up
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.covariance import covariance
@@ -41,7 +41,9 @@ def judge(
         misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
         doubt: how witnesses are summed up; by default as it was fitted to the weights that ship with the package.
     """
-    checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan(frame.points), bit_depth(frame.image)]
+    # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
+    of_scan = ranges(frame.points), up(frame.points)
+    checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan, bit_depth(frame.image)]
     seen = [remark for remark in checks if remark is not None]
     known = {remark.name for remark in seen}
     remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in known)]  # those of when it was read
@@ -61,7 +63,7 @@ def judge(
         going = moved(trace.initial, last.after)
         return Verdict(word, _because(reason, causes), last.after, going, causes, covariance(last))
 
-    if float(frame.image.std()) < BLANK:
+    if float(frame.image[::ROW_STEP].std()) < BLANK:
         return verdict(REJECTED, "The picture shows nothing.")
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)

@@ -206,6 +206,9 @@ def test_a_cloud_of_several_scans_is_prepared_as_one():
     one, several = scan(0.0, 0.0), np.concatenate([scan(ahead, 0.5 * ahead) for ahead in (0.0, -2.0, 2.0, 4.0)])
     frame = replace(make_frame(1), points=one)
     assert prepared(frame, Upright()) is frame
-    points = prepared(replace(frame, points=several), Upright()).points
-    np.testing.assert_array_equal(points, as_one_scan(several))
-    assert len(points) < 0.5 * len(several)
+    once = prepared(replace(frame, points=several), Upright())
+    np.testing.assert_array_equal(once.points, as_one_scan(several))
+    assert len(once.points) < 0.5 * len(several)
+    assert [remark.name for remark in once.remarks] == ["accumulated"], "a suspect if the result is doubted"
+    again = prepared(replace(once, points=several), Upright())
+    assert again.remarks == once.remarks, "said once, whoever read the frame has said it already"
