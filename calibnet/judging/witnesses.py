@@ -1,6 +1,6 @@
 """What tells right from wrong: a few numbers of one run, none of which needs the network again.
 
-What each adds is measured in docs; `Doubt` sums them up to the probability that a result is wrong.
+`Doubt` sums them up to the probability that a result is wrong; docs/decisions.md says how it was fitted.
 """
 
 from __future__ import annotations
