@@ -13,13 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calibnet.geometry import PinholeCamera
+from calibnet.geometry.projection import MINIMUM_DEPTH
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector, transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6
 from calibnet.trace import Matches
 
 ITERATIONS = 12
-MINIMUM_DEPTH = 0.5
-"""Metres nearer than which a point weighs nothing."""
 INDEPENDENT = 1 / 20
 """Share of matches that err independently: errors of neighbours are correlated over some twenty cells of a row."""
 

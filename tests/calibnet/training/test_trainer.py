@@ -236,9 +236,8 @@ def test_a_loss_that_is_not_a_number_stops_the_run(tiny_world: Scenes, tmp_path:
         trainer.run()
 
 
-def test_without_the_hybrid_loss_the_pose_is_learned_from_the_start(
-    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def watched_shares(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The shares of the pose's losses, batch by batch, as training asks for them."""
     shares: list[float] = []
     real = trainer_module.hybrid_loss
 
@@ -246,8 +245,15 @@ def test_without_the_hybrid_loss_the_pose_is_learned_from_the_start(
         shares.append(arguments[5])
         return real(*arguments)
 
-    monkeypatch.setattr(build_module, "load_preset", lambda name: replace(TINY, hybrid_loss=False))
     monkeypatch.setattr(trainer_module, "hybrid_loss", watched)
+    return shares
+
+
+def test_without_the_hybrid_loss_the_pose_is_learned_from_the_start(
+    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shares = watched_shares(monkeypatch)
+    monkeypatch.setattr(build_module, "load_preset", lambda name: replace(TINY, hybrid_loss=False))
     trainer_of(options(tmp_path, batches=3)).run()
     assert shares == [1.0, 1.0, 1.0]
 
@@ -289,14 +295,7 @@ def test_the_learning_rate_rises_and_falls_with_the_budget(tiny_world: Scenes, t
 def test_the_pose_s_losses_fade_in_after_the_warm_up(
     tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shares: list[float] = []
-    real = trainer_module.hybrid_loss
-
-    def watched(*arguments: Any) -> Any:
-        shares.append(arguments[5])
-        return real(*arguments)
-
-    monkeypatch.setattr(trainer_module, "hybrid_loss", watched)
+    shares = watched_shares(monkeypatch)
     recipe = replace(RECIPE, features=replace(RECIPE.features, pose_ramp=2 * BATCH, every=0))
     trainer_of(options(tmp_path, batches=6, warm_up=BATCH), recipe).run()
     assert shares == [0.0, 0.5, 1.0, 1.0, 1.0]

@@ -7,14 +7,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
-import yaml
 from rerun.chunk import RrdReader
 
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from tests.support.folder import write_folder
 
 Invoke = Callable[..., tuple[int, str, str]]
 
@@ -43,24 +42,9 @@ def invoke(
 
 
 @pytest.fixture
-def own_folder(tmp_path: Path, fakes: ModuleType) -> Path:
+def own_folder(tmp_path: Path) -> Path:
     """Two frames of the fake car as a plain folder."""
-    folder = tmp_path / "own"
-    for name in ("images", "clouds"):
-        (folder / name).mkdir(parents=True)
-    for index in range(2):
-        frame = fakes.make_frame(index)
-        cv2.imwrite(str(folder / "images" / f"{index:04d}.png"), frame.image[:, :, ::-1])
-        frame.points.tofile(folder / "clouds" / f"{index:04d}.bin")
-    calibration = {
-        "width": frame.camera.width,
-        "height": frame.camera.height,
-        "camera_matrix": frame.camera.matrix.tolist(),
-        "distortion": [0.0] * 5,
-        "camera_from_lidar": frame.camera_from_lidar.tolist(),
-    }
-    (folder / "calibration.yaml").write_text(yaml.safe_dump(calibration))
-    return folder
+    return write_folder(tmp_path / "own", 2)
 
 
 def entities_of(file: Path) -> set[str]:

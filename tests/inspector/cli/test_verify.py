@@ -6,13 +6,10 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
-import yaml
 
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.trace import DriveEstimate, Estimate
@@ -21,6 +18,7 @@ from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.read.run import read_run
 from tests.support.fakes import REFERENCE, FakeCascade
+from tests.support.folder import write_folder
 
 COVARIANCE = np.diag([*[0.01**2] * 3, *[np.radians(0.05) ** 2] * 3])
 """1 cm and 0.05° on every axis."""
@@ -85,24 +83,9 @@ def invoke(
 
 
 @pytest.fixture
-def own_folder(tmp_path: Path, fakes: ModuleType) -> Path:
+def own_folder(tmp_path: Path) -> Path:
     """Three frames of the fake car, with the calibration that it has."""
-    folder = tmp_path / "own"
-    for name in ("images", "clouds"):
-        (folder / name).mkdir(parents=True)
-    for index in range(3):
-        frame = fakes.make_frame(index)
-        cv2.imwrite(str(folder / "images" / f"{index:04d}.png"), frame.image[:, :, ::-1])
-        frame.points.tofile(folder / "clouds" / f"{index:04d}.bin")
-    content = {
-        "width": frame.camera.width,
-        "height": frame.camera.height,
-        "camera_matrix": frame.camera.matrix.tolist(),
-        "distortion": [0.0] * 5,
-        "camera_from_lidar": frame.camera_from_lidar.tolist(),
-    }
-    (folder / "calibration.yaml").write_text(yaml.safe_dump(content))
-    return folder
+    return write_folder(tmp_path / "own", 3)
 
 
 def test_a_good_calibration_is_accepted_and_nothing_is_written(invoke: Invoke, own_folder: Path) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
-import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from calibnet.errors import ConfigError
@@ -22,6 +21,7 @@ from inspector.compare.table import comparison_table
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun, read_run
 from inspector.record.outputs import rerun_binary
+from tests.support.layout import views
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -56,14 +56,6 @@ def rows_of(file: Path) -> dict[str, int]:
         if not chunk.is_static:
             rows[chunk.entity_path] = rows.get(chunk.entity_path, 0) + chunk.num_rows
     return rows
-
-
-def views(part: Any) -> Iterator[Any]:
-    if isinstance(part, rrb.View):
-        yield part
-    else:
-        for child in part.contents:
-            yield from views(child)
 
 
 def test_each_run_keeps_its_overlays_and_curves_and_nothing_else(

@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 import rerun as rr
-import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 import inspector
@@ -18,6 +17,7 @@ from inspector.record.contents import Coloring, Contents, Detail, Part
 from inspector.record.observation import Layout, Observation
 from inspector.record.recording import Recording, RunDescription
 from tests.support.fakes import DELTA, FakeCascade, make_frame
+from tests.support.layout import views
 
 CASCADE = FakeCascade((3, 5), strides=(8, 16), radius=2, size=(256, 96))
 TIMELINES = ("frame", "time", "step")
@@ -123,14 +123,6 @@ def test_every_view_of_the_layout_finds_its_entities(observations: list[Observat
                 query
             )
         assert set(view.visualizer_overrides) <= entities
-
-
-def views(part: Any) -> Iterator[Any]:
-    if isinstance(part, rrb.View):
-        yield part
-    else:
-        for child in part.contents:
-            yield from views(child)
 
 
 def test_the_layout_can_be_sent_and_has_the_tabs_that_are_named(
