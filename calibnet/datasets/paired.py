@@ -17,6 +17,7 @@ from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, o
 from calibnet.datasets.scans import read_scan
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
+from calibnet.runtime.reading import register_input
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,9 @@ class PairedSequence(ABC):
         self.name = name
         self.rig = rig
         self.files = tuple(files)
+        for file in self.files:
+            register_input(file.image)
+            register_input(file.scan)
 
     def __len__(self) -> int:
         """Number of frames."""

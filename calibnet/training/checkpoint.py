@@ -12,7 +12,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from calibnet.errors import WeightsError
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import write_whole
 
 KEY = "calib-inspect-training"
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from calibnet.datasets import Frame
 from calibnet.geometry import PinholeCamera
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import write_whole
 
 
 class SyntheticPool:

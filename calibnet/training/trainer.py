@@ -15,6 +15,7 @@ from calibnet.errors import CalibrationError, ConfigError
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.interruption import StopRequest
+from calibnet.runtime.writing import Kind, check_output
 from calibnet.training.batches import Batch, next_batch, open_batches
 from calibnet.training.build import Training
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
@@ -49,6 +50,9 @@ class Trainer:
         self.model.mark_forward_method("match")
         self.average.to(self.fabric.device)
         self.steps, self.seconds = 0, 0.0
+        check_output(
+            weights_path(self.options.preset, self.range, self.folder), Kind.WEIGHTS
+        )  # now, not after the work
         if resume and self.checkpoint.exists():
             self._resume()
         elif self.checkpoint.exists():

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.reading import require_file
+from calibnet.runtime.writing import Kind, write_whole
 from calibnet.weights.manifest import PACKAGE, load_manifest
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from calibnet.network.network import CalibrationNetwork
 
+LARGEST_BYTES = 1 << 30
+"""Of a file of weights; ours have 10 MB."""
 HEADER = "calib-inspect"
 MOVED = {"zooms", "rounds", "gains", "largest_match_error"}
 """Keys of older headers that act no more: how a network is used is said by its manifest."""
@@ -44,7 +47,7 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
         save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
         partial.chmod(0o644)  # safetensors keeps its files to their owner, which a package must not
 
-    write_whole(path, write)
+    write_whole(path, write, Kind.WEIGHTS)
 
 
 def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -61,8 +64,9 @@ def read_header(path: Path) -> dict[str, Any]:
     """
     from safetensors import SafetensorError, safe_open
 
-    if not path.is_file():
+    if not path.exists():
         raise WeightsError(f"There are no weights at {path}; train them with `calib-inspect train`.")
+    require_file(path, "Weights", LARGEST_BYTES, WeightsError, "train them with `calib-inspect train`")
     try:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}

@@ -17,7 +17,7 @@ import numpy as np
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Matrix6
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import write_whole
 
 PACKAGE = Path(__file__).parent
 """Where the weights that ship with the package lie."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from inspector.cli.options import FOLDER, STAGES
-from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
+from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, prepare_json, say, write_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,11 +24,12 @@ SCENES = 4
 @click.option(
     "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Runs of each of {SCENES} frames."
 )
-@click.option("--threads", type=click.IntRange(1), help="Of the CPU.  [default: all cores]")
+@click.option("--threads", type=click.IntRange(1, os.cpu_count() or 1), help="Of the CPU.  [default: all cores]")
 @click.option("--stages", type=STAGES, default="1-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to time.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
+@overwrite_option
 def benchmark(
     repeats: int,
     threads: int | None,
@@ -54,7 +56,7 @@ def benchmark(
         torch.set_num_threads(threads)
     cascade = Cascade.load(preset, stages, weights)
     for skipped in cascade.skipped:
-        click.echo(skipped.reason, err=True)
+        say(skipped.reason, err=True)
     frames = list(SyntheticSequence(seed=0, length=SCENES, rig=KITTI_LIKE))
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("timing", total=timing.WARM_UP + repeats * SCENES)

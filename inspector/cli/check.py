@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES, ExitCode
-from inspector.cli.output import JSON_FILE, write_json
+from inspector.cli.options import NumberRange
+from inspector.cli.output import JSON_FILE, overwrite_option, prepare, prepare_json, say, write, write_json
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
-LIMIT = click.FloatRange(min=0.0)
+LIMIT = NumberRange(min=0.0)
 
 
 @click.command()
@@ -27,6 +28,7 @@ LIMIT = click.FloatRange(min=0.0)
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")
+@overwrite_option
 def check(
     recording: Path,
     max_rotation: float | None,
@@ -46,15 +48,17 @@ def check(
 
     largest = {"rotation": max_rotation, "translation": max_translation}
     limits = [Limit(kind, value, statistic) for kind, value in largest.items() if value is not None]
+    prepare_json(json_file)
+    prepare(junit_file, Kind.JUNIT)
     run = open_run(recording)
     outcomes = check_run(run, limits)
     verdict = run.verdict
     if junit_file is not None:
-        write_whole(junit_file, junit(run, outcomes))
+        write(junit_file, junit(run, outcomes), Kind.JUNIT)
     write_json(json_file, verdict.as_dict())
     if outcomes:
-        click.echo(summary(run, outcomes), err=json_file == "-")
-    click.echo(line(verdict), err=json_file == "-")
+        say(summary(run, outcomes), err=json_file == "-")
+    say(line(verdict), err=json_file == "-")
     if not all(outcome.passed for outcome in outcomes):
         return ExitCode.CHECK_FAILED
     return VERDICT_CODES[verdict.word]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.errors import ConfigError
 from inspector.cli.errors import ExitCode, fail
+from inspector.cli.output import say
 from inspector.cli.recordings import RECORDING, open_run
 from inspector.cli.viewing import saved_lines, viewing_options
 
@@ -46,22 +46,17 @@ def compare(
     from inspector.record.stream import RecordingLostError
 
     outputs = viewing.outputs(f"compare-{'-'.join(called)}")
-    refuse_overwriting(outputs.file, recordings)
     comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
-    outputs.check()
     try:
+        outputs.check()
         record_comparison(comparison, outputs.open())
+        outputs.complete()
         return finish(comparison, outputs)
     except RecordingLostError as error:
+        outputs.close()
         os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
         outputs.close()
-
-
-def refuse_overwriting(file: Path | None, recordings: tuple[Path, ...]) -> None:
-    """Raise `ConfigError` when the comparison would replace what it reads."""
-    if file is not None and file.resolve() in [path.resolve() for path in recordings]:
-        raise ConfigError(f"{file} is one of the runs; choose another --save.")
 
 
 def finish(comparison: Comparison, outputs: Outputs) -> int:
@@ -70,11 +65,11 @@ def finish(comparison: Comparison, outputs: Outputs) -> int:
         metrics = run.corrected
         if metrics is not None:
             rotation, translation = metrics.rotation_deg.median, metrics.translation_cm.median
-            click.echo(f"{run.name}: {rotation:.2f}° / {translation:.1f} cm, median over {len(run.frames)} frames.")
+            say(f"{run.name}: {rotation:.2f}° / {translation:.1f} cm, median over {len(run.frames)} frames.")
     if outputs.file is not None:
-        for line in saved_lines(outputs.file, len(comparison.indices)):
-            click.echo(line)
+        for line in saved_lines(outputs, len(comparison.indices)):
+            say(line)
     if outputs.page is not None:
-        click.echo(f"Serving at {outputs.page} until Ctrl-C.")
+        say(f"Serving at {outputs.page} until Ctrl-C.")
         outputs.wait_while_serving()
     return ExitCode.OK

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import re
 import sys
+import tempfile
+import traceback
 from enum import IntEnum
 
 import click
 
 from calibnet.errors import CalibnetError
+from calibnet.runtime.reading import protecting_inputs
+from calibnet.runtime.text import lines, one_line
+from calibnet.runtime.writing import keeping_others
 
 SYSTEM_PACKAGES = {
     "libusb-1.0.so.0": "libusb-1.0-0",
@@ -32,6 +38,7 @@ class ExitCode(IntEnum):
     USAGE = 2
     BAD_INPUT = 3
     CANNOT_TELL = 4
+    UNFORESEEN = 70
     INTERRUPTED = 130
     BROKEN_PIPE = 141
 
@@ -52,13 +59,18 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
         arguments: what follows the program's name, by default of this process.
 
     Returns:
-        The exit code. Errors that are bugs pass through with their traceback.
+        The exit code.
     """
     try:
-        result = command.main(args=arguments, prog_name="calib-inspect", standalone_mode=False)
-        sys.stdout.flush()  # a full disk or a closed pipe shows up here rather than at the interpreter's end
+        with protecting_inputs(), keeping_others():
+            result = command.main(args=arguments, prog_name="calib-inspect", standalone_mode=False)
+        if sys.stdout is not None:
+            sys.stdout.flush()  # a full disk or a closed pipe shows up here rather than at the interpreter's end
     except click.ClickException as error:
-        error.show()
+        shown = io.StringIO()
+        error.show(shown)
+        with contextlib.suppress(OSError, AttributeError):  # stderr may be closed
+            click.echo(lines(shown.getvalue()), err=True, nl=False)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         return fail("Interrupted.", ExitCode.INTERRUPTED)
@@ -70,20 +82,41 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
     except SystemExit as leaving:  # click and rich leave with 1 when the reader of a pipe is gone
         discard_stdout()
         return ExitCode.BROKEN_PIPE if leaving.code == 1 else int(leaving.code or 0)
+    except MemoryError:
+        return fail("There is not enough memory for this; free some, or use fewer or smaller files.")
     except (OSError, ImportError) as error:
         sentence = environment_sentence(error)
-        if sentence is None:
-            raise
         discard_stdout()
-        return fail(sentence)
+        return fail(sentence) if sentence else unforeseen(error)
+    except Exception as error:  # the last net: nobody sees a traceback
+        return unforeseen(error)
     return result if isinstance(result, int) else ExitCode.OK
 
 
 def fail(sentence: str, code: ExitCode = ExitCode.BAD_INPUT) -> int:
     """Print one sentence on stderr and hand back the exit code."""
-    with contextlib.suppress(OSError):
-        click.echo(f"calib-inspect: {sentence}", err=True)
+    with contextlib.suppress(OSError, AttributeError):  # stderr may be closed
+        click.echo(f"calib-inspect: {one_line(sentence)}", err=True)
     return code
+
+
+def unforeseen(error: Exception) -> int:
+    """Say that something went wrong which nobody thought of, and keep what its makers need to know in a file."""
+    from platform import platform
+
+    from calibnet import __version__
+
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    told = [f"calib-inspect {__version__}, Python {sys.version}, {platform()}", f"Arguments: {sys.argv[1:]}"]
+    text = "\n".join([*told, "", *traceback.format_exception(error)])
+    where = "; its traceback could not be kept"
+    with contextlib.suppress(OSError):
+        descriptor, name = tempfile.mkstemp(prefix="calib-inspect-error-", suffix=".txt")
+        with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)
+        where = f" together with {name}"
+    sentence = f"A fault of calib-inspect ended this ({one_line(what, 300)}). Please report it{where}."
+    return fail(sentence, ExitCode.UNFORESEEN)
 
 
 def environment_sentence(error: OSError | ImportError) -> str | None:
@@ -112,5 +145,5 @@ def environment_sentence(error: OSError | ImportError) -> str | None:
 
 def discard_stdout() -> None:
     """Point stdout at nothing, so that the interpreter's last flush cannot fail a second time."""
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

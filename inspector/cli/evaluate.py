@@ -11,8 +11,8 @@ import click
 
 from calibnet.datasets import PickedFrames, Sequence, dataset_names, open_sequence, select_frames
 from calibnet.methods.registry import METHODS, open_method
-from inspector.cli.options import FOLDER, FRAMES, RANGE, STAGES
-from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
+from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, STAGES
+from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, prepare_json, say, write_json
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option("--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the miscalibrations.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     help="Another method, on the same single frames. Repeatable.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
+@overwrite_option
 def evaluate(
     dataset: str,
     root: Path,
@@ -100,7 +101,7 @@ def evaluate(
 
     cascade = Cascade.load(preset, stages or stages_within(range_), weights, wider=stages is None)
     for skipped in cascade.skipped:
-        click.echo(skipped.reason, err=True)
+        say(skipped.reason, err=True)
     if battery:
         run_battery(cascade, opened, range_, repeats, seed, lambda: find_sequences(dataset, root), json_file)
         return

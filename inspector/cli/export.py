@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import Kind
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
+from inspector.cli.output import overwrite_option, say, write
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 from inspector.export.registry import FORMATS, export_as
 
@@ -30,6 +31,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--drive", is_flag=True, help="The extrinsic of the drive, of a run with --drive.")
 @click.option("--force", is_flag=True, help="Write it although it is rejected.")
 @click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
+@overwrite_option
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
 @click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
 @click.option(
@@ -81,8 +83,8 @@ def export(
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_whole(output, text.encode())
-        click.echo(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
+        write(output, text.encode(), Kind.JSON if text.startswith("{") else Kind.EXPORT)
+        say(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
     return ExitCode.OK
 
 
@@ -95,7 +97,7 @@ def may_be_written(exported: Exported, force: bool) -> bool:
 
     written = force or verdict.word != "rejected"
     what = "Written all the same." if written else "Nothing is written; --force writes it all the same."
-    click.echo(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
+    say(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
     return written
 
 

@@ -13,7 +13,6 @@ from calibnet.datasets import dataset_names
 from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER
 from inspector.cli.run import calibrate, run_options
-from inspector.cli.viewing import RECORDINGS
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
@@ -99,12 +98,12 @@ def folder(directory: Path, dataset: str, **asked: Any) -> int:
 def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> int:
     """Calibrate a drive through the synthetic world: needs no data.
 
-    The recording is kept in recordings/demo.rrd.
+    The recording is kept in recordings/demo.rrd, or, where that is there, in demo-2.rrd and so on.
     """
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 
     if report is None:
-        viewing = replace(viewing, save=viewing.save or RECORDINGS / "demo.rrd")
+        viewing = replace(viewing, keep="demo")
     drive = SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE)
     return calibrate(drive, viewing=viewing, report=report, **asked)
 

@@ -99,7 +99,8 @@ def cli() -> None:
     """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
 
     Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 rejected or a limit
-    exceeded, 2 wrong usage, 3 bad input or environment, 4 cannot tell, 130 interrupted.
+    exceeded, 2 wrong usage, 3 bad input or environment, 4 cannot tell, 70 a fault of the
+    program, 130 interrupted.
     """
 
 

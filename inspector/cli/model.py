@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.output import JSON_FILE, console_beside, prepare_json, write_json
+from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, prepare_json, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,6 +18,7 @@ HEIGHT, WIDTH = 256, 512
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network: compact, paper or another preset.")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout, no table.")
+@overwrite_option
 def info(preset: str, json_file: str | None) -> None:
     """Print the parameters and multiply-adds of a network, by module and in total.
 

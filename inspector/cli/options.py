@@ -6,7 +6,7 @@ import math
 import re
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import click
 
@@ -122,6 +122,19 @@ class WordType(click.Choice[str]):
         return value if isinstance(value, self.words) else self.words(super().convert(value, param, ctx))
 
 
+class NumberRange(click.FloatRange):
+    """A finite number within limits; click's own lets NaN through, as it is below no limit."""
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Parse the text and hold it against the limits."""
+        number = float(super().convert(cast(float, value), param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is no finite number.", param, ctx)
+        return number
+
+
+SEED = click.IntRange(0, 2**63 - 1)
+"""Of everything random; recordings keep it as a 64-bit number."""
 RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()

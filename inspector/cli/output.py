@@ -1,4 +1,4 @@
-"""Where a command's results go: tables on the terminal, JSON into a file or, with ``-``, to stdout."""
+"""Where a command's results go: tables and sentences on the terminal, files, JSON with ``-`` to stdout."""
 
 from __future__ import annotations
 
@@ -8,11 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.text import lines
+from calibnet.runtime.writing import Kind, allow_overwriting, check_output, write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+
+def _let_overwrite(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
+    if asked:
+        allow_overwriting()
+
+
+overwrite_option = click.option(
+    "--overwrite",
+    is_flag=True,
+    expose_value=False,
+    callback=_let_overwrite,
+    help="Let outputs replace files of any kind; without it, files of their own kind only.",
+)
+"""Of every command that writes what its user names."""
 JSON_FILE = click.Path(dir_okay=False, writable=True, allow_dash=True)
 """Type of a ``--json FILE|-`` option."""
 
@@ -24,10 +39,32 @@ def console_beside(json_file: str | None) -> Console:
     return Console(stderr=json_file == "-", highlight=False)
 
 
+def say(text: object, err: bool = False) -> None:
+    """Print lines of ours, with all foreign text in them quoted."""
+    click.echo(lines(text), err=err)
+
+
+def prepare(file: Path | None, kind: Kind) -> None:
+    """Create the folder of an output, so that a path that cannot be written fails before the work.
+
+    Raises:
+        OutputError: the output may not be written.
+        OSError: its folder cannot be made.
+    """
+    if file is not None:
+        check_output(file, kind)
+        file.parent.mkdir(parents=True, exist_ok=True)
+
+
 def prepare_json(json_file: str | None) -> None:
-    """Create the folder of the file, so that a path that cannot be written fails before the work."""
-    if json_file not in (None, "-"):
-        Path(str(json_file)).parent.mkdir(parents=True, exist_ok=True)
+    """The same for a ``--json`` option."""
+    prepare(None if json_file in (None, "-") else Path(str(json_file)), Kind.JSON)
+
+
+def write(file: Path, content: bytes, kind: Kind) -> None:
+    """Write an output whole or not at all, and say when it replaces another."""
+    if write_whole(file, content, kind):
+        say(f"Replaced {file}.", err=True)
 
 
 def write_json(json_file: str | None, content: dict[str, Any]) -> None:
@@ -38,4 +75,4 @@ def write_json(json_file: str | None, content: dict[str, Any]) -> None:
     if json_file == "-":
         click.echo(text)
         return
-    write_whole(Path(json_file), f"{text}\n".encode())
+    write(Path(json_file), f"{text}\n".encode(), Kind.JSON)

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from inspector.cli.options import FOLDER
+from inspector.cli.output import overwrite_option, say
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
 
 
@@ -32,6 +33,7 @@ class SizeType(click.ParamType[tuple[int, int]]):
 @click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Of the viewer's window.")
 @click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first; with --animate, three]")
 @click.option("--tab", "wanted", multiple=True, metavar="TEXT", help="Only tabs whose name contains this. Repeatable.")
+@overwrite_option
 @click.option(
     "--animate",
     type=OUTPUT_FILE,
@@ -61,9 +63,9 @@ def pictures(
         from inspector.report.animation import spread, write_animation
 
         write_animation(run, animate, spread(run) if frame is None else [frame])
-        click.echo(str(animate))
+        say(animate)
     if out is not None:
         from inspector.read.screenshots import take_pictures
 
         for file in take_pictures(recording, out, size, numbers[0] if frame is None else frame, wanted):
-            click.echo(str(file))
+            say(file)

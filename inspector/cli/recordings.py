@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from inspector.cli.output import say
+
 if TYPE_CHECKING:
     from inspector.read.run import RecordedRun
 
@@ -21,5 +23,5 @@ def open_run(path: Path) -> RecordedRun:
 
     run = read_run(path)
     if run.warning:
-        click.echo(run.warning, err=True)
+        say(run.warning, err=True)
     return run

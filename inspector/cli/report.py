@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from inspector.cli.options import FOLDER
+from inspector.cli.output import overwrite_option, say
 
 
 @click.command()
@@ -24,6 +25,7 @@ from inspector.cli.options import FOLDER
 @click.option(
     "--with-viewer", is_flag=True, help="Put the embedded viewer (43 MB) into the folder, for any web server to serve."
 )
+@overwrite_option
 def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
     """Write a report of a run from its recording: index.html, pictures, metrics.json, the recording.
 
@@ -47,8 +49,8 @@ def write_report_of(recording: Path, out: Path, on_stderr: bool = False) -> None
 
     run = read_run(recording)
     if run.warning:
-        click.echo(run.warning, err=True)
-    click.echo(f"Report: {write_report(run, out)}", err=on_stderr)
+        say(run.warning, err=True)
+    say(f"Report: {write_report(run, out)}", err=on_stderr)
 
 
 def serve_report(folder: Path) -> None:
@@ -60,7 +62,7 @@ def serve_report(folder: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
         fetch_viewer(Path(viewer))
         with StopRequest() as stop, ReportServer(served_files(folder, Path(viewer))) as server:
-            click.echo(f"Serving at {server.address} until Ctrl-C.")
+            say(f"Serving at {server.address} until Ctrl-C.")
             if has_display():
                 webbrowser.open(server.address)
             while not stop.requested:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from inspector.cli.errors import ExitCode, fail
-from inspector.cli.options import COLORING, DETAIL, FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, STAGES
+from inspector.cli.options import COLORING, DETAIL, FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, SEED, STAGES
+from inspector.cli.output import say
 from inspector.cli.viewing import saved_lines, viewing_options
 from inspector.run.options import DEFAULT_RANGE, OptionsError, RunOptions
 
@@ -38,7 +39,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
     ),
     click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
-    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random."),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
     click.option(
         "--drive",
         is_flag=True,
@@ -101,9 +102,8 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
     """
     options = checked(sequence, asked)
     outputs = choose_outputs(options, viewing, report)
-    session = prepare(options, outputs)
     with recording_to(outputs):
-        return finish(session.run(), outputs, report)
+        return finish(prepare(options, outputs).run(), outputs, report)
 
 
 def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
@@ -157,6 +157,7 @@ def recording_to(outputs: Outputs) -> Iterator[None]:
     try:
         yield
     except RecordingLostError as error:
+        outputs.close()
         os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
         outputs.close()
@@ -203,23 +204,23 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
 
     The last line is the verdict. With ``on_stderr``, stdout is for something else.
     """
-    say = partial(click.echo, err=on_stderr)
+    tell = partial(say, err=on_stderr)
     for line in summary.lines():
-        say(line)
+        tell(line)
     if outputs.file is not None and summary.frames:
-        say(size_line(outputs.file, summary.frames))
-        for line in saved_lines(outputs.file, summary.frames):
-            say(line)
+        tell(size_line(outputs.file, summary.frames))
+        for line in saved_lines(outputs, summary.frames):
+            tell(line)
         if report is not None:
             from inspector.cli.report import write_report_of
 
             write_report_of(outputs.file, report, on_stderr)
     if outputs.page is not None and not summary.interrupted:
-        say(f"Serving at {outputs.page} until Ctrl-C.")
+        tell(f"Serving at {outputs.page} until Ctrl-C.")
     if summary.verdict:
-        say(summary.verdict)
+        tell(summary.verdict)
     if summary.interrupted:
-        click.echo("Interrupted: the frames above are all that was recorded.", err=True)
+        say("Interrupted: the frames above are all that was recorded.", err=True)
         return ExitCode.INTERRUPTED
     if outputs.page is not None:
         outputs.wait_while_serving()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ import click
 from calibnet.network.heads import HEADS
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE
-from inspector.cli.options import FOLDER, RANGE
+from inspector.cli.options import FOLDER, RANGE, SEED, NumberRange
+from inspector.cli.output import overwrite_option
 from inspector.cli.training_console import ConsoleObserver, Observers
 
 if TYPE_CHECKING:
@@ -45,7 +47,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--synthetic",
-    type=click.FloatRange(0, 1),
+    type=NumberRange(0, 1),
     default=TrainingOptions.synthetic,
     show_default=True,
     help="Share of samples from the synthetic world.",
@@ -58,16 +60,14 @@ if TYPE_CHECKING:
     help="Synthetic scenes, each rendered once.",
 )
 @click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
-@click.option(
-    "--minutes", type=click.FloatRange(0, min_open=True), help="Budget of training time, over all resumed runs."
-)
+@click.option("--minutes", type=NumberRange(0, min_open=True), help="Budget of training time, over all resumed runs.")
 @click.option("--samples", type=click.IntRange(1), help="Budget in samples instead: exactly repeatable.")
 @click.option(
     "--batch", type=click.IntRange(1), default=TrainingOptions.batch, show_default=True, help="Samples a step."
 )
 @click.option(
     "--learning-rate",
-    type=click.FloatRange(0, min_open=True),
+    type=NumberRange(0, min_open=True),
     default=TrainingOptions.learning_rate,
     show_default=True,
     help="Peak of the cosine schedule.",
@@ -85,9 +85,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Processes that prepare samples.",
 )
-@click.option(
-    "--seed", type=click.IntRange(0), default=TrainingOptions.seed, show_default=True, help="Of everything random."
-)
+@click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Of everything random.")
 @click.option(
     "--initialize",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -115,6 +113,7 @@ if TYPE_CHECKING:
     metavar="FILE.rrd",
     help="Also log losses and figures to a recording.",
 )
+@overwrite_option
 def train(
     preset: str,
     head: str | None,
@@ -196,12 +195,13 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
     from calibnet.training.trainer import Trainer
 
     observers: list[Observer] = [ConsoleObserver(console)]
-    if save is not None:
-        from inspector.record.training import TrainingLog
+    with ExitStack() as closing:
+        if save is not None:
+            from inspector.record.training import TrainingLog
 
-        observers.append(TrainingLog(save, f"{options.preset} ±{options.range}"))
-    path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
-    console.print(f"Weights with their training record: {path}")
+            observers.append(closing.enter_context(TrainingLog(save, f"{options.preset} ±{options.range}")))
+        path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
+    console.print(f"Weights with their training record: {path}", markup=False, soft_wrap=True)
 
 
 def step_file(save: Path, step: TrainingOptions, output: Path) -> Path:

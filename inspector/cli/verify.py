@@ -22,7 +22,7 @@ from inspector.cli.inspect import (
     split_option,
 )
 from inspector.cli.options import FOLDER
-from inspector.cli.output import JSON_FILE, prepare_json, write_json
+from inspector.cli.output import JSON_FILE, prepare_json, say, write_json
 from inspector.cli.run import checked, choose_outputs, finish, prepare, recording_to, run_options
 
 if TYPE_CHECKING:
@@ -148,5 +148,5 @@ def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> Ex
 
     write_json(json_file, as_json(verdict))
     if not quiet:
-        click.echo(line(verdict), err=json_file == "-")
+        say(line(verdict), err=json_file == "-")
     return VERDICT_CODES[verdict.word]

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from inspector.cli.output import overwrite_option
+
 if TYPE_CHECKING:
     from inspector.record.outputs import Outputs
 
@@ -37,6 +39,7 @@ class Viewing:
         serve: offer the viewer as a web page.
         bind: address that it listens on.
         connect: gRPC address of a viewer that runs already.
+        keep: without ``save``, write a file of this name wherever else the recording goes.
     """
 
     save: Path | None
@@ -44,6 +47,7 @@ class Viewing:
     serve: bool
     bind: str
     connect: str | None
+    keep: str = ""
 
     def outputs(self, name: str) -> Outputs:
         """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows.
@@ -54,31 +58,39 @@ class Viewing:
         from inspector.record.outputs import Outputs, has_display
 
         save, viewer = self.save, has_display() and not (self.headless or self.serve or self.connect)
-        if save is None and not (viewer or self.serve or self.connect):
-            save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', name).strip('-.') or 'run'}.rrd"
-        return Outputs(save, viewer, self.serve, self.connect, self.bind)
+        if save is None and (self.keep or not (viewer or self.serve or self.connect)):
+            save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', self.keep or name).strip('-.')[:100] or 'run'}.rrd"
+        return Outputs(save, viewer, self.serve, self.connect, self.bind, numbered=self.save is None)
 
 
 def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of `Viewing`, which it gets as one, ``viewing``."""
-    names = [field.name for field in fields(Viewing)]
+    names = [field.name for field in fields(Viewing) if field.name != "keep"]
 
     @wraps(command)
     def packed(**given: Any) -> Any:
         return command(viewing=Viewing(**{name: given.pop(name) for name in names}), **given)
 
     decorated: Callable[..., Any] = packed
-    for option in reversed(_OPTIONS):
+    for option in (overwrite_option, *reversed(_OPTIONS)):
         decorated = option(decorated)
     return decorated
 
 
-def saved_lines(file: Path, frames: int) -> list[str]:
-    """What to say about a recording that was written."""
+def saved_lines(outputs: Outputs, frames: int) -> list[str]:
+    """What to say about a recording that was written, and about an earlier one of its name."""
     from inspector.record.outputs import open_command
 
-    size = file.stat().st_size
-    return [
-        f"Saved {file} ({size / 1e6:.1f} MB, {size / frames / 1e6:.2f} MB a frame).",
+    assert outputs.file is not None
+    file, size = outputs.file, outputs.file.stat().st_size
+    replacing = " in place of an earlier recording" if outputs.replaced else ""
+    lines = [
+        f"Saved {file}{replacing} ({size / 1e6:.1f} MB, {size / frames / 1e6:.2f} MB a frame).",
         f"Open it with: {open_command(file)}",
     ]
+    return lines if outputs.earlier is None else [*lines, earlier_line(outputs)]
+
+
+def earlier_line(outputs: Outputs) -> str:
+    """Where the recording is that had the name before."""
+    return f"This run did not end, so the earlier {outputs.file} is kept as {outputs.earlier}."

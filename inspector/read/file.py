@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from rerun.chunk import RrdReader
 
 from calibnet.errors import CalibnetError
+from calibnet.runtime.reading import require_file
 from inspector import entities
 from inspector.record.outputs import rerun_binary
 
@@ -41,8 +42,9 @@ class RecordingFile:
         self.path = path
         self.cut = False
         self._copy: tempfile.TemporaryDirectory[str] | None = None  # lives as long as this object
-        if not path.is_file():
+        if not path.exists():
             raise RecordingError(f"There is no recording {path}; check the path, or make one with --save {path}.")
+        require_file(path, "Recording", None, RecordingError, "give a recording that calib-inspect made")
         self._reader, entries = self._open()
         self._entry = self._ours(entries)
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 from rerun.experimental import ViewerClient
 
 from calibnet.errors import ConfigError
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.record.outputs import LOCALHOST, free_port, rerun_binary, start_program
 
@@ -140,7 +140,7 @@ def take_pictures(
             if not wanted or any(file_stem((part,)) in stem for part in wanted):
                 viewer.show(page)
                 file = folder / f"{stem}.png"
-                write_whole(file, viewer.picture())
+                write_whole(file, viewer.picture(), Kind.PNG)
                 yield file
 
 

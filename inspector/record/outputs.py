@@ -20,7 +20,9 @@ from urllib.parse import quote, urlsplit
 import rerun as rr
 
 from calibnet.errors import ConfigError
+from calibnet.runtime.claim import Claim
 from calibnet.runtime.interruption import StopRequest
+from calibnet.runtime.writing import Kind
 
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
@@ -34,11 +36,13 @@ class Outputs:
     """The sinks of one recording, and the processes they need.
 
     Attributes:
-        file: ``.rrd`` to write; replaced when the first frame is there, not before.
+        file: ``.rrd`` to write; an earlier one is put aside when the first frame is there, and removed by `complete`.
         viewer: open the viewer in a window.
         serve: offer the web viewer.
         connect: gRPC address of a viewer that runs already.
         bind: address that servers started here listen on.
+        numbered: ``file`` is a name of ours, which gets a number where a file has it already.
+        replaced: `complete` has removed an earlier recording.
     """
 
     file: Path | None = None
@@ -46,24 +50,29 @@ class Outputs:
     serve: bool = False
     connect: str | None = None
     bind: str = LOCALHOST
+    numbered: bool = False
+    replaced: bool = field(default=False, init=False)
+    _claim: Claim | None = field(default=None, init=False, repr=False)
     page: str | None = field(default=None, init=False)
     _server: subprocess.Popen[bytes] | None = field(default=None, init=False, repr=False)
 
     def check(self) -> None:
-        """Find out before the work whether the outputs can be opened.
+        """Find out before the work whether the outputs can be opened, and claim the file until `close`.
 
         Raises:
-            ConfigError: the file cannot be written, or nothing listens at ``connect``.
+            ConfigError: the file may not or cannot be written, or nothing listens at ``connect``.
         """
-        if self.file is not None:
-            check_writable(self.file)
-            self.check_space()
         if self.connect is not None:
-            address = urlsplit(self.connect)
-            if address.scheme not in ("rerun", "rerun+http", "rerun+https") or not address.hostname:
-                raise ConfigError(f"--connect {self.connect} is no address such as rerun+http://127.0.0.1:9876/proxy.")
-            if not _listening(address.hostname, address.port or 9876):
+            host, port = _address(self.connect)
+            if not _listening(host, port):
                 raise ConfigError(f"No viewer listens at {self.connect}; start one with `rerun`, or use --save.")
+        if self.file is not None:
+            claim = self._claimed(self.file)
+            try:
+                self.check_space()
+            except ConfigError:
+                claim.release()
+                raise
 
     def check_space(self) -> None:
         """Raise `ConfigError` when the disk is about to be full."""
@@ -77,8 +86,9 @@ class Outputs:
         """Create the file, start what has to be started, and return Rerun's sinks, the file first."""
         sinks: list[Any] = []
         if self.file is not None:
+            claim = self._claimed(self.file)
             try:
-                sinks.append(rr.FileSink(self.file))
+                sinks.append(rr.FileSink(claim.begin()))
             except RuntimeError as error:
                 raise ConfigError(f"{self.file} cannot be written: {error}.") from None
         if self.viewer:
@@ -95,11 +105,29 @@ class Outputs:
             while self._server is not None and self._server.poll() is None and not stop.requested:
                 time.sleep(0.1)
 
+    def complete(self) -> None:
+        """The recording is closed and whole: an earlier one of its name is removed."""
+        if self._claim is not None:
+            self.replaced = self._claim.complete()
+
+    @property
+    def earlier(self) -> Path | None:
+        """Where an earlier recording of the same name lies, until `complete`."""
+        return None if self._claim is None else self._claim.earlier
+
     def close(self) -> None:
-        """Stop the web server; an opened viewer stays."""
+        """Stop the web server and let others write the file; an opened viewer stays."""
+        if self._claim is not None:
+            self._claim.release()
         if self._server is not None:
             self._server.terminate()
             self._server.wait()
+
+    def _claimed(self, file: Path) -> Claim:
+        if self._claim is None:
+            self._claim = (Claim.of_new if self.numbered else Claim)(file, Kind.RECORDING)
+            self.file = self._claim.path
+        return self._claim
 
     def _open_viewer(self) -> list[Any]:
         port = free_port()
@@ -122,20 +150,20 @@ class Outputs:
         return url
 
 
-def check_writable(file: Path) -> None:
-    """Raise `ConfigError` unless a recording can be written to ``file``; create its folder."""
-    if file.exists() and not file.is_file():
-        raise ConfigError(f"{file} is not a file; give --save a path such as {file.name or 'run'}.rrd in a folder.")
+def _address(url: str) -> tuple[str, int]:
+    """Host and port of a viewer's address.
+
+    Raises:
+        ConfigError: it is none.
+    """
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        existed = file.exists()
-        with file.open("ab"):
-            pass
-        if not existed:
-            file.unlink()
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise ConfigError(f"{file} cannot be written ({reason}); choose another --save.") from None
+        address = urlsplit(url)
+        host, port = address.hostname, address.port or 9876
+    except ValueError:  # a port that is none, a bracket too many
+        host = None
+    if host is None or address.scheme not in ("rerun", "rerun+http", "rerun+https"):
+        raise ConfigError(f"--connect {url} is no address such as rerun+http://127.0.0.1:9876/proxy.")
+    return host, port
 
 
 def has_display() -> bool:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import rerun as rr
 import rerun.blueprint as rrb
 
+from calibnet.runtime.claim import Claim
+from calibnet.runtime.writing import Kind
 from inspector import entities
 
 if TYPE_CHECKING:
@@ -20,9 +22,9 @@ class TrainingLog:
     """Observes a `Trainer`; every line of progress becomes a row, flushed at once."""
 
     def __init__(self, path: Path, name: str) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        self._claim = Claim(path, Kind.RECORDING)
         self.recording = rr.RecordingStream(entities.TRAINING_APPLICATION_ID)
-        self.recording.save(path, default_blueprint=training_blueprint())
+        self.recording.save(self._claim.begin(), default_blueprint=training_blueprint())
         self.recording.send_recording_name(name)
 
     def progressed(self, progress: Progress) -> None:
@@ -40,6 +42,17 @@ class TrainingLog:
         for figure, value in figures._asdict().items():
             self.recording.log(f"{entities.VALIDATION}/{figure}", rr.Scalars(value))
         self.recording.flush()
+
+    def __enter__(self) -> TrainingLog:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        """Write the footer; an earlier recording of the name goes, or stays where the run did not come to its end."""
+        self.recording.flush()
+        self.recording.disconnect()
+        if kind is None:
+            self._claim.complete()
+        self._claim.release()
 
     def _at(self, progress: Progress) -> None:
         self.recording.set_time("samples", sequence=progress.samples)

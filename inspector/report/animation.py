@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.report.pictures import draw_overlay
@@ -79,7 +79,7 @@ def write_animation(run: RecordedRun, file: Path, frames: Sequence[int]) -> None
     pictures[0].save(
         encoded, kind[1:], save_all=True, append_images=pictures[1:], duration=durations, loop=0, **FORMATS[kind]
     )
-    write_whole(file, encoded.getvalue())
+    write_whole(file, encoded.getvalue(), Kind[kind[1:].upper()])
 
 
 def steps_of(run: RecordedRun, frame: RecordedFrame) -> Iterator[Step]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from calibnet.errors import ConfigError
-from calibnet.runtime.whole_file import write_whole
+from calibnet.runtime.claim import Claim
+from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures
@@ -30,8 +32,8 @@ def check_folder(folder: Path) -> None:
     """
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
-        write_whole(folder / PICTURES / "writable", b"")
-        (folder / PICTURES / "writable").unlink()
+        with tempfile.TemporaryFile(dir=folder / PICTURES):
+            pass
     except OSError as error:
         raise _cannot_write(error, folder) from None
 
@@ -52,14 +54,17 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
     """
     check_folder(folder)
     figures = Figures.of(run)
+    claim = Claim(folder / PAGE, Kind.PAGE)
     try:
         examples = [_write_pictures(run, name, position, folder) for name, position in figures.examples().items()]
-        write_whole(folder / METRICS, _json(figures.as_dict()).encode())
+        write_whole(folder / METRICS, _json(figures.as_dict()).encode(), Kind.JSON)
         copy_recording(run.path, folder / RECORDING)
         page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
-        write_whole(folder / PAGE, page.encode())
+        write_whole(folder / PAGE, page.encode(), Kind.PAGE)
     except OSError as error:
         raise _cannot_write(error, folder) from None
+    finally:
+        claim.release()
     return folder / PAGE
 
 
@@ -76,7 +81,11 @@ def copy_recording(source: Path, target: Path) -> None:
     It is no hard link: the next run that records to the same path would write into the report.
     """
     if not (target.exists() and target.samefile(source)):
-        write_whole(target, lambda partial: shutil.copyfile(source, partial))
+        claim = Claim(target, Kind.RECORDING)  # another run may be recording there
+        try:
+            write_whole(target, lambda partial: shutil.copyfile(source, partial), Kind.RECORDING)
+        finally:
+            claim.release()
 
 
 def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) -> Example:
@@ -86,7 +95,7 @@ def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) ->
     files = {}
     for shown, entity in _overlays(run.has_reference).items():
         files[shown] = f"{PICTURES}/{name}_{shown}.jpg"
-        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index)))
+        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index)), Kind.JPEG)
     return Example(name, position, files)
 
 

@@ -120,6 +120,8 @@ class Session:
         finally:
             if recording is not None:
                 recording.close()
+        if recording is not None and not summary.interrupted:
+            self.outputs.complete()
         return summary
 
     def _observe(self, position: int, summary: Summary) -> Observation | None:
@@ -170,9 +172,11 @@ class Session:
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:
             return ""
-        return (
+        kept = (
             f" What was recorded before ({summary.frames} of {len(self.positions)} frames) is in {self.outputs.file}."
         )
+        earlier = self.outputs.earlier
+        return kept if earlier is None else f"{kept} The earlier recording of that name is kept as {earlier}."
 
 
 def drive_observer(progress: Progress, stop: StopRequest) -> Callable[[int, int], None]:

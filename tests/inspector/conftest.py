@@ -57,7 +57,10 @@ def record() -> Callable[..., None]:
             stop_on_bad_frame=stop_on_bad_frame,
             drive=drive,
         )
-        return session.run()
+        try:
+            return session.run()
+        finally:
+            session.outputs.close()
 
     return make
 

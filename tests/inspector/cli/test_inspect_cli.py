@@ -170,7 +170,7 @@ def test_contents_that_make_no_sense_are_wrong_usage(
     assert not Path("own.rrd").exists()
 
 
-class AskedError(Exception):
+class AskedError(BaseException):
     """Raised instead of running, with what was asked for."""
 
 

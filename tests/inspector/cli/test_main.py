@@ -98,9 +98,18 @@ def test_errors_become_one_sentence(
 
 
 @pytest.mark.parametrize("error", [ValueError("a bug"), ImportError("No module named 'x'"), OSError("no number")])
-def test_bugs_keep_their_traceback(error: Exception) -> None:
-    with pytest.raises(type(error), match=str(error)):
-        errors.run(failing(error), [])
+def test_a_fault_of_ours_is_one_sentence_and_a_file_with_the_traceback(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert errors.run(failing(error), []) == 70
+    (kept,) = tmp_path.iterdir()
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "Please report it" in said
+    assert str(kept) in said
+    assert f"{type(error).__name__}: {error}" in kept.read_text()
+    assert "Traceback" in kept.read_text()
 
 
 def test_a_failed_check_exits_1() -> None:

@@ -200,8 +200,13 @@ def test_command_keeps_other_files_and_the_recording(
     known: RecordedRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    (tmp_path / "index.html").write_text("an earlier report")
-    assert call("report", known.path, "--out", tmp_path) == 0
+    (tmp_path / "index.html").write_text("my own page")
+    assert call("report", known.path, "--out", tmp_path) == 3
+    assert (tmp_path / "index.html").read_text() == "my own page"
+    assert "not the page of a report but something else; choose another path" in capsys.readouterr().err
+    assert call("report", known.path, "--out", tmp_path, "--overwrite") == 0
+    capsys.readouterr()
+    assert call("report", known.path, "--out", tmp_path) == 0  # an earlier report is replaced
     assert str(tmp_path / "index.html") in capsys.readouterr().out
     assert (tmp_path / "notes.txt").read_text() == "mine"
     assert (tmp_path / "recording.rrd").read_bytes() == known.path.read_bytes()

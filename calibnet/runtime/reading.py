@@ -1,0 +1,247 @@
+"""The one place that opens what a user gives: regular files only, of a size that can be meant, never waited for.
+
+A path may name a fifo that nobody writes to, a device without an end, or a sparse file of 40 GB. What is opened here is
+also known to `calibnet.runtime.writing`, which never replaces what the same run reads.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO, NoReturn, TypeVar
+
+import yaml
+
+from calibnet.errors import CalibnetError, DatasetError
+
+MEGABYTE = 1 << 20
+TEXT_BYTES = 16 * MEGABYTE
+"""Of lists of times or frames; a calibration, a manifest or a preset has `SETTINGS_BYTES` at most."""
+SETTINGS_BYTES = MEGABYTE // 4
+DEEPEST = 24
+"""Levels that YAML and JSON of ours are nested at most; real ones have four."""
+
+Identity = tuple[int, int]
+"""Device and inode: what two paths to the same file have in common."""
+Loaded = TypeVar("Loaded")
+
+_inputs: set[Identity] | None = None
+"""Files that the run reads; None outside of `protecting_inputs`."""
+
+
+class TooLargeError(OSError):
+    """A file is larger than anything of its kind."""
+
+
+@contextmanager
+def protecting_inputs() -> Iterator[None]:
+    """Remember, within this context, which files are read, so that none of them is replaced (`is_input`)."""
+    global _inputs
+    before, _inputs = _inputs, set()
+    try:
+        yield
+    finally:
+        _inputs = before
+
+
+def register_input(path: Path) -> None:
+    """Remember a file that will be read later; one that is not there is nobody's input."""
+    if _inputs is not None:
+        try:
+            _inputs.add(_identity(path.stat()))
+        except OSError:
+            return
+
+
+def is_input(status: os.stat_result) -> bool:
+    """Whether the run reads the file of this status."""
+    return _inputs is not None and _identity(status) in _inputs
+
+
+def open_file(path: Path, largest: int | None = None, remember: bool = True) -> BinaryIO:
+    """Open a regular file to read; whatever else has the name is an error at once.
+
+    Args:
+        path: the file; links are followed.
+        largest: bytes that such a file can have.
+        remember: it is an input of the run.
+
+    Raises:
+        OSError: it is missing, cannot be read, is no regular file, or is too large (`TooLargeError`).
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    except ValueError as error:  # a name with a null character
+        raise OSError(0, str(error), str(path)) from None
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(0, f"it is {kind_of(status.st_mode)}, not a file", str(path))
+        if largest is not None and status.st_size > largest:
+            raise TooLargeError(0, _too_large(status.st_size, largest), str(path))
+    except BaseException:
+        os.close(descriptor)
+        raise
+    if remember and _inputs is not None:
+        _inputs.add(_identity(status))
+    return os.fdopen(descriptor, "rb")
+
+
+def require_file(path: Path, what: str, largest: int | None, error: type[CalibnetError], remedy: str) -> None:
+    """Check a file that a library will open by its name.
+
+    Raises:
+        CalibnetError: of type ``error``; the file cannot be read, is no regular file, or is too large.
+    """
+    try:
+        open_file(path, largest).close()
+    except OSError as problem:
+        _refuse(path, what, problem, error, remedy)
+
+
+def read_file(
+    path: Path, what: str, largest: int, error: type[CalibnetError] = DatasetError, remedy: str = "restore it"
+) -> bytes:
+    """All bytes of a file.
+
+    Args:
+        path: the file.
+        what: what it is, to begin the sentence with, for instance ``"Scan"``.
+        largest: bytes that such a file can have.
+        error: type of the error.
+        remedy: end of the sentence: what to do about a file that cannot be read.
+
+    Raises:
+        CalibnetError: of type ``error``; the file cannot be read, is no regular file, or is too large.
+    """
+    try:
+        with open_file(path, largest) as file:
+            data = file.read(largest + 1)
+        if len(data) > largest:  # it grows while it is read
+            raise TooLargeError(0, _too_large(len(data), largest), str(path))
+    except OSError as problem:
+        _refuse(path, what, problem, error, remedy)
+    return data
+
+
+def read_text(
+    path: Path,
+    what: str,
+    largest: int = SETTINGS_BYTES,
+    error: type[CalibnetError] = DatasetError,
+    remedy: str = "restore it",
+) -> str:
+    """A file as UTF-8; a byte-order mark is dropped. As `read_file` otherwise."""
+    data = read_file(path, what, largest, error, remedy)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise error(f"{what} {path} cannot be read (it is not a text file in UTF-8); {remedy}.") from None
+
+
+def parse_yaml(text: str) -> Any:
+    """YAML without what settings have no use for: aliases, dates, keys given twice, more levels than `DEEPEST`.
+
+    Raises:
+        ValueError: it is no such YAML; the message says why in a few words, and where if that is known.
+    """
+    try:
+        return yaml.load(text, _PlainLoader)
+    except yaml.MarkedYAMLError as problem:
+        line = f", line {problem.problem_mark.line + 1}" if problem.problem_mark is not None else ""
+        raise ValueError(f"{problem.problem or problem.context or 'malformed'}{line}") from None
+    except Exception as problem:  # what a tag asks for is converted by Python, with Python's errors
+        raise ValueError(f"a value cannot be what its tag says ({type(problem).__name__})") from None
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Strict JSON, without NaN and infinity.
+
+    Raises:
+        ValueError: it is none, or nested too deeply.
+    """
+    try:
+        return json.loads(text, parse_constant=_no_number)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """TOML.
+
+    Raises:
+        ValueError: it is none, or nested too deeply.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def kind_of(mode: int) -> str:
+    """What a path names, in words."""
+    kinds = {
+        stat.S_IFDIR: "a folder",
+        stat.S_IFIFO: "a fifo",
+        stat.S_IFCHR: "a device",
+        stat.S_IFBLK: "a device",
+        stat.S_IFSOCK: "a socket",
+        stat.S_IFLNK: "a link",
+    }
+    return kinds.get(stat.S_IFMT(mode), "something else")
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """See `parse_yaml`."""
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._level = 0
+        unwanted = ("tag:yaml.org,2002:timestamp", "tag:yaml.org,2002:merge")
+        self.yaml_implicit_resolvers = {
+            first: [(tag, pattern) for tag, pattern in resolvers if tag not in unwanted]
+            for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+        }
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.constructor.ConstructorError(None, None, "aliases are not read", event.start_mark)
+        self._level += 1
+        if self._level > DEEPEST:
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.constructor.ConstructorError(None, None, "nested too deeply", event.start_mark)
+        node = super().compose_node(parent, index)
+        self._level -= 1
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    problem = f"the key {key.value[:40]!r} is given twice"
+                    raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(f"{text} is no number")
+
+
+def _identity(status: os.stat_result) -> Identity:
+    return status.st_dev, status.st_ino
+
+
+def _too_large(size: int, largest: int) -> str:
+    return f"it has {size / 1e6:.0f} MB, more than the {largest / 1e6:.0f} MB that such a file can have"
+
+
+def _refuse(path: Path, what: str, problem: OSError, error: type[CalibnetError], remedy: str) -> NoReturn:
+    raise error(f"{what} {path} cannot be read ({problem.strerror or problem}); {remedy}.") from None

@@ -1,0 +1,178 @@
+"""The one place that writes what a user keeps: whole or not at all, and never over what may not be lost.
+
+An output is a new name or a regular file of the kind that is written: no device, fifo or link, nothing that the same
+run reads (`calibnet.runtime.reading`), and without ``--overwrite`` no file of another kind.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+
+from calibnet.errors import ConfigError
+from calibnet.runtime.reading import is_input, kind_of, open_file
+
+HEAD_BYTES = 1 << 20
+"""Of a file that is there, from which its kind is told."""
+
+
+class OutputError(ConfigError):
+    """An output that must not or cannot be written."""
+
+
+class Kind(StrEnum):
+    """What a file is, in words."""
+
+    RECORDING = "a recording"
+    JSON = "a JSON file"
+    JUNIT = "a JUnit file"
+    EXPORT = "a file that calib-inspect exported"
+    PAGE = "the page of a report"
+    PNG = "a PNG picture"
+    JPEG = "a JPEG picture"
+    GIF = "a GIF picture"
+    WEBP = "a WebP picture"
+    WEIGHTS = "a safetensors file"
+    EMPTY = "empty"
+    OTHER = "something else"
+
+
+_overwriting = False
+
+
+@contextmanager
+def keeping_others() -> Iterator[None]:
+    """A context in which files of another kind stay, until `allow_overwriting` is called."""
+    global _overwriting
+    before, _overwriting = _overwriting, False
+    try:
+        yield
+    finally:
+        _overwriting = before
+
+
+def allow_overwriting() -> None:
+    """Let outputs replace files of any kind; still nothing that is read, no link and no device."""
+    global _overwriting
+    _overwriting = True
+
+
+def check_output(path: Path, kind: Kind | None) -> bool:
+    """Find out, before the work and again before the writing, whether an output may be written.
+
+    Args:
+        path: the file.
+        kind: what will be written; None for a file of our own bookkeeping, which is read and replaced.
+
+    Returns:
+        Whether a file is there that will be replaced.
+
+    Raises:
+        OutputError: it may not.
+    """
+    try:
+        status = path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written ({error.strerror}); choose another path.") from None
+    if not stat.S_ISREG(status.st_mode):
+        advice = "name the file itself" if stat.S_ISLNK(status.st_mode) else "give a new name or a file to replace"
+        raise OutputError(f"{path} is not a file but {kind_of(status.st_mode)}, which is not written to; {advice}.")
+    if kind is None:
+        return True
+    if is_input(status):
+        raise OutputError(f"{path} is read by this run and is not replaced; choose another path for the output.")
+    found = _kind_of_file(path)
+    if found not in (kind, Kind.EMPTY) and not _overwriting:
+        raise OutputError(f"{path} is not {kind} but {found}; choose another path, or add --overwrite to replace it.")
+    return found is not Kind.EMPTY
+
+
+def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind | None = None) -> bool:
+    """Write beside ``path`` and move into place; several processes may write the same file.
+
+    Args:
+        path: the file; what it held stays until the new content is complete. Its folder is created if need be.
+        write: the content, or what writes it to the path it is given.
+        kind: see `check_output`.
+
+    Returns:
+        Whether a file was replaced.
+
+    Raises:
+        OutputError: the file may not be replaced.
+        OSError: it cannot be written; nothing is left behind.
+    """
+    partial: Path | None = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        check_output(path, kind)
+        descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:100]}.", suffix=".partial", dir=path.parent)
+        os.close(descriptor)
+        partial = Path(name)
+        if isinstance(write, bytes):
+            partial.write_bytes(write)
+        else:
+            write(partial)
+        partial.chmod(_usual_mode())
+        replaced = check_output(path, kind)
+        partial.replace(path)
+    except BaseException as error:
+        if partial is not None:
+            with contextlib.suppress(OSError):
+                partial.unlink()
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+        raise
+    return replaced
+
+
+def kind_of_content(head: bytes) -> Kind:
+    """What a file is, told by how it begins."""
+    if not head:
+        return Kind.EMPTY
+    for start, kind in _STARTS.items():
+        if head.startswith(start):
+            return kind
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return Kind.WEBP
+    text = head.lstrip()
+    if text.startswith((b"<?xml", b"<testsuite")) and b"<testsuite" in head:
+        return Kind.JUNIT
+    if text[:9].lower() == b"<!doctype" and b'content="calib-inspect"' in head:
+        return Kind.PAGE
+    if head[7:9] == b"\0{":
+        return Kind.WEIGHTS
+    if text.startswith((b"{", b"[")):
+        return Kind.JSON
+    return Kind.EXPORT if b"calib-inspect" in head else Kind.OTHER
+
+
+_STARTS = {
+    b"RRF": Kind.RECORDING,
+    b"\x89PNG": Kind.PNG,
+    b"\xff\xd8\xff": Kind.JPEG,
+    b"GIF8": Kind.GIF,
+}
+
+
+def _kind_of_file(path: Path) -> Kind:
+    try:
+        with open_file(path, remember=False) as file:
+            return kind_of_content(file.read(HEAD_BYTES))
+    except OSError:
+        return Kind.OTHER  # what cannot be read is not known to be ours
+
+
+def _usual_mode() -> int:
+    """The permissions of a file that is simply opened: temporary files are kept to their owner, a result is not."""
+    umask = os.umask(0)
+    os.umask(umask)
+    return 0o666 & ~umask
