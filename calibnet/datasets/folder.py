@@ -1,23 +1,31 @@
-"""Your own sensors: a folder of ``images/``, ``clouds/`` and one ``calibration.yaml``."""
+"""Your own sensors: a folder of ``images/``, ``clouds/`` and a calibration file."""
 
 from __future__ import annotations
 
-from functools import cached_property
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.folder_calibration import FolderCalibration, read_folder_calibration
+from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
+from calibnet.datasets.frame import Original
 from calibnet.datasets.images import read_image
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
-from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
+from calibnet.datasets.paired import FrameFiles, PairedSequence, Picture, check_paired, files_by_stem, require_folder
+from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
 from calibnet.datasets.scans import SCAN_SUFFIXES
+from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
+from calibnet.geometry.camera_model import CameraModel
+from calibnet.geometry.rectification import Rectification, central, said_of, without_black
+from calibnet.geometry.types import Extrinsic
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
+LOOKED_AT = 3
+"""Pictures of a drive that tell which part of them a fisheye fills."""
 PERIOD = 0.1
 """Seconds between two frames: a plain folder records no time."""
 LARGEST_NUMBER = 10**10
@@ -27,12 +35,21 @@ LARGEST_NUMBER = 10**10
 class Folder(PairedSequence):
     """Images and scans of one camera and one LiDAR, paired by their file names without the ending."""
 
-    def __init__(self, root: Path | str) -> None:
+    def __init__(
+        self,
+        root: Path | str,
+        guess: Path | None = None,
+        camera: str | None = None,
+        frames: FrameChoice = BY_NAME,
+    ) -> None:
         """Open a folder.
 
         Args:
             root: the folder with ``images``, ``clouds`` (``.bin``, ``.npy``, ``.pcd``, ``.ply``) and
-                ``calibration.yaml`` as `read_folder_calibration` describes it.
+                ``calibration.yaml``, or the file of another tool, see `calibnet.datasets.calibration_files`.
+            guess: a file with the extrinsic to start from, instead of that of the calibration, or where it has none.
+            camera: its name, in a calibration file of several cameras.
+            frames: names of the coordinate frames of camera and LiDAR, in a file of many.
 
         Raises:
             DatasetError: one of them is missing, malformed or cannot be right, or images and scans do not pair.
@@ -43,41 +60,116 @@ class Folder(PairedSequence):
         images = files_by_stem(require_folder(root / "images", layout), IMAGE_SUFFIXES, "images")
         scans = files_by_stem(require_folder(root / "clouds", layout), SCAN_SUFFIXES, "scans")
         check_paired(images, scans)
-        self._file: FolderCalibration = read_folder_calibration(root / "calibration.yaml")
-        refuse(
-            [*of_camera(self._file.camera), *of_extrinsic(self._file.calibration.camera_from_lidar)],
-            f"Calibration {root / 'calibration.yaml'}",
-        )
+        self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
+        assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None
+        self._rectification = rectification(self.calibration.camera, list(images.values()))
+        pinhole, extrinsic = self._rectification.pinhole, self.calibration.camera_from_lidar
+        remarks = [*of_lens(self.calibration.camera), *of_camera(pinhole), *of_extrinsic(extrinsic)]
+        refuse(remarks, f"Calibration {calibration_path(root)}")
+        self._fixed = Calibration(pinhole.matrix, extrinsic)
         files = [
             FrameFiles(number, PERIOD * position, image, scans[stem])
             for position, (number, (stem, image)) in enumerate(zip(_numbers(list(images)), images.items(), strict=True))
         ]
         name = root.resolve().name
         super().__init__(f"folder/{name}", name, files)
+        self.notes = said_of(self._rectification)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
-        return self._file.calibration
+        return self._fixed
 
-    def _image(self, files: FrameFiles) -> NDArray[np.uint8]:
-        image = read_image(files.image)
-        height, width = image.shape[:2]
-        if (width, height) != (self._file.width, self._file.height):
-            raise DatasetError(
-                f"Image {files.image} is {width}x{height} and calibration.yaml is for {self._file.width}x"
-                f"{self._file.height}; calibrate at the images' size or resize them."
-            )
-        if self._undistortion is None:
-            return image
-        return cv2.remap(image, *self._undistortion, cv2.INTER_LINEAR).astype(np.uint8, copy=False)
+    def _picture(self, files: FrameFiles) -> Picture:
+        image, camera = read_image(files.image), self._rectification.camera
+        check_size(image, camera, files.image)
+        if camera.is_pinhole:
+            return Picture(image)
+        return Picture(self._rectification(image), Original(image, camera))
 
-    @cached_property
-    def _undistortion(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]] | None:
-        """OpenCV's fixed-point maps from rectified to distorted pixels, None without distortion."""
-        if not self._file.distortion.any():
-            return None
-        matrix, size = self._file.calibration.matrix, (self._file.width, self._file.height)
-        coarse, fine = cv2.initUndistortRectifyMap(matrix, self._file.distortion, np.eye(3), matrix, size, cv2.CV_16SC2)
-        return coarse.astype(np.int16, copy=False), fine.astype(np.uint16, copy=False)
+
+def rectification(camera: CameraModel, images: list[Path]) -> Rectification:
+    """How pictures of a camera are rectified; some of a fisheye's are looked at, which may fill a circle only."""
+    middle = central(camera)
+    if camera.model in ("plumb_bob", "rational_polynomial"):
+        return middle
+    pictures = []
+    for position in spread(len(images), LOOKED_AT):
+        with suppress(DatasetError):
+            pictures.append(read_image(images[position]))
+    pictures = [picture for picture in pictures if picture.shape[:2] == (camera.height, camera.width)]
+    return without_black(middle, pictures) if pictures else middle
+
+
+def calibration_path(root: Path) -> Path:
+    """The calibration file of a folder: ``calibration.yaml``, or the only file there that could be one.
+
+    Raises:
+        DatasetError: there are several.
+    """
+    ours = root / "calibration.yaml"
+    if ours.exists() or not root.is_dir():
+        return ours
+    found = sorted(path for path in root.iterdir() if path.suffix.lower() in CALIBRATION_SUFFIXES and path.is_file())
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found)
+        raise DatasetError(f"{root} holds several files that may be its calibration ({names}); leave one there.")
+    return found[0] if found else ours
+
+
+def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> CalibrationFile:
+    """The calibration of a folder, with the extrinsic of another file where that is given.
+
+    Raises:
+        DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
+    """
+    path = calibration_path(root)
+    found = read_calibration(path, wanted)
+    if found.camera is None:
+        raise DatasetError(
+            f"Calibration {path} ({found.kind}) knows no camera; put the file of the camera there, and give this one "
+            "with --guess."
+        )
+    if guess is not None:
+        extrinsic = read_calibration(guess, replace(wanted, camera=None)).camera_from_lidar
+        if extrinsic is None:
+            raise DatasetError(f"Calibration {guess} has no extrinsic of a LiDAR; give one that has with --guess.")
+        found = replace(found, camera_from_lidar=extrinsic)
+    if found.camera_from_lidar is None:
+        raise DatasetError(
+            f"Calibration {path} ({found.kind}) does not say where the LiDAR is; give a first guess with --guess FILE, "
+            "or as the key 'camera_from_lidar', the 4x4 matrix that maps LiDAR points into the camera, in metres."
+        )
+    return found
+
+
+def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
+    """The calibration file of a folder, its camera and its extrinsic; the folder needs no frames.
+
+    Raises:
+        DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
+    """
+    images = folder / "images"
+    pictures = (
+        (path for path in sorted(images.iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES)
+        if images.is_dir()
+        else iter(())
+    )
+    found = read_folder(folder, Wanted(picture=next(pictures, None)))
+    assert found.camera is not None and found.camera_from_lidar is not None
+    return calibration_path(folder), found.camera, found.camera_from_lidar
+
+
+def check_size(image: NDArray[np.uint8], camera: CameraModel, path: Path) -> None:
+    """See that a picture is of the size that the camera is calibrated for.
+
+    Raises:
+        DatasetError: it is not.
+    """
+    height, width = image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise DatasetError(
+            f"Image {path} is {width}x{height} and its calibration is for {camera.width}x{camera.height}; calibrate "
+            "at the images' size or resize them."
+        )
 
 
 def _numbers(stems: list[str]) -> list[int]:

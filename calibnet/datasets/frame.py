@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.plausibility import Implausible
 from calibnet.geometry import PinholeCamera
+from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Extrinsic
+
+
+class Original(NamedTuple):
+    """A picture as it was taken, ``[H, W, 3]`` uint8 RGB, and the camera that took it, lens included."""
+
+    image: NDArray[np.uint8]
+    camera: CameraModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +36,7 @@ class Frame:
             dataset is calibrated, a starting guess where the user's sensors are not yet.
         source: the image's path (or a description), to name in messages.
         remarks: what is unlikely about it, though some sensor may be so: the first suspects when it does not fit.
+        original: the picture before it was rectified; None where it was rectified already.
     """
 
     index: int
@@ -38,6 +47,12 @@ class Frame:
     camera_from_lidar: Extrinsic = field(repr=False)
     source: str = ""
     remarks: tuple[Implausible, ...] = ()
+    original: Original | None = field(default=None, repr=False)
+
+    @property
+    def as_taken(self) -> Original:
+        """The picture and the camera that the user knows: what is shown, recorded and exported."""
+        return self.original or Original(self.image, CameraModel.of(self.camera))
 
 
 class Frames(Protocol):

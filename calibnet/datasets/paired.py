@@ -6,12 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Frame, Original
 from calibnet.datasets.images import read_image
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
 from calibnet.datasets.scans import read_scan
@@ -30,11 +31,23 @@ class FrameFiles:
     scan: Path
 
 
+class Picture(NamedTuple):
+    """A rectified image ``[H, W, 3]`` RGB, and the picture it was made from, if it was made from one."""
+
+    image: NDArray[np.uint8]
+    original: Original | None = None
+
+
 class PairedSequence(ABC):
     """A `calibnet.datasets.frame.Sequence` of image and scan files.
 
     A subclass lists the files and says how each frame is calibrated.
+
+    Attributes:
+        notes: sentences for the user on how the data is read.
     """
+
+    notes: tuple[str, ...] = ()
 
     def __init__(self, name: str, rig: str, files: Sequence[FrameFiles]) -> None:
         self.name = name
@@ -61,7 +74,8 @@ class PairedSequence(ABC):
         """
         files = self.files[position]
         calibration = self._calibration(files)
-        image, points = self._image(files), read_scan(files.scan)
+        image, original = self._picture(files)
+        points = read_scan(files.scan)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
         remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {files.image}")
@@ -75,15 +89,16 @@ class PairedSequence(ABC):
             camera_from_lidar=extrinsic,
             source=str(files.image),
             remarks=remarks,
+            original=original,
         )
 
     @abstractmethod
     def _calibration(self, files: FrameFiles) -> Calibration:
         """The calibration of one frame."""
 
-    def _image(self, files: FrameFiles) -> NDArray[np.uint8]:
-        """The rectified image of one frame, ``[H, W, 3]`` RGB."""
-        return read_image(files.image)
+    def _picture(self, files: FrameFiles) -> Picture:
+        """The image of one frame."""
+        return Picture(read_image(files.image))
 
 
 def require_folder(folder: Path, remedy: str) -> Path:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from calibnet.errors import ImplausibleError
 from calibnet.geometry import PinholeCamera
+from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Extrinsic
 from calibnet.geometry.visibility import is_accumulated
 
@@ -81,6 +82,16 @@ def suspicion(remarks: Iterable[Implausible], otherwise: str) -> str:
 def of_camera(camera: PinholeCamera) -> list[Implausible | None]:
     """All checks of a camera matrix against its picture; the first that finds something is the best explanation."""
     return [focal_length(camera) or pixel_shape(camera), picture_size(camera) or principal_point(camera)]
+
+
+def of_lens(camera: CameraModel) -> list[Implausible | None]:
+    """All checks of a camera matrix that is of pictures before they are rectified, where its lens is none of OpenCV's.
+
+    That of OpenCV's is the rectified picture's as well.
+    """
+    if camera.model in ("plumb_bob", "rational_polynomial"):
+        return []
+    return [pixel_shape(camera.pinhole), picture_size(camera.pinhole) or principal_point(camera.pinhole)]
 
 
 def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:

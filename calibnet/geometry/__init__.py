@@ -1,6 +1,7 @@
 """SE(3), the pinhole camera, projection with a z-buffer, and miscalibration sampling (NumPy only)."""
 
 from calibnet.geometry.camera import PinholeCamera
+from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.miscalibration import (
     RANGES,
     MiscalibrationRange,
@@ -11,7 +12,7 @@ from calibnet.geometry.miscalibration import (
     scaled,
     stages_within,
 )
-from calibnet.geometry.projection import Projection, depth_image, project
+from calibnet.geometry.projection import Projection, depth_image, project, project_through
 from calibnet.geometry.se3 import (
     PoseError,
     euler_xyz,
@@ -28,6 +29,7 @@ from calibnet.geometry.se3 import (
 
 __all__ = [
     "RANGES",
+    "CameraModel",
     "MiscalibrationRange",
     "PinholeCamera",
     "PoseError",
@@ -41,6 +43,7 @@ __all__ = [
     "orthonormal",
     "pose_error",
     "project",
+    "project_through",
     "rotation_angle",
     "rotation_from_euler_xyz",
     "rotation_from_vector",

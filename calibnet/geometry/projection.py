@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry.camera import PinholeCamera
+from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.se3 import transform_points
 from calibnet.geometry.types import Extrinsic
 
@@ -61,8 +62,27 @@ def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: P
     return Projection(np.stack([u, v]).T, depth, in_front[inside], np.stack([x, y, depth]).T)
 
 
+def project_through(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: CameraModel) -> Projection:
+    """Project points ``[N, >=3]`` of the LiDAR frame into pictures as they are taken, through the lens.
+
+    Of a lens that is no pinhole the depth is the distance from the camera, since it may see to the side.
+    """
+    if camera.is_pinhole:
+        return project(points, camera_from_lidar, camera.pinhole)
+    moved = transform_points(camera_from_lidar, points[:, :3]).astype(np.float32)
+    depth = np.linalg.norm(moved, axis=1)
+    seen = camera.see(moved)
+    u, v = seen.pixels.T
+    shown = seen.valid & (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
+    index = np.flatnonzero(shown & (depth > MINIMUM_DEPTH))
+    return Projection(seen.pixels[index].astype(np.float32), depth[index], index, moved[index])
+
+
 def nearest_per_cell(
-    projection: Projection, camera: PinholeCamera, stride: int = 1, far_to_near: NDArray[np.int64] | None = None
+    projection: Projection,
+    camera: PinholeCamera | CameraModel,
+    stride: int = 1,
+    far_to_near: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Z-buffer at ``stride`` pixels a cell; ``far_to_near`` saves the sorting where several are made.
 
@@ -77,7 +97,7 @@ def nearest_per_cell(
 
 
 def cells_of_points(
-    projection: Projection, camera: PinholeCamera, stride: int
+    projection: Projection, camera: PinholeCamera | CameraModel, stride: int
 ) -> tuple[tuple[int, int], NDArray[np.int64]]:
     """Height and width of an image of ``stride`` pixels a cell, and for each point its cell ``[M]``, row by row."""
     height, width = -(-camera.height // stride), -(-camera.width // stride)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,24 @@ dataset_option = click.option(
     show_default=True,
     help="What the folder holds; packages can add to these.",
 )
+FOLDER_OPTIONS = (
+    click.option(
+        "--guess",
+        type=click.Path(dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help="Start from the extrinsic of this calibration file; needed where the folder's own has none.",
+    ),
+    click.option("--camera", metavar="NAME", help="Camera of a calibration file of several, for instance cam0."),
+    click.option("--camera-frame", metavar="NAME", help="The camera's optical frame, in a file of many frames."),
+    click.option("--lidar-frame", metavar="NAME", help="The LiDAR's frame, likewise."),
+)
+
+
+def folder_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command what says how a folder is read; it passes them on to `open_folder`, under the same names."""
+    for option in reversed(FOLDER_OPTIONS):
+        command = option(command)
+    return dataset_option(command)
 
 
 @click.command()
@@ -78,18 +96,24 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
 @click.command()
 @click.argument("directory", type=FOLDER)
-@dataset_option
+@folder_options
 @run_options
-def folder(directory: Path, dataset: str, **asked: Any) -> int:
-    """Calibrate your own images/, clouds/ and calibration.yaml.
+def folder(
+    directory: Path,
+    dataset: str,
+    guess: Path | None,
+    camera: str | None,
+    camera_frame: str | None,
+    lidar_frame: str | None,
+    **asked: Any,
+) -> int:
+    """Calibrate your own images/, clouds/ and calibration.yaml, or the calibration file of another tool.
 
     Without --range and --miscalibrate the calibration.yaml is what is to be corrected; with them it
     is the reference.
     """
-    from calibnet.datasets import open_sequence
-
-    as_is = not disturbed(asked)
-    return calibrate(open_sequence(dataset, directory), as_is=as_is, **asked)
+    sequence = open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame)
+    return calibrate(sequence, camera=camera, as_is=not disturbed(asked), **asked)
 
 
 @click.command()
@@ -106,6 +130,24 @@ def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> in
         viewing = replace(viewing, keep="demo")
     drive = SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE)
     return calibrate(drive, viewing=viewing, report=report, **asked)
+
+
+def open_folder(
+    directory: Path,
+    dataset: str,
+    guess: Path | None,
+    camera: str | None,
+    camera_frame: str | None,
+    lidar_frame: str | None,
+) -> Sequence:
+    """A plain folder, or a folder of a dataset of another package, which knows none of these options."""
+    from calibnet.datasets import open_sequence
+    from calibnet.datasets.calibration_files import FrameChoice
+
+    asked: dict[str, Any] = {"guess": guess, "camera": camera}
+    if camera_frame or lidar_frame:
+        asked["frames"] = FrameChoice(camera_frame, lidar_frame)
+    return open_sequence(dataset, directory, **{name: value for name, value in asked.items() if value is not None})
 
 
 def open_odometry(sequence: str, root: Path | None, camera: int) -> Sequence:

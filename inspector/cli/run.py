@@ -180,6 +180,8 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}, stages {numbers}"
     console.print(what, markup=False, soft_wrap=True)
+    for note in getattr(options.sequence, "notes", ()):
+        console.print(note, markup=False, soft_wrap=True)
     for stage in cascade.skipped:
         console.print(f"Skipped: {stage.reason}", style="yellow", markup=False, soft_wrap=True)
 

@@ -13,8 +13,9 @@ from calibnet.errors import CalibnetError
 from inspector.cli.errors import VERDICT_CODES, ExitCode
 from inspector.cli.inspect import (
     camera_option,
-    dataset_option,
     disturbed,
+    folder_options,
+    open_folder,
     open_object,
     open_odometry,
     open_raw,
@@ -87,13 +88,21 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
 @verify.command()
 @click.argument("directory", type=FOLDER)
-@dataset_option
+@folder_options
 @verify_options
-def folder(directory: Path, dataset: str, **asked: Any) -> int:
+def folder(
+    directory: Path,
+    dataset: str,
+    guess: Path | None,
+    camera: str | None,
+    camera_frame: str | None,
+    lidar_frame: str | None,
+    **asked: Any,
+) -> int:
     """Of a folder with images/, clouds/ and calibration.yaml."""
-    from calibnet.datasets import open_sequence
-
-    return verify_sequence(lambda: open_sequence(dataset, directory), **asked)
+    return verify_sequence(
+        lambda: open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame), camera=camera, **asked
+    )
 
 
 def verify_sequence(

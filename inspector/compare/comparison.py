@@ -156,8 +156,7 @@ def _check_same_frames(
     one: RecordedRun, mine: Sequence[RecordedFrame], other: RecordedRun, theirs: Sequence[RecordedFrame]
 ) -> None:
     for a, b in zip(mine, theirs, strict=True):
-        same_size = (a.camera.width, a.camera.height) == (b.camera.width, b.camera.height)
-        if a.source != b.source or not same_size or not np.array_equal(a.camera.matrix, b.camera.matrix):
+        if a.source != b.source or not a.camera.same(b.camera):
             raise RecordingError(
                 f"Frame {a.index} is another picture or has another camera in {other.path} than in {one.path}; "
                 "compare runs on the same data."

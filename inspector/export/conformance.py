@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibnet.conformance.requirement import require
-from calibnet.geometry import PinholeCamera, miscalibration, transform
+from calibnet.geometry import CameraModel, miscalibration, transform
 from inspector.export.exported import Exported
 
 SMALLEST = 1e-6
@@ -42,5 +42,6 @@ def example() -> Exported:
     """A calibration with another number in every place."""
     rotation = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
     extrinsic = miscalibration([1.1, -2.3, 0.7], [0, 0, 0]) @ transform(rotation, [0.061, -0.083, -0.271])
-    camera = PinholeCamera(640, 480, np.array([[500.1, 0.0, 320.2], [0.0, 501.3, 240.4], [0.0, 0.0, 1.0]]))
-    return Exported(extrinsic, camera, np.array([-0.3, 0.1, 0.001, -0.002, 0.05]), "an example, frame 7")
+    matrix = np.array([[500.1, 0.0, 320.2], [0.0, 501.3, 240.4], [0.0, 0.0, 1.0]])
+    camera = CameraModel(640, 480, matrix, coefficients=np.array([-0.3, 0.1, 0.001, -0.002, 0.05]))
+    return Exported(extrinsic, camera, "an example, frame 7")

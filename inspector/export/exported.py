@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from calibnet.datasets.folder_calibration import read_folder_calibration
-from calibnet.geometry import PinholeCamera
-from calibnet.geometry.types import Extrinsic, Floats
+from calibnet.datasets.folder import read_calibration_of
+from calibnet.geometry import CameraModel
+from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, Verdict
 from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
@@ -31,16 +29,14 @@ class Exported:
 
     Attributes:
         camera_from_lidar: 4x4, metres.
-        camera: intrinsics; of the rectified images.
-        distortion: OpenCV's coefficients of the raw images; zeros where the images are rectified already.
+        camera: as it is, lens included.
         origin: where it comes from, for the file's comment; says so where that is not accepted.
         frames: names of the two coordinate frames.
         verdict: whether it is good, of a recording; None where nothing says.
     """
 
     camera_from_lidar: Extrinsic = field(repr=False)
-    camera: PinholeCamera
-    distortion: Floats = field(repr=False)
+    camera: CameraModel
     origin: str
     frames: FrameNames = field(default_factory=FrameNames)
     verdict: Verdict | None = field(default=None, repr=False)
@@ -67,7 +63,7 @@ def exported_median(run: RecordedRun) -> Exported:
         RecordingError: the frames are not all of one camera on one mount.
     """
     camera = run.frames[0].camera
-    if not (run.one_mount and all(_same_camera(camera, frame.camera) for frame in run.frames)):
+    if not (run.one_mount and all(camera.same(frame.camera) for frame in run.frames)):
         raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
     count = sum(not frame.rejected for frame in run.frames) or len(run.frames)
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
@@ -90,23 +86,17 @@ def exported_drive(run: RecordedRun) -> Exported:
 
 
 def exported_folder(folder: Path) -> Exported:
-    """The calibration of a plain folder: of its ``calibration.yaml``.
+    """The calibration of a plain folder: of its ``calibration.yaml``, or the file of another tool.
 
     Raises:
-        DatasetError: the file is missing or malformed.
+        DatasetError: the file is missing or malformed, or lacks camera or extrinsic.
     """
-    path = folder / "calibration.yaml"
-    content = read_folder_calibration(path)
-    camera = PinholeCamera(content.width, content.height, content.calibration.matrix)
-    return Exported(content.calibration.camera_from_lidar, camera, content.distortion, f"{folder.name}/{path.name}")
+    path, camera, extrinsic = read_calibration_of(folder)
+    return Exported(extrinsic, camera, f"{folder.name}/{path.name}")
 
 
-def _judged(extrinsic: Extrinsic, camera: PinholeCamera, origin: str, verdict: Verdict | None) -> Exported:
-    """What a recording says, of rectified images."""
+def _judged(extrinsic: Extrinsic, camera: CameraModel, origin: str, verdict: Verdict | None) -> Exported:
+    """What a recording says."""
     if verdict is not None and verdict.word != ACCEPTED:
         origin = f"{origin}; {verdict.word}: {explained(verdict)}"
-    return Exported(extrinsic, camera, np.zeros(5), origin, verdict=verdict)
-
-
-def _same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
-    return (one.width, one.height) == (other.width, other.height) and np.array_equal(one.matrix, other.matrix)
+    return Exported(extrinsic, camera, origin, verdict=verdict)

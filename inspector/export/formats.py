@@ -7,7 +7,7 @@ import json
 import cv2
 import numpy as np
 
-from calibnet.geometry import invert
+from calibnet.geometry import CameraModel, invert
 from calibnet.geometry.types import Floats, Rotation
 from inspector.export.exported import Exported
 
@@ -26,6 +26,9 @@ def as_kitti(exported: Exported) -> str:
     lines.append(_entry("Tr", exported.camera_from_lidar[:3]))
     lines.append(f"# convention: Tr = {CONVENTION}")
     lines.append("# cameras: P0 to P3 are the same rectified camera, pixels = P0 Tr x_lidar, without baseline")
+    if not exported.camera.is_pinhole:
+        named = ", ".join(f"{name} {value!r}" for name, value in lens(exported.camera).items())
+        lines.append(f"# lens: this format has no lens; rectify the pictures with the same matrix first, of {named}")
     lines.append(f"# source: calib-inspect, {exported.origin}")
     return "\n".join([*lines, ""])
 
@@ -66,7 +69,8 @@ def as_opencv(exported: Exported) -> str:
     storage.write("image_width", exported.camera.width)
     storage.write("image_height", exported.camera.height)
     storage.write("camera_matrix", exported.camera.matrix)
-    storage.write("distortion_coefficients", exported.distortion.reshape(1, -1))
+    for name, value in lens(exported.camera).items():
+        storage.write(name, np.array([value]) if isinstance(value, list) else value)
     storage.write("camera_from_lidar", exported.camera_from_lidar)
     storage.write("rvec", cv2.Rodrigues(exported.camera_from_lidar[:3, :3])[0])
     storage.write("tvec", exported.camera_from_lidar[:3, 3:])
@@ -86,9 +90,15 @@ def as_json(exported: Exported) -> str:
         "image_width": exported.camera.width,
         "image_height": exported.camera.height,
         "camera_matrix": exported.camera.matrix.tolist(),
-        "distortion_coefficients": exported.distortion.tolist(),
+        **lens(exported.camera),
     }
     return f"{json.dumps(content, indent=2)}\n"
+
+
+def lens(camera: CameraModel) -> dict[str, str | float | list[float]]:
+    """A lens as files name it: its model, coefficients with names of their own, and the rest in OpenCV's order."""
+    of_model: dict[str, str | float | list[float]] = {"distortion_model": camera.model, **camera.named}
+    return of_model | {"distortion_coefficients": camera.distortion.tolist()}
 
 
 def quaternion_xyzw(rotation: Rotation) -> Floats:

@@ -8,14 +8,14 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import PinholeCamera, PoseError, pose_error
+from calibnet.geometry import CameraModel, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
@@ -48,7 +48,7 @@ class RecordedFrame:
         index: the frame's number in its sequence.
         seconds: since the sequence's first frame.
         source: name of its image file.
-        camera: its own camera, at full size.
+        camera: its own camera, as it is, lens included.
         initial: ``camera_from_lidar`` that the run started from, 4x4.
         corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where that is
             rejected.
@@ -60,7 +60,7 @@ class RecordedFrame:
     index: int
     seconds: float
     source: str
-    camera: PinholeCamera
+    camera: CameraModel
     initial: Extrinsic = field(repr=False)
     corrected: Extrinsic = field(repr=False)
     stages: dict[int, Extrinsic] = field(repr=False)
@@ -262,7 +262,7 @@ def _frames(
                 index=index,
                 seconds=row[entities.TIME],
                 source=row["source"][0],
-                camera=PinholeCamera(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3))),
+                camera=_camera(row),
                 initial=initial[index],
                 corrected=corrected[index],
                 stages=of_stages,
@@ -273,6 +273,14 @@ def _frames(
             )
         )
     return tuple(frames)
+
+
+def _camera(row: dict[str, Any]) -> CameraModel:
+    """The camera of a frame; earlier recordings have rectified pictures, and say no lens."""
+    camera = CameraModel(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3)))
+    if not row.get("lens_model"):
+        return camera
+    return replace(camera, model=row["lens_model"][0], coefficients=np.array(row["lens_coefficients"]))
 
 
 def _matrices(batches: list[RecordBatch]) -> dict[int, Extrinsic]:

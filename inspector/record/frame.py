@@ -22,7 +22,7 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
     """Set the timelines to a frame, and log what every recording has of it."""
     frame = observation.frame
     rec.set_frame(frame.index, frame.timestamp)
-    rec.log(entities.IMAGE, rr.Image(frame.image).compress(jpeg_quality=JPEG_QUALITY))
+    rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
     table = stage_table(observation, rec.path if Part.OVERLAYS in contents.parts else None)
     rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
     if observation.trace.verdict is not None:
@@ -48,12 +48,14 @@ def _log_extrinsics(rec: Subtree, observation: Observation) -> None:
 
 
 def _log_camera(rec: Subtree, observation: Observation) -> None:
-    """The camera at the image's full size, and the image's file name without its folder."""
-    frame = observation.frame
-    camera = rr.AnyValues(
-        width=frame.camera.width,
-        height=frame.camera.height,
-        camera_matrix=frame.camera.matrix.astype(np.float64).ravel(),
-        source=Path(frame.source).name,
+    """The camera as it is, lens included, and the image's file name without its folder."""
+    camera = observation.frame.as_taken.camera
+    values = rr.AnyValues(
+        width=camera.width,
+        height=camera.height,
+        camera_matrix=camera.matrix.astype(np.float64).ravel(),
+        source=Path(observation.frame.source).name,
+        lens_model=camera.model,
+        lens_coefficients=camera.coefficients.astype(np.float64),
     )
-    rec.log(entities.CAMERA, camera)
+    rec.log(entities.CAMERA, values)

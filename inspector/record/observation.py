@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, project
+from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, project_through
 from calibnet.geometry.projection import Projection
 from calibnet.geometry.types import Extrinsic, Vector3
 from calibnet.trace import CascadeTrace, StageTrace
@@ -59,10 +59,11 @@ class Observation:
         return "as given" if self.reference is None else "miscalibrated"
 
     def projected(self, camera_from_lidar: Extrinsic) -> Projection:
-        """The scan in the frame's image, rows far to near; each extrinsic of the run is projected once."""
+        """The scan in the picture as it was taken, rows far to near; each extrinsic of the run is projected once."""
         key = camera_from_lidar.tobytes()
         if key not in self._projections:
-            seen = project(self.frame.points[self._in_front], camera_from_lidar, self.frame.camera).sorted()
+            camera = self.frame.as_taken.camera
+            seen = project_through(self.frame.points[self._in_front], camera_from_lidar, camera).sorted()
             self._projections[key] = replace(seen, index=self._in_front[seen.index])
         return self._projections[key]
 
@@ -72,7 +73,12 @@ class Observation:
 
     @cached_property
     def _in_front(self) -> NDArray[np.intp]:
-        """Rows of the scan before the camera under any extrinsic of the run: half of what a scanner sees."""
+        """Rows of the scan before the camera under any extrinsic of the run: half of what a scanner sees.
+
+        All of them for a lens that may see to the side.
+        """
+        if not self.frame.as_taken.camera.is_pinhole:
+            return np.arange(len(self.frame.points))
         extrinsics = [self.trace.initial, *(stage.after for stage in self.trace.stages)]
         extrinsics += [] if self.reference is None else [self.reference]
         ahead = np.stack([extrinsic[2] for extrinsic in extrinsics]).astype(np.float32)
@@ -166,7 +172,7 @@ class Layout:
             )
             for stage in observation.trace.stages
         )
-        camera = observation.frame.camera
+        camera = observation.frame.as_taken.camera
         lidar_from_camera = invert(observation.trace.corrected)
         return cls(
             stages,

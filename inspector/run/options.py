@@ -50,7 +50,7 @@ class RunOptions:
 
     sequence: Sequence
     frames: str = ":"
-    camera: int | None = None
+    camera: int | str | None = None
     as_is: bool = False
     range: MiscalibrationRange | None = None
     miscalibration: Transform | None = field(default=None, repr=False)

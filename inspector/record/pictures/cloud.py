@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import project
+from calibnet.geometry import project_through
 from calibnet.geometry.types import Extrinsic
 from inspector.record.observation import Observation
 
@@ -34,11 +34,12 @@ def subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
 
 def seen_colors(frame: Frame, points: NDArray[np.float32], camera_from_lidar: Extrinsic) -> NDArray[np.uint8]:
     """``[M, 3]`` RGB: the colour of the pixel that each point falls on, grey where it falls on none."""
-    projection = project(points, camera_from_lidar, frame.camera)
+    image, camera = frame.as_taken
+    projection = project_through(points, camera_from_lidar, camera)
     rgb = np.full((len(points), 3), OUTSIDE, dtype=np.uint8)
     u, v = np.rint(projection.pixels).astype(np.intp).T
-    height, width = frame.image.shape[:2]
-    rgb[projection.index] = frame.image[np.minimum(v, height - 1), np.minimum(u, width - 1)]
+    height, width = image.shape[:2]
+    rgb[projection.index] = image[np.minimum(v, height - 1), np.minimum(u, width - 1)]
     return rgb
 
 

@@ -23,7 +23,7 @@ class FrameOverlays:
 
     def __init__(self, observation: Observation, contents: Contents) -> None:
         """Draw points of an observation in the density and the colours that the contents ask for."""
-        self._observation = observation
+        self._observation, self._camera = observation, observation.frame.as_taken.camera
         self._thinning = DENSE if contents.dense else SPARSE
         self._paint = make_painter(observation, contents.color)
         self._drawn: dict[bytes, Overlay] = {}
@@ -44,11 +44,11 @@ class FrameOverlays:
         key = camera_from_lidar.tobytes()
         if key not in self._drawn:
             projection = self._observation.projected(camera_from_lidar)
-            self._drawn[key] = make_overlay(projection, self._observation.frame.camera, self._thinning, self._paint)
+            self._drawn[key] = make_overlay(projection, self._camera, self._thinning, self._paint)
         return self._drawn[key]
 
     def _log_caption(self, rec: Subtree, entity: str, text: str) -> None:
-        middle = [self._observation.frame.camera.width / 2, 0.0]
+        middle = [self._camera.width / 2, 0.0]
         caption = rr.Points2D([middle], labels=text, colors=colors.REFERENCE, radii=0.0, show_labels=True)
         rec.log(entities.caption(entity), caption)
 

@@ -31,13 +31,13 @@ class StartingPoints:
     def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
         """The scan as the stage found it; the network's image is the frame's, turned upright and resized."""
         camera, reference, frame = stage.camera, observation.reference, observation.frame
-        if stage.upright is None:
+        if stage.upright is None and frame.original is None:
             projection = observation.projected(stage.before)
             scale = np.array([camera.width / frame.camera.width, camera.height / frame.camera.height], dtype=np.float32)
             pixels = (projection.pixels + 0.5) * scale - 0.5  # pixel centres are at integers
             projection = replace(projection, pixels=pixels)
         else:
-            upright = transform(stage.upright, np.zeros(3))
+            upright = np.eye(4) if stage.upright is None else transform(stage.upright, np.zeros(3))
             reference = None if reference is None else upright @ reference
             projection = project(frame.points, upright @ stage.before, camera).sorted()
             pixels = projection.pixels

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from calibnet.geometry import PinholeCamera
+from calibnet.geometry import CameraModel
 from calibnet.geometry.projection import Projection, nearest_per_cell
 from inspector.record.pictures.painting import Painter, paint_depth
 
@@ -47,7 +47,7 @@ class Overlay:
 
 
 def make_overlay(
-    projection: Projection, camera: PinholeCamera, thinning: Thinning, paint: Painter = paint_depth
+    projection: Projection, camera: CameraModel, thinning: Thinning, paint: Painter = paint_depth
 ) -> Overlay:
     """Thin a projected scan; the nearest point of each cell stays.
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibnet.geometry import transform_points
 from calibnet.geometry.projection import Projection
 from inspector import colors
 from inspector.record.contents import Coloring
@@ -82,9 +83,8 @@ def _error_painter(observation: Observation) -> Painter:
     """Pixels between where an extrinsic puts a point and where the reference puts it."""
     frame, reference = observation.frame, observation.reference
     assert reference is not None, "the command line refuses --color error without a reference"
-    true = (frame.points[:, :3] @ reference[:3, :3].T + reference[:3, 3]).astype(np.float32) @ frame.camera.matrix.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        pixels = np.where(true[:, 2:] > 0.0, true[:, :2] / true[:, 2:], np.inf)
+    seen = frame.as_taken.camera.see(transform_points(reference, frame.points[:, :3].astype(np.float64)))
+    pixels = np.where(seen.valid[:, None], seen.pixels, np.inf)
 
     def paint(projection: Projection, rows: NDArray[np.int64]) -> Paint:
         off = np.linalg.norm(projection.pixels[rows] - pixels[projection.index[rows]], axis=1)

@@ -204,7 +204,7 @@ def test_lens_distortion_is_undone(coefficients, write_layout, write_calibration
 def test_image_of_another_size(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(width=80))
-    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 and calibration\.yaml is for 80x48"):
+    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 and its calibration is for 80x48"):
         layout.open()[0]
 
 
@@ -214,7 +214,8 @@ IDENTITY = np.eye(4).tolist()
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        *(({key: None}, f"no key '{key}'") for key in ("width", "camera_matrix", "distortion", "camera_from_lidar")),
+        *(({key: None}, f"no key '{key}'") for key in ("width", "camera_matrix", "distortion")),
+        ({"camera_from_lidar": None}, "does not say where the LiDAR is; give a first guess with --guess FILE"),
         ({"width": 64.5}, "width is 64.5"),
         ({"height": -1}, "height is -1"),
         ({"camera_matrix": [[1, 2], [3, 4]]}, "camera_matrix has 2x2 numbers instead of 3x3"),
@@ -222,8 +223,8 @@ IDENTITY = np.eye(4).tolist()
         ({"camera_matrix": [[0, 0, 1], [0, 5, 1], [0, 0, 1]]}, "singular"),
         ({"camera_matrix": [[5, 0, 1], [0, 5, 1], [0, 0, 2]]}, "not a camera matrix"),
         ({"camera_matrix": "[[.nan, 0, 1], [0, 5, 1], [0, 0, 1]]"}, "not finite"),
-        ({"distortion": [0, 0, 0]}, "distortion has 3 numbers instead of 4 or 5 or 8"),
-        ({"camera_from_lidar": "front left"}, "camera_from_lidar is not 4x4 numbers"),
+        ({"distortion": [0, 0, 0]}, "distortion has 3 numbers instead of 4 or 5 or 8 or 12 or 14"),
+        ({"camera_from_lidar": "front left"}, "camera_from_lidar is not 4x4 or 3x4 numbers"),
         ({"camera_from_lidar": (2.0 * np.eye(4)).tolist()}, "last row"),
         ({"camera_from_lidar": np.diag([2.0, 1, 1, 1]).tolist()}, "not orthonormal"),
         ({"camera_from_lidar": np.diag([-1.0, 1, 1, 1]).tolist()}, "reflection"),

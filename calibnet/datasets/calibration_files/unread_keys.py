@@ -12,17 +12,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-READ = frozenset({"width", "height", "camera_matrix", "distortion", "camera_from_lidar"})
+READ = frozenset(
+    {
+        *("width", "height", "camera_matrix", "distortion_model", "distortion", "xi", "alpha"),
+        *("camera_from_lidar", "lidar_from_camera", "rig_from_camera", "cloud_columns"),
+        *("fix", "prior_translation", "prior_rotation"),
+    }
+)
 """The keys that are read."""
 
 SIZE = "'width' and 'height' in pixels"
 MATRIX = "'camera_matrix' as [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
-LENS = "'distortion' as OpenCV's k1, k2, p1, p2, k3"
+LENS = "'distortion_model' and 'distortion', for instance plumb_bob with OpenCV's k1, k2, p1, p2, k3"
 EXTRINSIC = "'camera_from_lidar' as the 4x4 matrix that maps LiDAR points into the camera, in metres"
 INVERSE = "its inverse as 'camera_from_lidar'"
 RECTIFIED = "rectified pictures with the 'camera_matrix' they then have"
 WHOLE = "the 'camera_matrix' of the pictures as they are stored"
-STRAIGHT = "rectified pictures with 'distortion' [0, 0, 0, 0, 0] (only plumb_bob and rational_polynomial are undone)"
+STRAIGHT = "'distortion_model' as one of plumb_bob, rational_polynomial, equidistant, omnidirectional, double_sphere"
 
 _CAM, _LIDAR = r"(camera|cam|image)\d*", r"(lidar|velodyne|velo|laser|livox|ouster|hesai|pandar|ldr)\d*"
 _A, _OF = (
@@ -76,9 +82,12 @@ def unread_geometry(content: Mapping[Any, Any], parent: str = "") -> list[Unread
         parent: that key and a dot.
     """
     found = []
+    lens_is_said = not parent and bool(content.get("distortion_model"))
     for name, value in content.items():
         key, plain = f"{parent}{name}", _plain(name)
         if _says_nothing(value) or (not parent and name in READ):
+            continue
+        if lens_is_said and (MODEL.fullmatch(plain) or _remedy(plain, value) == STRAIGHT):
             continue
         if MODEL.fullmatch(plain) and isinstance(value, str):
             if not _is_read(plain, value):

@@ -1,0 +1,44 @@
+"""Which tool wrote a calibration file is told by what it holds, not by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from calibnet.datasets.calibration_files import kalibr, koide, opencv, ours, ros, transforms
+from calibnet.datasets.calibration_files.calibration_file import CalibrationFile, Wanted
+from calibnet.datasets.calibration_files.text import parse
+from calibnet.errors import DatasetError
+
+NOTHING_WANTED = Wanted()
+
+
+def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> CalibrationFile:
+    """Read a calibration file.
+
+    Known are our ``calibration.yaml``, ROS's ``camera_info``, Kalibr's ``camchain``, OpenCV's ``FileStorage``,
+    koide3's ``calib.json``, lists of transforms such as ``/tf_static``, and Autoware's.
+
+    Args:
+        path: the file.
+        wanted: what to take from a file of several sensors.
+
+    Raises:
+        DatasetError: it cannot be read, or what it says cannot be used; the message names it.
+    """
+    content, of_opencv = parse(path)
+    if transforms.is_list(content):
+        return transforms.read_list(content, path, wanted)
+    if koide.is_known(content):
+        return koide.read(content, path, wanted)
+    if kalibr.is_known(content):
+        return kalibr.read(content, path, wanted)
+    if opencv.is_known(content, of_opencv):
+        return opencv.read(content, path, wanted)
+    if ros.is_known(content):
+        return ros.read(content, path)
+    if transforms.is_autoware(content):
+        return transforms.read_autoware(content, path, wanted)
+    if not isinstance(content, Mapping):
+        raise DatasetError(f"Calibration {path} holds no 'key: value' lines; write it as docs/own-sensors.md says.")
+    return ours.read(content, path)

@@ -1,0 +1,60 @@
+"""ROS's ``camera_info``: as ``camera_calibration`` writes it, and as ``topic echo`` of ROS 1 and 2 prints it.
+
+Its matrix and lens are of the pictures as they are taken (``image_raw``); ``R`` and ``P`` are of rectified ones, and
+are not needed. Keys of our own for the extrinsic may stand beside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from calibnet.datasets.calibration_files import values
+from calibnet.datasets.calibration_files.calibration_file import CalibrationFile
+from calibnet.errors import DatasetError
+
+NAMES = {
+    "width": ("image_width", "width"),
+    "height": ("image_height", "height"),
+    "matrix": ("camera_matrix", "K", "k"),
+    "coefficients": ("distortion_coefficients", "D", "d"),
+}
+
+
+def is_known(content: Any) -> bool:
+    """Whether it is a ``camera_info``."""
+    if not isinstance(content, Mapping):
+        return False
+    calibrated = "image_width" in content and isinstance(content.get("camera_matrix"), Mapping)
+    echoed = "distortion_model" in content and any(key in content for key in ("K", "k")) and "width" in content
+    return calibrated or echoed
+
+
+def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
+    """Read it.
+
+    Raises:
+        DatasetError: it is incomplete, or is of pictures that were binned or cut.
+    """
+    found = {what: next((key for key in keys if key in content), None) for what, keys in NAMES.items()}
+    for what, key in found.items():
+        if key is None:
+            raise DatasetError(f"Calibration {path}: this camera_info has no {NAMES[what][0]}; write it out again.")
+    roi = content.get("roi") or {}
+    cut = [key for key in ("binning_x", "binning_y") if content.get(key) not in (None, 0, 1)]
+    cut += [f"roi.{key}" for key in ("x_offset", "y_offset") if isinstance(roi, Mapping) and roi.get(key)]
+    if cut:
+        raise DatasetError(
+            f"Calibration {path}: this camera_info is of pictures that were cut or binned ({', '.join(cut)}); give the "
+            "camera matrix of the pictures as they are, with these at 0."
+        )
+
+    def value(what: str) -> Any:
+        return content[found[what]]
+
+    size = values.pixels(value("width"), "width", path), values.pixels(value("height"), "height", path)
+    model = values.lens_model(content.get("distortion_model") or "plumb_bob", path, "distortion_model")
+    matrix = values.numbers(value("matrix"), str(found["matrix"]), path, (3, 3))
+    camera = values.camera(size, matrix, model, value("coefficients"), path, str(found["coefficients"]))
+    return CalibrationFile("ROS's camera_info", camera, values.extrinsic(content, path))

@@ -1,0 +1,287 @@
+"""Calibration files as other tools write them, told apart by what they hold, and each read for what it says."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from calibnet.datasets.calibration_files import FrameChoice, Wanted, read_calibration
+from calibnet.errors import DatasetError
+from calibnet.geometry import invert, transform
+
+MATRIX = np.array([[900.0, 0.0, 639.5], [0.0, 905.0, 359.5], [0.0, 0.0, 1.0]])
+AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+EXTRINSIC = transform(AXES, [0.0, -0.1, -0.2])
+"""Camera from LiDAR: the camera 0.2 m ahead of the LiDAR and 0.1 m below it."""
+ROWS = EXTRINSIC.tolist()
+
+ROS = """\
+image_width: 1280
+image_height: 720
+camera_name: front
+camera_matrix: {rows: 3, cols: 3, data: [900.0, 0, 639.5, 0, 905.0, 359.5, 0, 0, 1]}
+distortion_model: plumb_bob
+distortion_coefficients: {rows: 1, cols: 5, data: [0.1, -0.2, 0.001, 0.002, 0]}
+rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+projection_matrix: {rows: 3, cols: 4, data: [880, 0, 640, 0, 0, 885, 360, 0, 0, 0, 1, 0]}
+"""
+ROS_ECHO = """\
+header: {frame_id: camera}
+height: 720
+width: 1280
+distortion_model: equidistant
+d: [0.1, -0.03, 0.001, 0.0]
+k: [900.0, 0, 639.5, 0, 905.0, 359.5, 0, 0, 1]
+r: [1, 0, 0, 0, 1, 0, 0, 0, 1]
+p: [880, 0, 640, 0, 0, 885, 360, 0, 0, 0, 1, 0]
+binning_x: 0
+binning_y: 0
+roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}
+"""
+KALIBR = """\
+cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [0.1, 0.01, 0.0, 0.0]
+  distortion_model: equidistant
+  intrinsics: [900.0, 905.0, 639.5, 359.5]
+  resolution: [1280, 720]
+  rostopic: /cam0/image_raw
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.54]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: omni
+  distortion_coeffs: [-0.1, 0.05, 0.001, 0.002]
+  distortion_model: radtan
+  intrinsics: [1.2, 900.0, 905.0, 639.5, 359.5]
+  resolution: [1280, 720]
+"""
+DOUBLE_SPHERE = """\
+cam0:
+  camera_model: ds
+  distortion_coeffs: []
+  distortion_model: none
+  intrinsics: [-0.2, 0.6, 900.0, 905.0, 639.5, 359.5]
+  resolution: [1280, 720]
+"""
+KOIDE = {
+    "camera": {
+        "camera_model": "plumb_bob",
+        "distortion_coeffs": [0.1, -0.2, 0, 0, 0],
+        "intrinsics": [900, 905, 639.5, 359.5],
+    },
+    "meta": {"camera_info_topic": "/camera_info", "bag_names": ["a"]},
+    "results": {
+        "init_T_lidar_camera": [9.0, 9, 9, 0, 0, 0, 1],
+        "T_lidar_camera": [0.2, 0.0, -0.1, -0.5, 0.5, -0.5, 0.5],
+    },
+}
+TF_ECHO = """\
+transforms:
+- header: {stamp: {sec: 1, nanosec: 2}, frame_id: base_link}
+  child_frame_id: velodyne
+  transform: {translation: {x: 1.0, y: 0.0, z: 2.0}, rotation: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}}
+- header: {frame_id: base_link}
+  child_frame_id: front_camera
+  transform: {translation: {x: 1.2, y: 0.0, z: 1.9}, rotation: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}}
+- header: {frame_id: front_camera}
+  child_frame_id: front_camera_optical
+  transform: {translation: {x: 0.0, y: 0.0, z: 0.0}, rotation: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
+"""
+AUTOWARE = """\
+sensor_kit_base_link:
+  camera0/camera_link: {x: 0.2, y: 0.0, z: -0.1, roll: 0.0, pitch: 0.0, yaw: 0.0}
+  velodyne_top_base_link: {x: 0.0, y: 0.0, z: 0.0, roll: 0.0, pitch: 0.0, yaw: 0.0}
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    def call(text: str, name: str = "any name.txt") -> Path:
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return call
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    path = tmp_path / "picture.png"
+    cv2.imwrite(str(path), np.zeros((720, 1280, 3), np.uint8))
+    return path
+
+
+def check_camera(found, kind: str, model: str, coefficients: list[float]) -> None:
+    assert found.kind == kind
+    assert (found.camera.width, found.camera.height, found.camera.model) == (1280, 720, model)
+    assert_allclose(found.camera.matrix, MATRIX)
+    assert_allclose(found.camera.coefficients, coefficients)
+
+
+def test_camera_info_of_ros(write):
+    found = read_calibration(write(ROS))
+    check_camera(found, "ROS's camera_info", "plumb_bob", [0.1, -0.2, 0.001, 0.002, 0])
+    assert found.camera_from_lidar is None
+    found = read_calibration(write(ROS + f"camera_from_lidar: {ROWS}\n"))
+    assert_allclose(found.camera_from_lidar, EXTRINSIC)
+
+
+def test_camera_info_as_it_is_echoed(write):
+    check_camera(read_calibration(write(ROS_ECHO)), "ROS's camera_info", "equidistant", [0.1, -0.03, 0.001, 0.0])
+    old = ROS_ECHO.replace("d: [", "D: [").replace("k: [", "K: [").replace("equidistant", "plumb_bob")
+    check_camera(read_calibration(write(old)), "ROS's camera_info", "plumb_bob", [0.1, -0.03, 0.001, 0.0])
+    with pytest.raises(DatasetError, match=r"cut or binned \(binning_x, roi\.y_offset\)"):
+        read_calibration(write(ROS_ECHO.replace("binning_x: 0", "binning_x: 2").replace("y_offset: 0", "y_offset: 8")))
+
+
+def test_camchain_of_kalibr(write):
+    path = write(KALIBR)
+    found = read_calibration(path, Wanted("cam0"))
+    check_camera(found, "Kalibr's camchain", "equidistant", [0.1, 0.01, 0.0, 0.0])
+    assert_allclose(found.rig_from_camera, np.eye(4))
+    found = read_calibration(path, Wanted("cam1"))
+    check_camera(found, "Kalibr's camchain", "omnidirectional", [1.2, -0.1, 0.05, 0.001, 0.002])
+    assert_allclose(found.rig_from_camera[:3, 3], [0.54, 0, 0])
+    with pytest.raises(DatasetError, match="holds cam0, cam1; say which one with --camera"):
+        read_calibration(path)
+    check_camera(read_calibration(write(DOUBLE_SPHERE)), "Kalibr's camchain", "double_sphere", [-0.2, 0.6])
+    found = read_calibration(write(DOUBLE_SPHERE + f"  T_cam_lidar: {ROWS}\n"))
+    assert_allclose(found.camera_from_lidar, EXTRINSIC)
+    with pytest.raises(DatasetError, match="camera_model is 'eucm'; calibrate with one of pinhole, omni, ds"):
+        read_calibration(write(DOUBLE_SPHERE.replace("ds", "eucm")))
+
+
+@pytest.mark.parametrize("ending", ["yaml", "xml", "json"])
+def test_file_storage_of_opencv(ending, tmp_path):
+    path = tmp_path / f"stereo.{ending}"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("image_width", 1280)
+    storage.write("image_height", 720)
+    storage.write("calibration_time", "Thu 26 Nov 2026")
+    storage.write("camera_matrix", MATRIX)
+    storage.write("distortion_coefficients", np.array([[0.1, -0.2, 0.001, 0.002, 0.05]]))
+    storage.write("camera_from_lidar", EXTRINSIC)
+    storage.release()
+    found = read_calibration(path)
+    check_camera(found, "OpenCV's file", "plumb_bob", [0.1, -0.2, 0.001, 0.002, 0.05])
+    assert_allclose(found.camera_from_lidar, EXTRINSIC)
+
+
+def test_calib_json_of_koide3(write, picture):
+    found = read_calibration(write(json.dumps(KOIDE)), Wanted(picture=picture))
+    check_camera(found, "koide3's calib.json", "plumb_bob", [0.1, -0.2, 0, 0, 0])
+    assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
+    with pytest.raises(DatasetError, match="does not say the size of the pictures"):
+        read_calibration(write(json.dumps(KOIDE)))
+    fisheye = {"camera_model": "fisheye", "distortion_coeffs": [0.1, 0, 0, 0], "intrinsics": [900, 905, 639.5, 359.5]}
+    found = read_calibration(write(json.dumps({"camera": fisheye})), Wanted(picture=picture))
+    check_camera(found, "koide3's calib.json", "equidistant", [0.1, 0, 0, 0])
+    assert found.camera_from_lidar is None
+
+
+def test_transforms_between_frames(write):
+    found = read_calibration(write(TF_ECHO))
+    assert found.camera is None
+    assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
+    by_hand = "- {parent: velodyne, child: cam_optical, translation: [0.2, 0, -0.1], rpy_deg: [-90, 0, -90]}\n"
+    assert_allclose(read_calibration(write(by_hand)).camera_from_lidar, EXTRINSIC, atol=1e-12)
+
+
+def test_frames_are_named_where_their_names_do_not_tell(write):
+    with pytest.raises(DatasetError, match="frame front_camera stands as the LiDAR does, x forward and z up"):
+        read_calibration(write(TF_ECHO), Wanted(frames=FrameChoice("front_camera")))
+    with pytest.raises(DatasetError, match="has no frame 'rear'; frames there: base_link, front_camera"):
+        read_calibration(write(TF_ECHO), Wanted(frames=FrameChoice("rear")))
+    other = "- {parent: base_link, child: rear_lidar, translation: [0, 0, 0], rpy_deg: [0, 0, 180]}\n"
+    path = write(TF_ECHO + other)
+    with pytest.raises(DatasetError, match=r"several frames of a lidar \(velodyne, rear_lidar\); name it"):
+        read_calibration(path)
+    assert_allclose(read_calibration(path, Wanted(frames=FrameChoice(None, "velodyne"))).camera_from_lidar, EXTRINSIC)
+
+
+def test_calibration_of_autoware(write):
+    found = read_calibration(write(AUTOWARE))
+    assert found.kind == "Autoware's calibration"
+    assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
+
+
+OURS = f"width: 1280\nheight: 720\ncamera_matrix: {MATRIX.tolist()}\ndistortion: [0, 0, 0, 0, 0]\n"
+
+
+@pytest.mark.parametrize(
+    "spelling",
+    [
+        f"camera_from_lidar: {np.ravel(ROWS).tolist()}",
+        f"camera_from_lidar: {np.ravel(ROWS)[:12].tolist()}",
+        f"lidar_from_camera: {invert(EXTRINSIC).tolist()}",
+        f"camera_from_lidar: {{translation: [0, -0.1, -0.2], rotation: {AXES.tolist()}}}",
+        "camera_from_lidar: {translation: [0, -0.1, -0.2], quaternion_xyzw: [0.5, -0.5, 0.5, 0.5]}",
+        "camera_from_lidar: {translation: [0, -0.1, -0.2], quaternion_wxyz: [0.5, 0.5, -0.5, 0.5]}",
+        "lidar_from_camera: {translation: [0.2, 0, -0.1], rpy_deg: [-90, 0, -90]}",
+        "lidar_from_camera: {translation: [0.2, 0, -0.1], rpy_rad: [-1.5707963267948966, 0, -1.5707963267948966]}",
+    ],
+)
+def test_an_extrinsic_in_any_form_and_either_direction(spelling, write):
+    found = read_calibration(write(OURS + spelling))
+    assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("spelling", "problem"),
+    [
+        ("camera_from_lidar: {translation: [0, 0, 0], rotation: [0.5, -0.5, 0.5, 0.5]}", "whose order nobody can tell"),
+        ("camera_from_lidar: {translation: [0, 0, 0], quaternion_xyzw: [1, 1, 0, 0]}", "has length 1.41 and not 1"),
+        ("camera_from_lidar: {translation: [0, 0, 0]}", "has 0 rotations"),
+        ("camera_from_lidar: {rpy_deg: [0, 0, 0]}", "has no 'translation'"),
+        ("camera_from_lidar: {translation: [0, 0, 0], rpy_deg: [0, 0, 0], units: mm}", "an unknown 'units'"),
+        (f"camera_from_lidar: {ROWS}\nlidar_from_camera: {ROWS}", "contradict each other"),
+        ("width: 640", "the key 'width' is there twice"),
+        ("distortion_model: omnidirectional", "has no key 'xi'"),
+        ("distortion_model: equidistant", None),
+        ("cloud_columns: [x, y, intensity]", "cloud_columns is"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(spelling, problem, write):
+    path = write(OURS + spelling)
+    if problem is None:
+        assert read_calibration(path).camera.model == "equidistant", "a fifth zero does not count"
+        return
+    with pytest.raises(DatasetError, match=problem) as caught:
+        read_calibration(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_file_of_an_extrinsic_alone_is_a_guess(write):
+    found = read_calibration(write(f"camera_from_lidar: {ROWS}"))
+    assert found.camera is None
+    assert_allclose(found.camera_from_lidar, EXTRINSIC)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<opencv_storage><a",
+        "{" * 3000,
+        "[" * 100_000,
+        "a: &a [*a]",
+        "%YAML:1.0\n---\n: :",
+        "\0",
+        "2001-99-99",
+        "? [a]\n: b",
+    ],
+)
+def test_garbage_is_one_sentence(text, write):
+    path = write(text)
+    with pytest.raises(DatasetError) as caught:
+        read_calibration(path)
+    assert str(path) in str(caught.value)
