@@ -23,6 +23,15 @@ WORST_PX: Final = 20.0
 INITIAL: Final[Rgb] = (255, 75, 75)
 REFERENCE: Final[Rgb] = (255, 255, 255)
 LIMIT: Final[Rgb] = (150, 150, 150)
+GROUND: Final[Rgb] = (24, 26, 30)
+"""Behind pictures and words, in a light viewer too: dimmed pictures would wash out on white."""
+LETTERS: Final[Rgb] = (235, 236, 240)
+VERDICTS: Final[dict[str, Rgb]] = {
+    "accepted": (110, 240, 140),
+    "rejected": (255, 110, 100),
+    "cannot tell": (255, 205, 80),
+}
+"""Of the words of `calibnet.verdict`."""
 FOUND: Final[Rgb] = (90, 255, 120)
 STAGES: Final[dict[int, Rgb]] = {
     1: (255, 140, 40),

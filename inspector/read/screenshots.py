@@ -79,18 +79,22 @@ class HeadlessViewer:
         self.client.set_time(timeline, sequence=value, play_state="paused")
 
     def pages(self) -> list[Page]:
-        """Every page of every tab, as the blueprint orders them."""
+        """Every page of every tab, as the blueprint orders them; one without a name where nothing has tabs."""
         blueprint = self._blueprint()
-        return list(_pages(blueprint, _root(blueprint)))
+        outer = list(_outer_tabs(blueprint, _root(blueprint)))
+        return [page for tabs in outer for page in _pages(blueprint, tabs)] or [()]
 
     def show(self, page: Page) -> None:
         """Bring a page to the front."""
+        if not page:
+            return
         blueprint = self._blueprint()
-        here = _root(blueprint)
+        outer = _outer_tabs(blueprint, _root(blueprint))
+        here = next(tabs for tabs in outer if page[0] in (_name(blueprint, part) for part in _parts(blueprint, tabs)))
         for name in page:
-            container = blueprint[f"/{here}"]["ContainerBlueprint"]
-            here = next(part for part in container["contents"] if _name(blueprint, part) == name)
-            container["active_tab"] = here
+            shown = next(part for part in _parts(blueprint, here) if _name(blueprint, part) == name)
+            _container(blueprint, here)["active_tab"] = shown
+            here = shown
         self.client.set_blueprint(blueprint, "recording")
 
     def picture(self) -> bytes:
@@ -151,22 +155,38 @@ def file_stem(page: Page) -> str:
 
 
 def _root(blueprint: dict[str, Any]) -> str:
-    """The container with all others in it: the one that is no other's content."""
-    containers = {path.lstrip("/"): fields.get("ContainerBlueprint", {}) for path, fields in blueprint.items()}
-    inner = {part for fields in containers.values() for part in fields.get("contents", [])}
-    tabs = [path for path, fields in containers.items() if fields.get("container_kind") == "Tabs"]
-    return next(path for path in tabs if path not in inner)
+    """The container with all others in it."""
+    return f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}"
+
+
+def _container(blueprint: dict[str, Any], part: str) -> dict[str, Any]:
+    """The fields of a container; none of a view, which may have nothing that differs from the viewer's defaults."""
+    fields: dict[str, Any] = blueprint.get(f"/{part}", {}).get("ContainerBlueprint", {})
+    return fields
+
+
+def _parts(blueprint: dict[str, Any], here: str) -> list[str]:
+    parts: list[str] = _container(blueprint, here).get("contents", [])
+    return parts
+
+
+def _outer_tabs(blueprint: dict[str, Any], here: str) -> Iterator[str]:
+    """The containers with tabs that lie in no other such, for a user may put ours among views of theirs."""
+    if _container(blueprint, here).get("container_kind") == "Tabs":
+        yield here
+        return
+    for part in _parts(blueprint, here):
+        yield from _outer_tabs(blueprint, part)
 
 
 def _pages(blueprint: dict[str, Any], here: str) -> Iterator[Page]:
-    fields = blueprint[f"/{here}"].get("ContainerBlueprint", {})
-    if fields.get("container_kind") != "Tabs":
+    if _container(blueprint, here).get("container_kind") != "Tabs":
         yield ()
         return
-    for part in fields["contents"]:
+    for part in _parts(blueprint, here):
         yield from ((_name(blueprint, part), *rest) for rest in _pages(blueprint, part))
 
 
 def _name(blueprint: dict[str, Any], part: str) -> str:
-    fields = blueprint[f"/{part}"]
+    fields = blueprint.get(f"/{part}", {})
     return str(fields.get("ContainerBlueprint", fields.get("ViewBlueprint", {})).get("display_name", ""))

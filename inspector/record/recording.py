@@ -14,8 +14,9 @@ from typing import Any
 
 import rerun as rr
 
+from calibnet.datasets.frame import Frame
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import DriveEstimate
+from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
 from inspector import entities
 from inspector.record.frame import log_frame, verdict_values
@@ -23,7 +24,7 @@ from inspector.record.observation import Layout, Observation
 from inspector.record.stream import Stream
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
-from inspector.record.tabs.drive import log_drive
+from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
 
 FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
@@ -89,6 +90,9 @@ class Recording:
         for tab in self._tabs:
             tab.log(self._rec, observation, self._contents)
         self._frames += 1
+        self._flush_when_due()
+
+    def _flush_when_due(self) -> None:
         self._unflushed += 1
         fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
         if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
@@ -105,11 +109,23 @@ class Recording:
         """Log whether the calibration that the run started from is good."""
         self._rec.log_once(entities.VERDICT_GIVEN, verdict_values(verdict))
 
-    def log_drive(self, estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None = None) -> None:
-        """Log what all frames together make of the extrinsic and, shown beside it, the verdict on the given one."""
+    def log_drive(
+        self,
+        estimate: DriveEstimate,
+        reference: Extrinsic | None,
+        given: Verdict | None = None,
+        remarks: Sequence[str] = (),
+    ) -> None:
+        """Log what all frames together make of the extrinsic, the verdict on the given one, and remarks."""
         if estimate.verdict is not None:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
-        log_drive(self._rec, estimate, reference, self._seconds, given)
+        log_drive(self._rec, estimate, reference, self._seconds, given, remarks)
+
+    def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
+        """Log what the drive's extrinsic makes of one of its frames."""
+        observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
+        log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
+        self._flush_when_due()
 
     def close(self) -> None:
         """Flush and write the footer; nothing, where nothing can be written any more."""

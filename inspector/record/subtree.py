@@ -42,6 +42,10 @@ class Subtree:
             self._said_once.add(path)
             self._stream.log(path, *components, static=True)
 
+    def log_for_all(self, entity: str, *components: Components) -> None:
+        """Log what holds at all times in place of what was logged so before."""
+        self._stream.log(self.path(entity), *components, static=True)
+
     def set_frame(self, index: int, seconds: float) -> None:
         """Set all timelines to a frame, before its first stage."""
         self._stream.set_time(entities.FRAME, sequence=index)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import DriveCalibrator, with_causes
 from calibnet.runtime.interruption import StopRequest
+from calibnet.trace import DriveEstimate
 from calibnet.verdict import BadFrame
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
@@ -165,9 +167,21 @@ class Session:
             return
         if self.verify and estimate.verdict is not None:
             summary.given_verdict = judge_given(self.cascade, self.frames, initial, estimate.verdict, DRIVE)
-        recording.log_drive(estimate, reference, summary.given_verdict)
+        recording.log_drive(estimate, reference, summary.given_verdict, summary.of_frames())
+        self._record_drive_overlays(recording, estimate, stop)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict
+
+    def _record_drive_overlays(self, recording: Recording, estimate: DriveEstimate, stop: StopRequest) -> None:
+        """Show the drive's extrinsic on every frame that has a result of its own."""
+        unusable = {bad.frame for bad in estimate.skipped}
+        for position in self.positions:
+            if stop.requested:
+                raise KeyboardInterrupt
+            with contextlib.suppress(DatasetError):
+                frame = self.sequence[position]
+                if frame.index not in unusable:
+                    recording.log_drive_overlay(frame, estimate, self.start.reference(frame))
 
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:

@@ -40,6 +40,7 @@ class Summary:
     drive_verdict: Verdict | None = field(default=None, repr=False)
     given_verdict: Verdict | None = field(default=None, repr=False)
     started: float = field(default_factory=time.monotonic)
+    _numbers: list[int] = field(default_factory=list, repr=False)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
     _change: list[PoseError] = field(default_factory=list, repr=False)
@@ -51,6 +52,8 @@ class Summary:
         self.frames += 1
         if trace.verdict is not None:
             self.verdicts[observation.frame.index] = trace.verdict
+        if observation.reference is not None:
+            self._numbers.append(observation.frame.index)
         self._change.append(pose_error(trace.corrected, trace.initial))
         for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
             error = observation.error(extrinsic)
@@ -79,12 +82,7 @@ class Summary:
             return ["No frame was recorded."]
         seconds = time.monotonic() - self.started
         lines = [f"{_frames(self.frames)} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
-        if self._initial:
-            lines.append(
-                f"Error, median over frames: {_middle(self._initial)} initially, {_middle(self._corrected)} corrected."
-            )
-        else:
-            lines.append(f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with.")
+        lines += self.of_frames()
         if self.skipped:
             numbers = ", ".join(str(bad.frame) for bad in self.skipped)
             lines.append(f"{_frames(len(self.skipped))} skipped, which could not be used: {numbers}.")
@@ -92,6 +90,28 @@ class Summary:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
         lines.append(f"Cascade, median milliseconds: {times}.")
+        return lines
+
+    def of_frames(self) -> list[str]:
+        """Sentences on the frames one by one: their median, the worst, and how many became worse."""
+        if not self._initial:
+            return [f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with."]
+        lines = [
+            f"Error, median over frames: {_middle(self._initial)} initially, {_middle(self._corrected)} corrected."
+        ]
+        if len(self._corrected) > 1:
+            worst = max(range(len(self._corrected)), key=lambda position: self._corrected[position].translation_cm)
+            lines.append(f"Worst: frame {self._numbers[worst]}, {_figures(self._corrected[worst])} left.")
+        worse = [
+            number
+            for number, before, after in zip(self._numbers, self._initial, self._corrected, strict=True)
+            if after.rotation_deg > before.rotation_deg or after.translation_cm > before.translation_cm
+        ]
+        if worse:
+            numbers = ", ".join(map(str, worse))
+            lines.append(
+                f"{len(worse)} of {_frames(len(self._corrected))} worse than before, in angle or place: {numbers}."
+            )
         return lines
 
     @property
@@ -108,6 +128,10 @@ class Summary:
 def _middle(errors: list[PoseError]) -> str:
     rotation = median(error.rotation_deg for error in errors)
     return f"{rotation:.2f}° / {median(error.translation_cm for error in errors):.1f} cm"
+
+
+def _figures(error: PoseError) -> str:
+    return f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
 
 
 def _frames(count: int) -> str:

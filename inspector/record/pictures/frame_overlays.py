@@ -10,6 +10,8 @@ from calibnet.geometry.types import Extrinsic
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Observation
+from inspector.record.pictures.captions import caption_strip
+from inspector.record.pictures.lettering import text_png
 from inspector.record.pictures.overlay import Overlay, Thinning, make_overlay
 from inspector.record.pictures.painting import make_painter
 from inspector.record.subtree import Subtree
@@ -28,12 +30,19 @@ class FrameOverlays:
         self._paint = make_painter(observation, contents.color)
         self._drawn: dict[bytes, Overlay] = {}
 
-    def log(self, rec: Subtree, entity: str, name: str, camera_from_lidar: Extrinsic) -> None:
+    def log(
+        self,
+        rec: Subtree,
+        entity: str,
+        name: str,
+        camera_from_lidar: Extrinsic,
+        color: colors.Rgb = colors.LETTERS,
+    ) -> None:
         """Log the points under an extrinsic and, above them, its name and how far off it is."""
         rec.log(entity, self._under(camera_from_lidar).archetype())
         error = self._observation.error(camera_from_lidar)
-        figures = "" if error is None else f": {error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
-        self._log_caption(rec, entity, name + figures)
+        figures = "" if error is None else f"{error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
+        self._log_caption(rec, entity, name, figures, color)
 
     def log_reference(self, rec: Subtree, entity: str, reference: Extrinsic) -> None:
         """Log the points under the reference, whose caption is its name alone."""
@@ -47,10 +56,20 @@ class FrameOverlays:
             self._drawn[key] = make_overlay(projection, self._camera, self._thinning, self._paint)
         return self._drawn[key]
 
-    def _log_caption(self, rec: Subtree, entity: str, text: str) -> None:
-        middle = [self._camera.width / 2, 0.0]
-        caption = rr.Points2D([middle], labels=text, colors=colors.REFERENCE, radii=0.0, show_labels=True)
-        rec.log(entities.caption(entity), caption)
+    def _log_caption(
+        self, rec: Subtree, entity: str, name: str, figures: str = "", color: colors.Rgb = colors.LETTERS
+    ) -> None:
+        """A strip of the picture's width that lies above it."""
+        camera, path = self._camera, entities.caption(entity)
+        strip = caption_strip((camera.width, camera.height))
+        lines = [": ".join(filter(None, [name, figures]))] if strip.lines == 1 else [name, figures]
+        picture = text_png(lines, (camera.width, strip.height), strip.letters, color)
+        rec.log(
+            path,
+            rr.Transform3D(translation=[0.0, -float(strip.height), 0.0]),
+            rr.EncodedImage(contents=picture, media_type="image/png", opacity=1.0),
+            rr.AnyValues(text=": ".join(filter(None, [name, figures]))),
+        )
 
 
 @lru_cache(maxsize=1)

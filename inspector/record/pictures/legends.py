@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from inspector import colors, entities
 from inspector.record.contents import Coloring
+from inspector.record.pictures.lettering import bar_png, names_png
 from inspector.record.subtree import Subtree
 
-BAR_WIDTH, BAR_HEIGHT = 1200, 12
+BAR_WIDTH = 1800
+POINT_BAR_HEIGHT, CERTAINTY_BAR_HEIGHT = 54, 140
+"""Pixels: one lies across a whole page, the other in a third of it."""
+NAMES_HEIGHT = 64
 WHEEL_RADIUS = 40
-LEGEND_SPACING = 120.0
-"""Between two names in a row, in units of the legend's view."""
 LABELLED_DEPTHS_M = (3, 5, 10, 20, 40, 80)
 LABELLED_CERTAINTIES = (0.0, 0.05, 0.2, 0.5, 1.0)
 
@@ -30,20 +32,21 @@ class Bar(NamedTuple):
 
 def log_point_legend(rec: Subtree, coloring: Coloring) -> None:
     """What the colours of an overlay's points stand for, at `entities.LEGEND_POINTS`."""
-    _log_bar(rec, entities.LEGEND_POINTS, point_bar(coloring))
+    _log_bar(rec, entities.LEGEND_POINTS, point_bar(coloring), POINT_BAR_HEIGHT)
 
 
 def log_map_legends(rec: Subtree) -> None:
     """What the colours of maps stand for, at `entities.LEGEND_DISPLACEMENT` and `entities.LEGEND_CERTAINTY`."""
     rec.log_once(entities.LEGEND_DISPLACEMENT, rr.Image(displacement_wheel()))
     certainty = colors.certainty_colors(np.linspace(0.0, 1.0, BAR_WIDTH) ** 2)
-    _log_bar(rec, entities.LEGEND_CERTAINTY, Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES}))
+    bar = Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES})
+    _log_bar(rec, entities.LEGEND_CERTAINTY, bar, CERTAINTY_BAR_HEIGHT)
 
 
 def log_names(rec: Subtree, path: str, names: Mapping[str, colors.Rgb]) -> None:
-    """Names in their colours, in a row."""
-    positions = [(LEGEND_SPACING * position, 0.0) for position in range(len(names))]
-    rec.log_once(path, _labels(positions, list(names), list(names.values())))
+    """Names in a row, each after a dot in its colour."""
+    picture = names_png(list(names.items()), NAMES_HEIGHT)
+    rec.log_once(path, rr.EncodedImage(contents=picture, media_type="image/png"))
 
 
 def point_bar(coloring: Coloring) -> Bar:
@@ -75,11 +78,6 @@ def displacement_wheel() -> NDArray[np.uint8]:
     return wheel
 
 
-def _log_bar(rec: Subtree, path: str, bar: Bar) -> None:
-    rec.log_once(path, rr.Image(np.tile(bar.strip, (BAR_HEIGHT, 1, 1))))
-    positions = [(BAR_WIDTH * place, 0.0) for place in bar.labels]
-    rec.log_once(f"{path}/labels", _labels(positions, list(bar.labels.values()), [colors.REFERENCE] * len(positions)))
-
-
-def _labels(positions: list[tuple[float, float]], labels: list[str], label_colors: list[colors.Rgb]) -> rr.Points2D:
-    return rr.Points2D(positions, labels=labels, colors=label_colors, radii=rr.Radius.ui_points(5.0), show_labels=True)
+def _log_bar(rec: Subtree, path: str, bar: Bar, height: int) -> None:
+    picture = bar_png(bar.strip, bar.labels, height)
+    rec.log_once(path, rr.EncodedImage(contents=picture, media_type="image/png"))

@@ -32,6 +32,24 @@ def certainty_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr
     return rr.Image(picture)
 
 
+def subcell_match(scale: ScaleTrace) -> NDArray[np.float32]:
+    """``[h, w, 2]`` float32 displacement ``(dx, dy)`` in cells: the mean of the most probable one and its neighbours.
+
+    The last stages move points by less than a cell, which the most probable one alone would not show.
+    """
+    down, across = scale.probability.shape[:2]
+    padded = np.pad(scale.probability.astype(np.float32), ((1, 1), (1, 1), (0, 0), (0, 0)))
+    rows, columns = np.indices(scale.occupied.shape)
+    dx, dy = scale.best[..., 0], scale.best[..., 1]
+    total, moment = np.zeros(scale.occupied.shape, np.float32), np.zeros((*scale.occupied.shape, 2), np.float32)
+    for step_y in (-1, 0, 1):
+        for step_x in (-1, 0, 1):
+            share = padded[dy + down // 2 + 1 + step_y, dx + across // 2 + 1 + step_x, rows, columns]
+            total += share
+            moment += share[..., None] * np.array([step_x, step_y], np.float32)
+    return (scale.best + moment / np.maximum(total, 1e-6)[..., None]).astype(np.float32)
+
+
 def reach_px(scale: ScaleTrace) -> float:
     """Longest displacement in pixels along one axis that the search window holds."""
     return scale.stride * float(max(scale.volume.shape[0] // 2, scale.volume.shape[1] // 2))

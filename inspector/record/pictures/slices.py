@@ -10,6 +10,8 @@ from calibnet.trace import ScaleTrace
 from inspector import colors
 from inspector.record.pictures.channel_grid import palette_png, slice_grid
 
+INSET = 0.15
+"""How far a frame lies within another of the same tile, in heights of the tile."""
 BRIGHTEST_PERCENTILE = 90.0
 """Of the cells' peak probabilities: what is as probable is drawn brightest."""
 
@@ -31,23 +33,18 @@ def slice_marks(scale: ScaleTrace, true: NDArray[np.float32] | None) -> rr.Boxes
     """
     down, across, height, width = scale.probability.shape
     middle = np.array([across // 2, down // 2])
-    marked = [("now", np.zeros(2, dtype=int), colors.INITIAL)]
-    marked.append(("won most cells", _most_common(scale.best[scale.occupied]), colors.FOUND))
+    marked = [(np.zeros(2, dtype=int), colors.INITIAL)]
+    marked.append((_most_common(scale.best[scale.occupied]), colors.FOUND))
     if true is not None and scale.occupied.any():
         typical = np.rint(np.median(true[scale.occupied], axis=0) / scale.stride).astype(int)
-        marked.append(("true", np.clip(typical, -middle, middle), colors.REFERENCE))
-    names: dict[tuple[int, ...], tuple[str, colors.Rgb]] = {}
-    for name, cell, color in marked:  # one frame a tile: names that share one are joined
-        known = names.get(tuple(cell))
-        names[tuple(cell)] = (f"{known[0]}, {name}" if known else name, color)
-    tile = np.array([width + 1, height + 1])
-    return rr.Boxes2D(
-        mins=[(middle + cell) * tile for cell in names],
-        sizes=[tile for _ in names],
-        colors=[color for _, color in names.values()],
-        labels=[name for name, _ in names.values()],
+        marked.append((np.clip(typical, -middle, middle), colors.REFERENCE))
+    tile, cells = np.array([width + 1, height + 1]), [tuple(cell) for cell, _ in marked]
+    inset = [INSET * tile.min() * cells[:position].count(cell) for position, cell in enumerate(cells)]
+    return rr.Boxes2D(  # frames of one tile lie within each other
+        mins=[(middle + cell) * tile + by for cell, by in zip(cells, inset, strict=True)],
+        sizes=[tile - 2 * by for by in inset],
+        colors=[color for _, color in marked],
         radii=rr.Radius.ui_points(2.0),
-        show_labels=True,
     )
 
 

@@ -145,7 +145,7 @@ def _log_displacement(rec: Subtree, number: int, results: StageDetail) -> None:
             origins=np.stack([columns + 0.5, rows + 0.5], axis=1),
             vectors=results.displacement[rows, columns] / finest.stride,
             colors=ARROW_COLOR,
-            radii=rr.Radius.ui_points(0.7),
+            radii=rr.Radius.ui_points(1.2),
         ),
     )
     rec.log(confidence(number), certainty_image(results.confidence, seen))

@@ -16,12 +16,12 @@ from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Grid, Layout, Observation, StageLayout
 from inspector.record.pictures.legends import log_map_legends, log_names
-from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
+from inspector.record.pictures.maps import certainty_image, flow_image, reach_px, subcell_match
 from inspector.record.pictures.matches import StartingPoints, chosen_match
 from inspector.record.pictures.search_window import SearchWindow
 from inspector.record.pictures.slices import slice_marks, slices_picture
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, image_view, map_legends, names_legend, tensor_view
+from inspector.record.tabs.views import View, image_view, legend, map_legends, tensor_view, with_legend
 
 NAME = "Cost volumes"
 
@@ -31,7 +31,7 @@ COST_VOLUME = "cost_volume"
 PROBABILITY = "probability"
 """The aggregated volume, a softmax over the window, as a tensor ``dy, dx, y, x``."""
 BEST_MATCH = "best_match"
-"""Displacement of the most probable cell, as flow colours."""
+"""Displacement that is the most probable, in fractions of a cell, as flow colours."""
 TRUE_MATCH = "true_match"
 """Displacement to where the reference puts each cell's point, as flow colours."""
 PEAK_PROBABILITY = "peak_probability"
@@ -49,6 +49,8 @@ WINDOW_TRUTH = f"{WINDOW}/truth"
 CHOSEN_CELL = "chosen_cell"
 """A frame around the chosen cell, drawn over the maps."""
 
+LEGEND_SLICES = "legend/slices"
+"""What the frames among the slices stand for."""
 LEGEND_WINDOW = "legend/window"
 """What the marks in the search window stand for."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
@@ -61,11 +63,13 @@ def wanted(layout: Layout) -> bool:
 
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log what the colours of the maps and the marks in the window stand for."""
-    if Part.VOLUMES not in layout.contents.parts:
-        return
-    log_map_legends(rec)
-    marks = {"now": colors.INITIAL, "won": colors.FOUND}
-    log_names(rec, LEGEND_WINDOW, marks | ({"true": colors.REFERENCE} if layout.has_reference else {}))
+    true = {"true": colors.REFERENCE} if layout.has_reference else {}
+    if Part.TENSORS in layout.contents.parts:
+        marks = {"tile of no displacement": colors.INITIAL, "won most cells": colors.FOUND}
+        log_names(rec, LEGEND_SLICES, marks | true)
+    if Part.VOLUMES in layout.contents.parts:
+        log_map_legends(rec)
+        log_names(rec, LEGEND_WINDOW, {"now": colors.INITIAL, "won": colors.FOUND} | true)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
@@ -90,13 +94,14 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
         name = "Which displacement won" if Part.TENSORS in parts else stage.title
         pages.append(_maps_page(stage, layout, name))
     if Part.TENSORS in parts:
-        pages.append(rrb.Vertical(*(_slice_row(stage.number, grid) for grid in stage.grids), name="All displacements"))
+        slices = rrb.Vertical(*(_slice_row(stage.number, grid) for grid in stage.grids))
+        pages.append(with_legend(slices, legend("Framed tiles", LEGEND_SLICES), "All displacements"))
         return rrb.Tabs(*pages, name=stage.title)
     return pages[0]
 
 
 def _maps_page(stage: StageLayout, layout: Layout, name: str) -> View:
-    legends = map_legends(names_legend("Marks in the window", LEGEND_WINDOW, 3 if layout.has_reference else 2))
+    legends = map_legends(legend("Marks in the window", LEGEND_WINDOW))
     rows = [_map_row(stage.number, grid, layout) for grid in stage.grids]
     return rrb.Vertical(*rows, legends, row_shares=[1.0] * len(rows) + [0.35], name=name)
 
@@ -150,7 +155,7 @@ def _log_stage(
 def _log_maps(rec: Subtree, number: int, scale: ScaleTrace, true: NDArray[np.float32] | None) -> None:
     """Which displacement won in every cell, how surely, and which is the true one."""
     stride, reach = scale.stride, reach_px(scale)
-    best = flow_image(scale.best * stride, reach, scale.occupied)
+    best = flow_image(subcell_match(scale) * stride, reach, scale.occupied)
     rec.log(entities.of_scale(number, stride, BEST_MATCH), best)
     peak = certainty_image(scale.probability.max(axis=(0, 1)), scale.occupied)
     rec.log(entities.of_scale(number, stride, PEAK_PROBABILITY), peak)

@@ -6,7 +6,7 @@ so, whatever else is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
@@ -19,8 +19,11 @@ from calibnet.verdict import Verdict
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
+from inspector.record.pictures.frame_overlays import FrameOverlays
+from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, curve_view
+from inspector.record.tabs.table import matrix_lines
+from inspector.record.tabs.views import View, curve_view, legend, with_legend
 from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NAME = "Whole drive as one"
@@ -30,12 +33,13 @@ BAND = 2.0
 PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
 """Of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
+LEGEND_CURVES = "legend/drive"
+"""The names of the curves in their colours."""
 CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT}
 """Of every parameter, with their colours."""
 
 
-VERDICT_TEXT = "drive/verdict"
-"""Verdict on the estimate, how sure it is, and the frames that were left out, as text."""
+NOT_YET = "# Not solved yet\n\nThe whole drive is solved as one when the last of its frames is calibrated."
 TEXT_SHARE = 0.24
 """Of the tab's width that it takes."""
 
@@ -57,6 +61,9 @@ def wanted(layout: Layout) -> bool:
 
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log the names and colours of the curves."""
+    names = {"estimate from the frames so far": colors.FOUND, f"± {BAND:g} standard deviations": colors.LIMIT}
+    log_names(rec, LEGEND_CURVES, names)
+    rec.log_once(entities.DRIVE_TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
     for name in PARAMETERS:
         for kind, color in CURVES.items():
             label = {"upper": f"+{BAND:g} σ", "lower": f"-{BAND:g} σ"}.get(kind, kind)
@@ -74,6 +81,7 @@ def log_drive(
     reference: Extrinsic | None,
     seconds: Mapping[int, float],
     given: Verdict | None = None,
+    remarks: Sequence[str] = (),
 ) -> None:
     """Log the estimate after each frame of its history, on the frames' own times.
 
@@ -83,9 +91,11 @@ def log_drive(
         reference: that curves are relative to; without one, the estimate of all frames.
         seconds: time of every recorded frame by its index.
         given: verdict on the extrinsic that the drive started from, where that was to be verified.
+        remarks: what else is to be said beside it, of its frames one by one.
     """
-    text = rr.TextDocument("\n".join(_lines(estimate, reference, given)), media_type=rr.MediaType.MARKDOWN)
-    rec.log_once(VERDICT_TEXT, text)
+    lines = _lines(estimate, reference, given, remarks)
+    text = rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
+    rec.log_for_all(entities.DRIVE_TEXT, text)
     origin = estimate.camera_from_lidar if reference is None else reference
     for frame, current in estimate.history:
         rec.set_frame(frame, seconds.get(frame, 0.0))
@@ -104,22 +114,38 @@ def view(layout: Layout) -> View:
         curve_view(f"{name.capitalize()} off {zero} [{unit}]", f"/{parameter(name)}")
         for name, unit in PARAMETERS.items()
     ]
-    text = rrb.TextDocumentView(origin=VERDICT_TEXT, name="Verdict")
-    return rrb.Horizontal(text, rrb.Grid(*views, grid_columns=3), column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
+    text = rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="Verdict")
+    curves = with_legend(rrb.Grid(*views, grid_columns=3), legend("Curves", LEGEND_CURVES), "Curves")
+    return rrb.Horizontal(text, curves, column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
 
 
-def _lines(estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None) -> list[str]:
-    """Verdicts, frames and, where they are known, errors, as Markdown."""
+def log_drive_overlay(rec: Subtree, observation: Observation, contents: Contents, verdict: Verdict | None) -> None:
+    """Log a frame's points under the drive's extrinsic, which the observation's trace starts from."""
+    rec.set_frame(observation.frame.index, observation.frame.timestamp)
+    name = "whole drive as one" if verdict is None else f"whole drive, {verdict.word}"
+    color = colors.LETTERS if verdict is None else colors.VERDICTS[verdict.word]
+    overlays = FrameOverlays(observation, contents)
+    overlays.log(rec, entities.OVERLAY_DRIVE, name, observation.trace.initial, color)
+
+
+def _lines(
+    estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None, remarks: Sequence[str]
+) -> list[str]:
+    """Verdicts, errors where they are known, frames and the matrix, as Markdown."""
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     if estimate.verdict is not None:
         lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
-    lines += [f"Solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}.", ""]
+    solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"
     if reference is not None:
         error = pose_error(estimate.camera_from_lidar, reference)
-        lines += [f"Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm.", ""]
+        lines += [f"**Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm**, {solved}.", ""]
+    else:
+        lines += [f"{solved.capitalize()}.", ""]
+    for remark in remarks:
+        lines += [remark, ""]
     if estimate.skipped:
         lines += ["Skipped:", "", *(f"- frame {bad.frame}: {bad.why}" for bad in estimate.skipped), ""]
-    return lines
+    return [*lines, *matrix_lines("The drive's", estimate.camera_from_lidar)]
 
 
 def offset(error: PoseError, name: str) -> float:

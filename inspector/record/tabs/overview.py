@@ -1,5 +1,7 @@
-"""Tab *Overview*: the start, the result and the reference over the image, error curves over the frames, the table.
+"""Tab *Overview*: the answer first, as one large picture and in words.
 
+The picture can be changed for that of the start, of the reference and, where all frames are solved as one, of a single
+frame's result; below it are the curves over the frames, and small pictures of start and reference.
 Its overlays are in every recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
 """
 
@@ -15,27 +17,38 @@ from calibnet.verdict import REJECTED
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation
+from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.frame_overlays import frame_overlays
-from inspector.record.pictures.legends import log_point_legend
+from inspector.record.pictures.legends import log_names, log_point_legend
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import (
-    LARGEST_OVERLAY,
     LEGEND_HEIGHT,
     SCREEN_HEIGHT,
     SCREEN_WIDTH,
     TITLE_HEIGHT,
     View,
     curve_view,
+    legend,
     overlay_view,
     point_legend,
 )
 
 NAME = "Overview"
 
+LARGE_SHARE = 0.62
+"""Of the tab's width that the large picture takes."""
+LARGEST_OVERLAY = 600.0
+"""Height in pixels beyond which what lies below it would have too little room."""
+SMALL_SHARE = 0.3
+"""Height of the small pictures, in heights of the text above them."""
+_SMALL = (entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_REFERENCE)
+
 FIT = "fit"
 """Curves of the error in pixels of the frame's image that the stages expect of their matches."""
 FIT_LIMIT = f"{FIT}/limit"
 """The match error up to which the last stage's result is believed."""
+LEGEND_CURVES = "legend/curves"
+"""The names of the curves in their colours."""
 SUCCESS = {"rotation": 1.0, "translation": 2.5}
 """Limits of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
 
@@ -62,7 +75,9 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     trace, reference = observation.trace, observation.reference
     overlays = frame_overlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
-    overlays.log(rec, entities.OVERLAY_CORRECTED, _result(trace), trace.corrected)
+    word = "" if trace.verdict is None else trace.verdict.word
+    color = colors.VERDICTS.get(word, colors.LETTERS)
+    overlays.log(rec, entities.OVERLAY_CORRECTED, _result(trace), trace.corrected, color)
     if reference is not None:
         overlays.log_reference(rec, entities.OVERLAY_REFERENCE, reference)
     if Part.CURVES in contents.parts:
@@ -78,37 +93,56 @@ def _result(trace: CascadeTrace) -> str:
 
 
 def view(layout: Layout) -> View:
-    """Overlays side by side, their legend, and below them curves beside the table."""
-    overlays = [
-        overlay_view(layout.start, entities.OVERLAY_MISCALIBRATED, layout.image),
-        overlay_view("Corrected", entities.OVERLAY_CORRECTED, layout.image),
-    ]
+    """The large picture above curves, and beside them what is to be said of it."""
+    names = {"Corrected": entities.OVERLAY_CORRECTED, layout.start: entities.OVERLAY_MISCALIBRATED}
+    if layout.with_drive:
+        names = {"Whole drive as one": entities.OVERLAY_DRIVE} | names
     if layout.has_reference:
-        overlays.append(overlay_view("Reference (truth)", entities.OVERLAY_REFERENCE, layout.image))
-    below: View = rrb.TextDocumentView(origin=entities.TABLE, name="Verdict, and what every stage did to this frame")
+        names["Reference (truth)"] = entities.OVERLAY_REFERENCE
+    pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
+    left: list[View] = [rrb.Tabs(*pictures, active_tab=0, name="Result"), point_legend(layout)]
+    shares = [_large_height(layout), LEGEND_HEIGHT]
     if layout.stages and Part.CURVES in layout.contents.parts:
-        below = rrb.Horizontal(rrb.Vertical(*_curve_views(layout)), below, column_shares=[1.0, 1.0])
-    width, height = layout.image
-    overlay = min(SCREEN_WIDTH / len(overlays) * height / width + TITLE_HEIGHT, LARGEST_OVERLAY)
-    return rrb.Vertical(
-        rrb.Horizontal(*overlays),
-        point_legend(layout),
-        below,
-        row_shares=[overlay, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - overlay],
+        curves = rrb.Horizontal(*_curve_views(layout))
+        left += [curves, legend("Curves", LEGEND_CURVES)]
+        shares += [SCREEN_HEIGHT - sum(shares) - LEGEND_HEIGHT, 0.8 * LEGEND_HEIGHT]
+    said: list[View] = [rrb.TextDocumentView(origin=entities.TABLE, name="This frame: what every stage did")]
+    if layout.with_drive:
+        said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The whole drive as one: the answer"))
+    small = [overlay_view(name, path, layout.image, caption=False) for name, path in names.items() if path in _SMALL]
+    right = [*said, rrb.Horizontal(*small)]
+    return rrb.Horizontal(
+        rrb.Vertical(*left, row_shares=shares),
+        rrb.Vertical(*right, row_shares=[1.0] * len(said) + [SMALL_SHARE * len(said)]),
+        column_shares=[LARGE_SHARE, 1.0 - LARGE_SHARE],
         name=NAME,
     )
 
 
+def _large_height(layout: Layout) -> float:
+    """Of the large picture with its caption, its title and the row of names above, in pixels of the screen."""
+    width, height = layout.image
+    picture = LARGE_SHARE * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
+    return min(picture + 2 * TITLE_HEIGHT, LARGEST_OVERLAY)
+
+
 def _curve_views(layout: Layout) -> list[View]:
-    """The errors of every stage over the frames, where they are known, and the match errors that stages expect."""
+    """The errors after every stage over the frames, where they are known, and the match errors that stages expect.
+
+    The initial error is not among them: it is so large that the stages' would lie on zero. The table has it.
+    """
     kinds = entities.ERROR_KINDS.items() if layout.has_reference else ()
     errors = [
         curve_view(
-            f"{kind.capitalize()} error [{unit}]", f"error/{kind}", "$origin/**", f"- /{entities.error_corrected(kind)}"
+            f"{kind.capitalize()} error [{unit}]",
+            f"error/{kind}",
+            "$origin/**",
+            f"- /{entities.error_corrected(kind)}",
+            f"- /{entities.error_initial(kind)}",
         )
         for kind, unit in kinds
     ]
-    return [*errors, curve_view("Fit of picture and scan: matches expected to be off by [px]", FIT)]
+    return [*errors, curve_view("Fit: matches off by [px]", FIT)]
 
 
 def _log_errors(rec: Subtree, observation: Observation) -> None:
@@ -138,6 +172,7 @@ def _log_fit(rec: Subtree, observation: Observation) -> None:
 
 def _log_curve_styles(rec: Subtree, layout: Layout) -> None:
     looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
+    log_names(rec, LEGEND_CURVES, {f"after {name}": color for name, color in looks.values()} | {"limit": colors.LIMIT})
     curves = {fit_stage(number): look for number, look in looks.items()}
     limits = {FIT_LIMIT: "believed: below"}
     for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():

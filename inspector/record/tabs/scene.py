@@ -20,7 +20,7 @@ from inspector.record.observation import Layout, Observation, Xyz
 from inspector.record.pictures.cloud import seen_colors, subsample
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, names_legend, uncapitalized, with_legend
+from inspector.record.tabs.views import View, legend, uncapitalized, with_legend
 
 NAME = "3D"
 
@@ -101,8 +101,8 @@ def view(layout: Layout) -> View:
         _scene_view(name, through, list(dict.fromkeys([camera, *truth])), layout)
         for name, (through, camera) in seen.items()
     ]
-    legend = names_legend("Cameras", LEGEND_CAMERAS, len(layout.stages) + (2 if layout.has_reference else 1))
-    return rrb.Tabs(with_legend(rrb.Horizontal(*views), legend, "Side by side"), *pages, name=NAME)
+    side_by_side = with_legend(rrb.Horizontal(*views), legend("Cameras", LEGEND_CAMERAS), "Side by side")
+    return rrb.Tabs(side_by_side, *pages, name=NAME)
 
 
 def _frustum(

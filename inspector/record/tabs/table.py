@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 
 from calibnet.geometry import RANGES, PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace
 from inspector import entities
 from inspector.record.observation import Observation
@@ -17,8 +18,9 @@ from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NOTHING = "–"
 READING_AID = (
-    "Where the calibration is right, jumps in the points' colours lie on the edges of the picture. "
-    "Play the timeline `step` with *Cascade / Step by step* in front to watch each frame being corrected."
+    "Where the calibration is right, jumps in the points' colours lie on the edges of the picture: change between the "
+    "pictures by their names above them. Play the timeline `step` with *Cascade / Step by step* in front to watch each "
+    "frame being corrected."
 )
 
 
@@ -125,8 +127,13 @@ def _per_axis(error: PoseError) -> list[str]:
 
 
 def _extrinsic(trace: CascadeTrace) -> list[str]:
-    rows = (" ".join(f"{value:9.5f}" for value in row) for row in trace.corrected[:3])
-    return [f"{'Uncorrected' if trace.rejected else 'Corrected'} `camera_from_lidar` (metres)", "```", *rows, "```"]
+    return matrix_lines("Uncorrected" if trace.rejected else "Corrected", trace.corrected)
+
+
+def matrix_lines(which: str, camera_from_lidar: Extrinsic) -> list[str]:
+    """An extrinsic as Markdown."""
+    rows = (" ".join(f"{value:9.5f}" for value in row) for row in camera_from_lidar[:3])
+    return [f"{which} `camera_from_lidar` (metres)", "```", *rows, "```"]
 
 
 def _error(error: PoseError | None) -> list[str]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import rerun as rr
 import rerun.blueprint as rrb
 
-from inspector import entities
+from inspector import colors, entities
 from inspector.record.contents import Coloring
 from inspector.record.observation import Grid, Layout
-from inspector.record.pictures.legends import LEGEND_SPACING
+from inspector.record.pictures.captions import caption_strip
 
 SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
 """Pixels that tabs are laid out for."""
 LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
-LARGEST_OVERLAY = 390.0
-"""Height in pixels beyond which what lies below the overlays would have too little room."""
 LEGEND_SHARE = 0.06
 """Of a page's height that its legend takes."""
 DIMMED = 0.65
@@ -29,14 +27,27 @@ COLORED_BY = {
 View = rrb.View | rrb.Container
 
 
-def overlay_view(name: str, points: str, image: tuple[int, int] | None = None) -> rrb.Spatial2DView:
-    """Points over the frame's image; with its size, points and captions beyond it do not widen the view."""
-    bounds = None if image is None else rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(0.0, image[1]))
+def overlay_view(
+    name: str, points: str, image: tuple[int, int] | None = None, caption: bool = True
+) -> rrb.Spatial2DView:
+    """Points over the frame's image, and the caption above it.
+
+    Args:
+        name: of the view.
+        points: entity of the overlay.
+        image: size of the image; what lies beyond it and the caption does not widen the view then.
+        caption: show it; a small view has no room for letters that can be read.
+    """
+    bounds = None
+    if image is not None:
+        top = -float(caption_strip(image).height) if caption else 0.0
+        bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(top, image[1]))
     return rrb.Spatial2DView(
         origin="/",
-        contents=[f"/{entities.IMAGE}", f"/{points}/**"],
+        contents=[f"/{entities.IMAGE}", f"/{points}/**", *([] if caption else [f"- /{entities.caption(points)}"])],
         name=name,
         visual_bounds=bounds,
+        background=colors.GROUND,
         overrides={f"/{entities.IMAGE}": rr.EncodedImage.from_fields(opacity=DIMMED)},
     )
 
@@ -44,15 +55,17 @@ def overlay_view(name: str, points: str, image: tuple[int, int] | None = None) -
 def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> rrb.Spatial2DView:
     """A map and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
     if grid is None:
-        return rrb.Spatial2DView(origin=f"/{path}", name=name)
+        return rrb.Spatial2DView(origin=f"/{path}", name=name, background=colors.GROUND)
     bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))
     contents = ["$origin/**", *(f"/{mark}" for mark in marks)]
-    return rrb.Spatial2DView(origin=f"/{path}", contents=contents, name=name, visual_bounds=bounds)
+    return rrb.Spatial2DView(
+        origin=f"/{path}", contents=contents, name=name, visual_bounds=bounds, background=colors.GROUND
+    )
 
 
 def legend(name: str, path: str) -> rrb.Spatial2DView:
     """A static legend, without a title bar: its labels say it."""
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, titlebar=False)
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, titlebar=False, background=colors.GROUND)
 
 
 def point_legend(layout: Layout) -> rrb.Spatial2DView:
@@ -60,19 +73,11 @@ def point_legend(layout: Layout) -> rrb.Spatial2DView:
     return legend(COLORED_BY[layout.contents.color], entities.LEGEND_POINTS)
 
 
-def names_legend(name: str, path: str, count: int) -> rrb.Spatial2DView:
-    """So many names in their colours, in one row."""
-    bounds = rrb.VisualBounds2D(x_range=(-LEGEND_SPACING / 2, LEGEND_SPACING * (count - 0.5)), y_range=(-8.0, 16.0))
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds, titlebar=False)
-
-
 def map_legends(*more: View) -> View:
     """What the colours of displacements and of certainties stand for, and what else a page needs, in one row."""
     return rrb.Horizontal(
-        rrb.Spatial2DView(
-            origin=f"/{entities.LEGEND_DISPLACEMENT}", name="Displacement: hue = direction, white = none"
-        ),
-        rrb.Spatial2DView(origin=f"/{entities.LEGEND_CERTAINTY}", name="Probability, confidence"),
+        image_view("Displacement: hue = direction, white = none", entities.LEGEND_DISPLACEMENT),
+        image_view("Probability, confidence", entities.LEGEND_CERTAINTY),
         *more,
     )
 
@@ -83,12 +88,15 @@ def with_legend(view: View, below: View, name: str) -> View:
 
 
 def curve_view(name: str, origin: str, *contents: str) -> rrb.TimeSeriesView:
-    """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose."""
+    """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose.
+
+    Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them.
+    """
     return rrb.TimeSeriesView(
         origin=origin,
         contents=list(contents) or "$origin/**",
         name=name,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
 
 

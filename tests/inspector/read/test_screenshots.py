@@ -32,11 +32,55 @@ def test_the_first_picture_of_the_demo_is_complete(record: Callable[..., Any], t
         pages = viewer.pages()
     assert not complaints
     assert picture.shape == (1080, 1920, 3)
-    third = picture[80:280]
-    for left in (0, 640, 1280):  # three overlays side by side: colourful, not an empty view
-        panel = third[:, left : left + 640].astype(int)
-        assert (np.ptp(panel, axis=2) > 60).mean() > 0.1
+    large, small = picture[240:520, :1180], picture[900:1030, 1200:]  # colourful, not empty views
+    for panel in (large, small):
+        assert (np.ptp(panel.astype(int), axis=2) > 60).mean() > 0.1
     stems = [file_stem(page) for page in pages]
     assert stems[0] == "overview"
     assert {"cascade-all-stages", "hourglass-stage-3", "3d-side-by-side"} <= set(stems)
     assert len(set(stems)) == len(stems)
+
+
+def nested(root: str) -> dict[str, Any]:
+    """A user's layout: our tabs beside a view of theirs that differs in nothing from the viewer's defaults."""
+    tabs = {"container_kind": "Tabs", "contents": ["view/1", "container/inner"], "display_name": "left"}
+    user = {"container_kind": "Horizontal", "contents": ["container/tabs", "view/9"]}
+    inner = {"container_kind": "Tabs", "contents": ["view/2", "view/3"], "display_name": "Cascade"}
+    return {
+        "/viewport": {"ViewportBlueprint": {"root_container": root}},
+        "/container/user": {"ContainerBlueprint": user},
+        "/container/tabs": {"ContainerBlueprint": tabs},
+        "/container/inner": {"ContainerBlueprint": inner},
+        "/view/1": {"ViewBlueprint": {"display_name": "Overview"}},
+        "/view/2": {"ViewBlueprint": {"display_name": "All stages"}},
+        "/view/3": {"ViewBlueprint": {"display_name": "Stage 3"}},
+    }
+
+
+class Blueprints:
+    def __init__(self, blueprint: dict[str, Any]) -> None:
+        self.blueprint = blueprint
+
+    def get_blueprint(self) -> Blueprints:
+        return self
+
+    def set_blueprint(self, blueprint: dict[str, Any], of: str) -> None:
+        self.blueprint = blueprint
+
+
+@pytest.mark.parametrize("root", ["tabs", "user"])
+def test_pages_are_found_wherever_the_tabs_lie(root: str) -> None:
+    viewer = HeadlessViewer()
+    viewer.client = Blueprints(nested(root))  # type: ignore[assignment]
+    assert viewer.pages() == [("Overview",), ("Cascade", "All stages"), ("Cascade", "Stage 3")]
+    viewer.show(("Cascade", "Stage 3"))
+    shown = viewer.client.get_blueprint().blueprint
+    active = [shown[f"/container/{name}"]["ContainerBlueprint"]["active_tab"] for name in ("tabs", "inner")]
+    assert active == ["container/inner", "view/3"]
+
+
+def test_a_layout_without_tabs_is_one_page() -> None:
+    viewer = HeadlessViewer()
+    viewer.client = Blueprints({"/viewport": {"ViewportBlueprint": {"root_container": "gone"}}})  # type: ignore[assignment]
+    assert viewer.pages() == [()]
+    viewer.show(())

@@ -173,7 +173,7 @@ def test_a_rejected_frame_is_shown_as_it_was(
     file = tmp_path / "doubted.rrd"
     causes = (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
     summary = record(file, detail="overview", doubted=(1,), unsure=(2,), causes=causes)
-    captions = [row.as_py()[0] for _, row in read(file, "overlay/corrected/caption", "Points2D:labels")]
+    captions = [row.as_py()[0] for _, row in read(file, "overlay/corrected/caption", "text")]
     told = [caption.partition(":")[0] for caption in captions]
     assert told == ["corrected, accepted", "rejected, left as it was", "corrected, cannot tell"]
     shown, given = (

@@ -96,7 +96,11 @@ def test_below_a_prefix_every_path_of_every_view_has_it() -> None:
     for one, other in views:
         assert other.origin == f"/car/left/{one.origin.lstrip('/')}".rstrip("/")
         assert set(other.visualizer_overrides) == {f"/car/left{path}" for path in one.visualizer_overrides}
-    assert queries(moved, "Rotation error [deg]") == ["$origin/**", "- /car/left/error/rotation/corrected"]
+    assert queries(moved, "Rotation error [deg]") == [
+        "$origin/**",
+        "- /car/left/error/rotation/corrected",
+        "- /car/left/error/rotation/initial",
+    ]
     assert queries(moved, "Corrected") == ["/car/left/image", "/car/left/overlay/corrected/**"]
     assert queries(moved, "Yaw off the reference [deg]") == ["$origin/**"]
 

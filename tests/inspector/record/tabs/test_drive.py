@@ -16,9 +16,10 @@ from calibnet.geometry import miscalibration, transform
 from calibnet.geometry.types import Transform
 from calibnet.trace import DriveEstimate, Estimate
 from calibnet.verdict import BadFrame, Cause, Verdict
+from inspector import entities
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.drive import VERDICT_TEXT, curve, deviation, drive_sentence, log_drive
+from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive
 from tests.support.fakes import FakeCascade
 
 REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.0, -0.1, -0.2])
@@ -71,9 +72,10 @@ def test_deviations_have_the_units_of_their_curves() -> None:
 
 def shown(file: Path) -> str:
     """The text beside the curves."""
-    (chunk,) = RrdReader(file).store().stream().filter(content=f"/{VERDICT_TEXT}")
-    text: str = chunk.to_record_batch()["TextDocument:text"].to_pylist()[0][0]
-    return text
+    chunks = RrdReader(file).store().stream().filter(content=f"/{entities.DRIVE_TEXT}")
+    first, last = [chunk.to_record_batch()["TextDocument:text"].to_pylist()[0][0] for chunk in chunks]
+    assert first.startswith("# Not solved yet")
+    return str(last)
 
 
 def test_the_verdict_is_recorded_and_shown_with_what_was_skipped(
