@@ -34,8 +34,8 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
     """
     write_report_of(recording, out)
     if with_viewer:
-        from inspector.report.serve import fetch_viewer
         from inspector.report.write import VIEWER
+        from inspector.serving.viewer_files import fetch_viewer
 
         fetch_viewer(out / VIEWER)
     if serve:
@@ -57,11 +57,13 @@ def serve_report(folder: Path) -> None:
     """Serve a report and the viewer until Ctrl-C or SIGTERM; open the browser where there is a display."""
     from calibnet.runtime.interruption import StopRequest
     from inspector.record.outputs import has_display
-    from inspector.report.serve import ReportServer, fetch_viewer, served_files
+    from inspector.report.serve import report_app
+    from inspector.serving.server import PageServer
+    from inspector.serving.viewer_files import fetch_viewer
 
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
         fetch_viewer(Path(viewer))
-        with StopRequest() as stop, ReportServer(served_files(folder, Path(viewer))) as server:
+        with StopRequest() as stop, PageServer(report_app(folder, Path(viewer))) as server:
             say(f"Serving at {server.address} until Ctrl-C.")
             if has_display():
                 webbrowser.open(server.address)

@@ -1,0 +1,69 @@
+"""What stands before every page: requests from elsewhere and without the token get nothing.
+
+A page on the web could let a name of its own point to 127.0.0.1 and read what is served here, so the Host header has to
+name this server. Other users of this machine can reach it as well, so every path begins with a random token, which only
+the printed address has. Answers forbid pages to load anything from elsewhere.
+"""
+
+from __future__ import annotations
+
+import secrets
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
+
+LOCALHOST = "127.0.0.1"
+TOKEN_BYTES = 18
+
+
+def new_token() -> str:
+    """A path part that nobody can guess."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
+
+
+class Guard:
+    """ASGI middleware that checks Host, Origin and token, and takes the token off the path."""
+
+    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+        """Stand before an app.
+
+        Args:
+            app: knows nothing of the token.
+            port: that the server listens on.
+            token: of `new_token`.
+        """
+        self._app = app
+        self._hosts = {f"{LOCALHOST}:{port}", f"localhost:{port}"}
+        self._token = token
+        live = " ".join(f"ws://{host}" for host in sorted(self._hosts))
+        self._headers = {
+            "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+            f"connect-src 'self' data: blob: {live}; frame-ancestors 'self'; form-action 'self'; base-uri 'none'",
+            "cross-origin-resource-policy": "same-origin",
+            "referrer-policy": "no-referrer",
+            "x-content-type-options": "nosniff",
+        }
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer 403 to strangers and 404 without the token; a websocket of theirs is not opened."""
+        headers = Headers(scope=scope)
+        origin = headers.get("origin")
+        allowed = headers.get("host") in self._hosts and (origin is None or urlsplit(origin).netloc in self._hosts)
+        token, _, path = str(scope["path"]).lstrip("/").partition("/")
+        known = secrets.compare_digest(token.encode(), self._token.encode())
+        if not (allowed and known):
+            refusal = PlainTextResponse("Forbidden", 403) if not allowed else PlainTextResponse("Not found", 404)
+            refused: ASGIApp = WebSocketClose() if scope["type"] == "websocket" else refusal
+            await refused(scope, receive, send)
+            return
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(self._headers)
+            await send(message)
+
+        inner = dict(scope) | {"path": f"/{path}", "raw_path": f"/{path}".encode()}
+        await self._app(inner, receive, send_guarded)

@@ -1,0 +1,67 @@
+"""A server for the pages of one command, on this machine only, which ends with it.
+
+The server is uvicorn, the apps are Starlette's: both know ranges, slow clients and clients
+that hang up.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from types import TracebackType
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from calibnet.errors import CalibnetError
+from inspector.serving.guard import LOCALHOST, Guard, new_token
+
+PATIENCE_S = 10.0
+KEEP_ALIVE_S = 15
+MOST_CONNECTIONS = 64
+"""Open at the same time; others are told to come again."""
+
+
+class PageServer:
+    """Serves an app while it is entered as a context.
+
+    Attributes:
+        address: where the app's root is, with the token that opens it.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        """Listen on a free port of this machine; `inspector.serving.guard.Guard` stands before the app."""
+        self._socket = socket.socket()
+        self._socket.bind((LOCALHOST, 0))
+        port, token = int(self._socket.getsockname()[1]), new_token()
+        self.address = f"http://{LOCALHOST}:{port}/{token}/"
+        config = uvicorn.Config(
+            Guard(app, port, token),
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=1,
+            limit_concurrency=MOST_CONNECTIONS,
+            ws_max_size=1 << 20,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(target=self._server.run, args=([self._socket],), daemon=True)
+
+    def __enter__(self) -> PageServer:
+        self._thread.start()
+        deadline = time.monotonic() + PATIENCE_S
+        while not self._server.started:
+            if not self._thread.is_alive() or time.monotonic() > deadline:
+                raise CalibnetError("The server of pages does not start; is the machine out of ports or memory?")
+            time.sleep(0.01)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._server.should_exit = True
+        self._thread.join(PATIENCE_S)
+        self._socket.close()

@@ -1,0 +1,39 @@
+"""The files of Rerun's web viewer, which the installed Rerun only hands out as a web server."""
+
+from __future__ import annotations
+
+import shutil
+import urllib.request
+from pathlib import Path
+from urllib.error import URLError
+
+from calibnet.errors import CalibnetError
+from inspector.record.outputs import Outputs
+
+VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
+
+
+class ViewerFilesError(CalibnetError):
+    """The web viewer's files cannot be had from the installed Rerun."""
+
+
+def fetch_viewer(folder: Path) -> None:
+    """Get the web viewer's files (43 MB) from the installed Rerun.
+
+    Raises:
+        CalibnetError: Rerun does not start, or does not have them.
+    """
+    outputs = Outputs(serve=True)
+    try:
+        outputs.open()
+        address, _, _ = str(outputs.page).partition("?")
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in VIEWER_FILES:
+            with urllib.request.urlopen(f"{address}{name}", timeout=60) as answer, (folder / name).open("wb") as file:
+                shutil.copyfileobj(answer, file)
+    except URLError as error:
+        raise ViewerFilesError(
+            f"The installed Rerun does not hand out its web viewer ({error.reason}); reinstall rerun-sdk."
+        ) from None
+    finally:
+        outputs.close()

@@ -1,0 +1,112 @@
+"""The server of pages: this machine only, this host only, and nothing without the token."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+import pytest
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from inspector.serving.server import PageServer
+
+
+async def page(request: Request) -> PlainTextResponse:
+    return PlainTextResponse(request.url.path)
+
+
+async def echo(socket: WebSocket) -> None:
+    await socket.accept()
+    await socket.send_text(await socket.receive_text())
+    await socket.close()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[PageServer]:
+    with PageServer(Starlette(routes=[WebSocketRoute("/live", echo), Route("/{path:path}", page)])) as running:
+        yield running
+
+
+def status(server: PageServer, path: str | None = None, **headers: str) -> int:
+    address = urlsplit(server.address)
+    connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=10)
+    connection.request("GET", address.path if path is None else path, headers=headers)
+    answer = connection.getresponse()
+    answer.read()
+    connection.close()
+    return answer.status
+
+
+def test_the_app_knows_nothing_of_the_token(server: PageServer) -> None:
+    address = urlsplit(server.address)
+    connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=10)
+    connection.request("GET", f"{address.path}a/b?c=d")
+    answer = connection.getresponse()
+    assert (answer.status, answer.read()) == (200, b"/a/b")
+    assert "default-src 'self'" in str(answer.headers["content-security-policy"])
+    assert answer.headers["referrer-policy"] == "no-referrer"
+    connection.close()
+
+
+@pytest.mark.parametrize("path", ["/", "/live", "/wrong/", "//", "/%00/"])
+def test_without_the_token_nothing_is_found(server: PageServer, path: str) -> None:
+    assert status(server, path) == 404
+
+
+def test_tokens_differ_and_are_long(server: PageServer) -> None:
+    other = PageServer(Starlette())
+    tokens = {urlsplit(one.address).path.strip("/") for one in (server, other)}
+    assert len(tokens) == 2 and min(map(len, tokens)) >= 24
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["evil.example", "localhost:{port}.evil.example", "127.0.0.1", "127.0.0.1:1", "localhost:x.evil.com", ""],
+)
+def test_another_host_is_refused(server: PageServer, host: str) -> None:
+    """A web page could let its own name point to 127.0.0.1 and read the page through it."""
+    port = urlsplit(server.address).port
+    assert status(server, Host=host.format(port=port)) == 403
+    assert status(server, Host=f"localhost:{port}") == 200
+
+
+def test_another_origin_is_refused(server: PageServer) -> None:
+    assert status(server, Origin="http://evil.example") == 403
+    assert status(server, Origin=server.address.rstrip("/").rpartition("/")[0]) == 200
+
+
+def test_websockets_are_guarded_alike(server: PageServer) -> None:
+    live = server.address.replace("http:", "ws:") + "live"
+    with connect(live) as socket_:
+        socket_.send("hello")
+        assert socket_.recv() == "hello"
+    address = urlsplit(server.address)
+    for uri, origin in ((f"ws://{address.netloc}/live", None), (live, "http://evil.example")):
+        with pytest.raises(InvalidStatus) as refused, connect(uri, origin=origin):  # type: ignore[arg-type]
+            pass
+        assert refused.value.response.status_code == 403
+
+
+def test_only_this_machine_can_connect(server: PageServer) -> None:
+    address = urlsplit(server.address)
+    assert address.hostname == "127.0.0.1"
+    with pytest.raises(ConnectionRefusedError):  # another of this machine's addresses: all of 127/8 are its own
+        socket.create_connection(("127.0.0.2", int(address.port or 0)), timeout=5)
+
+
+def test_it_ends_with_its_context() -> None:
+    with PageServer(Starlette(routes=[Route("/", page)])) as running:
+        assert status(running) == 200
+        address = urlsplit(running.address)
+        waiting = socket.create_connection((str(address.hostname), int(address.port or 0)), timeout=5)
+    waiting.close()  # a client that says nothing does not hold it
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection((str(address.hostname), int(address.port or 0)), timeout=5)
