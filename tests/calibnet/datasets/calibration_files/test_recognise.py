@@ -245,7 +245,7 @@ def test_an_extrinsic_in_any_form_and_either_direction(spelling, write):
         ("camera_from_lidar: {rpy_deg: [0, 0, 0]}", "has no 'translation'"),
         ("camera_from_lidar: {translation: [0, 0, 0], rpy_deg: [0, 0, 0], units: mm}", "an unknown 'units'"),
         (f"camera_from_lidar: {ROWS}\nlidar_from_camera: {ROWS}", "contradict each other"),
-        ("width: 640", "the key 'width' is there twice"),
+        ("width: 640", "the key 'width' is given twice"),
         ("distortion_model: omnidirectional", "has no key 'xi'"),
         ("distortion_model: equidistant", None),
         ("cloud_columns: [x, y, intensity]", "cloud_columns is"),
