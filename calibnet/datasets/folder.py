@@ -13,7 +13,8 @@ from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
 from calibnet.datasets.frame import Original
 from calibnet.datasets.images import read_image
-from calibnet.datasets.paired import FrameFiles, PairedSequence, Picture, check_paired, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, Picture, files_by_stem, require_folder
+from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
 from calibnet.datasets.scans import SCAN_SUFFIXES
 from calibnet.datasets.selection import spread
@@ -41,6 +42,7 @@ class Folder(PairedSequence):
         guess: Path | None = None,
         camera: str | None = None,
         frames: FrameChoice = BY_NAME,
+        max_time_difference: float | None = None,
     ) -> None:
         """Open a folder.
 
@@ -50,6 +52,7 @@ class Folder(PairedSequence):
             guess: a file with the extrinsic to start from, instead of that of the calibration, or where it has none.
             camera: its name, in a calibration file of several cameras.
             frames: names of the coordinate frames of camera and LiDAR, in a file of many.
+            max_time_difference: pair by time, what is at most so many milliseconds apart, see `pair`.
 
         Raises:
             DatasetError: one of them is missing, malformed or cannot be right, or images and scans do not pair.
@@ -59,7 +62,7 @@ class Folder(PairedSequence):
         require_folder(root, layout)
         images = files_by_stem(require_folder(root / "images", layout), IMAGE_SUFFIXES, "images")
         scans = files_by_stem(require_folder(root / "clouds", layout), SCAN_SUFFIXES, "scans")
-        check_paired(images, scans)
+        pairing = pair(images, scans, max_time_difference)
         self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
         assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None
         self._rectification = rectification(self.calibration.camera, list(images.values()))
@@ -67,20 +70,18 @@ class Folder(PairedSequence):
         remarks = [*of_lens(self.calibration.camera), *of_camera(pinhole), *of_extrinsic(extrinsic)]
         refuse(remarks, f"Calibration {calibration_path(root)}")
         self._fixed = Calibration(pinhole.matrix, extrinsic)
-        files = [
-            FrameFiles(number, PERIOD * position, image, scans[stem])
-            for position, (number, (stem, image)) in enumerate(zip(_numbers(list(images)), images.items(), strict=True))
-        ]
+        files = _frames(pairing.pairs)
         name = root.resolve().name
         super().__init__(f"folder/{name}", name, files)
-        self.notes = said_of(self._rectification)
+        self.notes = (*pairing.notes, *said_of(self._rectification))
 
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
 
     def _picture(self, files: FrameFiles) -> Picture:
-        image, camera = read_image(files.image), self._rectification.camera
-        check_size(image, camera, files.image)
+        path, camera = files.needed.image, self._rectification.camera
+        image = read_image(path)
+        check_size(image, camera, path)
         if camera.is_pinhole:
             return Picture(image)
         return Picture(self._rectification(image), Original(image, camera))
@@ -170,6 +171,16 @@ def check_size(image: NDArray[np.uint8], camera: CameraModel, path: Path) -> Non
             f"Image {path} is {width}x{height} and its calibration is for {camera.width}x{camera.height}; calibrate "
             "at the images' size or resize them."
         )
+
+
+def _frames(pairs: list[Pair]) -> list[FrameFiles]:
+    """The frames of pairs, numbered by their names, with their times or `PERIOD` from one to the next."""
+    known = [one.seconds for one in pairs if one.seconds is not None]
+    start = known[0] if len(known) == len(pairs) else None
+    return [
+        FrameFiles(number, PERIOD * position if start is None else (one.seconds or 0.0) - start, one.image, one.scan)
+        for position, (number, one) in enumerate(zip(_numbers([one.stem for one in pairs]), pairs, strict=True))
+    ]
 
 
 def _numbers(stems: list[str]) -> list[int]:

@@ -58,7 +58,7 @@ class KittiObject(PairedSequence):
         super().__init__(f"kitti-object/{split}", f"KITTI object detection, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
-        path = self._calibrations / f"{files.image.stem}.txt"
+        path = self._calibrations / f"{files.needed.image.stem}.txt"
         projection = f"P{self._camera}"
         rows = read_calibration_file(path, {projection: 12, "R0_rect": 9, "Tr_velo_to_cam": 12})
         velodyne = rows["Tr_velo_to_cam"].reshape(3, 4)

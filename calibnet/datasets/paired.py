@@ -21,14 +21,33 @@ from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
 
 
+class Both(NamedTuple):
+    """An image and the scan taken with it."""
+
+    image: Path
+    scan: Path
+
+
 @dataclass(frozen=True)
 class FrameFiles:
-    """The files of one frame, its number and its time in seconds since the first."""
+    """The files of one frame, its number and its time in seconds since the first; a file may be missing."""
 
     index: int
     timestamp: float
-    image: Path
-    scan: Path
+    image: Path | None
+    scan: Path | None
+
+    @property
+    def needed(self) -> Both:
+        """Both files.
+
+        Raises:
+            DatasetError: one is missing.
+        """
+        if self.image is None or self.scan is None:
+            there, what = (self.image, "scan") if self.scan is None else (self.scan, "image")
+            raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
+        return Both(self.image, self.scan)
 
 
 class Picture(NamedTuple):
@@ -54,8 +73,9 @@ class PairedSequence(ABC):
         self.rig = rig
         self.files = tuple(files)
         for file in self.files:
-            register_input(file.image)
-            register_input(file.scan)
+            for path in (file.image, file.scan):
+                if path is not None:
+                    register_input(path)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -73,13 +93,14 @@ class PairedSequence(ABC):
             IndexError: there is no such position.
         """
         files = self.files[position]
+        image_path, scan_path = files.needed
         calibration = self._calibration(files)
         image, original = self._picture(files)
-        points = read_scan(files.scan)
+        points = read_scan(scan_path)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
-        remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {files.image}")
-        remarks += refuse([bit_depth(image)], f"Image {files.image}") + refuse(of_scan(points), f"Scan {files.scan}")
+        remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {image_path}")
+        remarks += refuse([bit_depth(image)], f"Image {image_path}") + refuse(of_scan(points), f"Scan {scan_path}")
         return Frame(
             index=files.index,
             timestamp=files.timestamp,
@@ -87,7 +108,7 @@ class PairedSequence(ABC):
             points=points,
             camera=camera,
             camera_from_lidar=extrinsic,
-            source=str(files.image),
+            source=str(image_path),
             remarks=remarks,
             original=original,
         )
@@ -98,7 +119,7 @@ class PairedSequence(ABC):
 
     def _picture(self, files: FrameFiles) -> Picture:
         """The image of one frame."""
-        return Picture(read_image(files.image))
+        return Picture(read_image(files.needed.image))
 
 
 def require_folder(folder: Path, remedy: str) -> Path:

@@ -44,11 +44,22 @@ FOLDER_OPTIONS = (
     click.option("--camera", metavar="NAME", help="Camera of a calibration file of several, for instance cam0."),
     click.option("--camera-frame", metavar="NAME", help="The camera's optical frame, in a file of many frames."),
     click.option("--lidar-frame", metavar="NAME", help="The LiDAR's frame, likewise."),
+    click.option(
+        "--max-time-difference",
+        type=click.FloatRange(min=0),
+        metavar="MS",
+        help="Pair each image with the nearest scan within so many milliseconds, by timestamps.txt in both folders or "
+        "by names that are times.  [default: by name; by time within 50 where names differ]",
+    ),
 )
 
 
+FOLDER_ONLY = ("guess", "camera_frame", "lidar_frame", "max_time_difference")
+"""Those of them that are no fields of `RunOptions`."""
+
+
 def folder_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command what says how a folder is read; it passes them on to `open_folder`, under the same names."""
+    """Give a command what says how a folder is read; it passes them on to `open_folder`."""
     for option in reversed(FOLDER_OPTIONS):
         command = option(command)
     return dataset_option(command)
@@ -98,22 +109,14 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 @click.argument("directory", type=FOLDER)
 @folder_options
 @run_options
-def folder(
-    directory: Path,
-    dataset: str,
-    guess: Path | None,
-    camera: str | None,
-    camera_frame: str | None,
-    lidar_frame: str | None,
-    **asked: Any,
-) -> int:
+def folder(directory: Path, dataset: str, **asked: Any) -> int:
     """Calibrate your own images/, clouds/ and calibration.yaml, or the calibration file of another tool.
 
     Without --range and --miscalibrate the calibration.yaml is what is to be corrected; with them it
     is the reference.
     """
-    sequence = open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame)
-    return calibrate(sequence, camera=camera, as_is=not disturbed(asked), **asked)
+    sequence = open_folder(directory, dataset, asked)
+    return calibrate(sequence, as_is=not disturbed(asked), **asked)
 
 
 @click.command()
@@ -132,22 +135,25 @@ def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> in
     return calibrate(drive, viewing=viewing, report=report, **asked)
 
 
-def open_folder(
-    directory: Path,
-    dataset: str,
-    guess: Path | None,
-    camera: str | None,
-    camera_frame: str | None,
-    lidar_frame: str | None,
-) -> Sequence:
-    """A plain folder, or a folder of a dataset of another package, which knows none of these options."""
+def open_folder(directory: Path, dataset: str, asked: dict[str, Any]) -> Sequence:
+    """A plain folder, or a folder of a dataset of another package, which knows none of the `FOLDER_OPTIONS`.
+
+    Args:
+        directory: the folder.
+        dataset: what it holds.
+        asked: all options of the command; `FOLDER_ONLY` are taken out.
+    """
     from calibnet.datasets import open_sequence
     from calibnet.datasets.calibration_files import FrameChoice
 
-    asked: dict[str, Any] = {"guess": guess, "camera": camera}
-    if camera_frame or lidar_frame:
-        asked["frames"] = FrameChoice(camera_frame, lidar_frame)
-    return open_sequence(dataset, directory, **{name: value for name, value in asked.items() if value is not None})
+    frames = FrameChoice(asked.pop("camera_frame"), asked.pop("lidar_frame"))
+    options = {
+        "guess": asked.pop("guess"),
+        "camera": asked["camera"],
+        "frames": frames if any(frames) else None,
+        "max_time_difference": asked.pop("max_time_difference"),
+    }
+    return open_sequence(dataset, directory, **{name: value for name, value in options.items() if value is not None})
 
 
 def open_odometry(sequence: str, root: Path | None, camera: int) -> Sequence:

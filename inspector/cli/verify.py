@@ -12,6 +12,7 @@ import click
 from calibnet.errors import CalibnetError
 from inspector.cli.errors import VERDICT_CODES, ExitCode
 from inspector.cli.inspect import (
+    FOLDER_ONLY,
     camera_option,
     disturbed,
     folder_options,
@@ -90,19 +91,12 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 @click.argument("directory", type=FOLDER)
 @folder_options
 @verify_options
-def folder(
-    directory: Path,
-    dataset: str,
-    guess: Path | None,
-    camera: str | None,
-    camera_frame: str | None,
-    lidar_frame: str | None,
-    **asked: Any,
-) -> int:
+def folder(directory: Path, dataset: str, **asked: Any) -> int:
     """Of a folder with images/, clouds/ and calibration.yaml."""
-    return verify_sequence(
-        lambda: open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame), camera=camera, **asked
-    )
+    of_folder = {**asked}
+    for name in FOLDER_ONLY:
+        del asked[name]
+    return verify_sequence(lambda: open_folder(directory, dataset, of_folder), **asked)
 
 
 def verify_sequence(

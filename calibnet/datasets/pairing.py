@@ -1,0 +1,185 @@
+"""Which image and which scan are of one moment: those of one name, or those nearest in time."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calibnet.errors import DatasetError
+from calibnet.geometry.types import Floats
+from calibnet.runtime.reading import TEXT_BYTES, read_text
+
+TIMES = "timestamps.txt"
+"""Beside the files of a folder: a time a line, in the order of their names."""
+MAX_TIME_DIFFERENCE_MS = 50.0
+"""Between an image and a scan of one frame, by default: half a turn of a scanner."""
+WORTH_A_WARNING_MS = 20.0
+"""Apart, from which on what drives is smeared: 28 cm at 50 km/h."""
+CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
+"""Digits of a time since 1970 in seconds, milli-, micro- and nanoseconds, and seconds of each unit."""
+NEWEST = 4e9
+"""Seconds since 1970 beyond which a number is no time."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An image and a scan of one moment; one of them is None where the other has no partner of its name.
+
+    Attributes:
+        stem: name of the image's file without its ending, or of the scan's where there is no image.
+        image: its file.
+        scan: its file.
+        seconds: when the image was taken; None where no time is known.
+    """
+
+    stem: str
+    image: Path | None
+    scan: Path | None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """The frames of a folder, and sentences for the user on how they were found."""
+
+    pairs: list[Pair]
+    notes: tuple[str, ...] = ()
+
+
+def pair(images: Mapping[str, Path], scans: Mapping[str, Path], most_ms: float | None = None) -> Pairing:
+    """Pair the images and scans of two folders, each sorted by name.
+
+    By name, if no name lacks its partner or no times are known; a frame without a partner is kept, to be told of when
+    it is read. Otherwise by time, of `TIMES` or of the names: each image with the nearest scan, each scan once.
+
+    Args:
+        images: files by stem.
+        scans: likewise.
+        most_ms: milliseconds that the two of a frame may be apart; giving it asks for pairing by time.
+
+    Raises:
+        DatasetError: nothing pairs, or times were asked for and are not known.
+    """
+    image_times, scan_times = times_of(images), times_of(scans)
+    by_time = image_times is not None and scan_times is not None
+    if most_ms is not None and not by_time:
+        lacking = next(iter((images if image_times is None else scans).values())).parent
+        raise DatasetError(
+            f"{lacking} knows no times to pair by; write {lacking / TIMES} with a time a line, in seconds, or name the "
+            "files by their times."
+        )
+    if most_ms is None and (images.keys() == scans.keys() or not by_time):
+        return _by_name(images, scans, image_times)
+    assert image_times is not None and scan_times is not None
+    return _by_time(images, scans, image_times, scan_times, MAX_TIME_DIFFERENCE_MS if most_ms is None else most_ms)
+
+
+def _by_name(images: Mapping[str, Path], scans: Mapping[str, Path], times: Floats | None) -> Pairing:
+    if not images.keys() & scans.keys():
+        image_folder, scan_folder = (next(iter(files.values())).parent for files in (images, scans))
+        raise DatasetError(
+            f"{image_folder} ({len(images)} images, the first {next(iter(images))}) and {scan_folder} ({len(scans)} "
+            f"scans, the first {next(iter(scans))}) have no name in common; name an image and its scan alike, or by "
+            f"their times, or write their times into a {TIMES} in each folder."
+        )
+    seconds = dict(zip(images, times.tolist() if times is not None else [None] * len(images), strict=True))
+    stems = [*images, *(stem for stem in scans if stem not in images)]
+    pairs = [Pair(stem, images.get(stem), scans.get(stem), seconds.get(stem)) for stem in stems]
+    lacking = [stem for stem in stems if stem not in images or stem not in scans]
+    if not lacking:
+        return Pairing(pairs)
+    few = ", ".join(lacking[:3]) + (" and so on" if len(lacking) > 3 else "")
+    return Pairing(pairs, (f"{len(lacking)} of {len(stems)} names have an image or a scan only ({few}).",))
+
+
+def _by_time(
+    images: Mapping[str, Path], scans: Mapping[str, Path], image_times: Floats, scan_times: Floats, most_ms: float
+) -> Pairing:
+    order = np.argsort(scan_times, kind="stable")
+    names, files, times = list(scans), list(scans.values()), scan_times[order]
+    nearest = np.clip(np.searchsorted(times, image_times), 1, max(1, len(times) - 1))
+    if len(times) > 1:
+        before_is_nearer = image_times - times[nearest - 1] <= times[np.minimum(nearest, len(times) - 1)] - image_times
+        nearest = nearest - before_is_nearer
+    else:
+        nearest = np.zeros(len(image_times), np.int64)
+    apart = np.abs(times[nearest] - image_times) * 1000
+    best: dict[int, int] = {}
+    for position in np.argsort(apart, kind="stable").tolist():
+        if apart[position] <= most_ms:
+            best.setdefault(int(nearest[position]), position)  # each scan goes to the nearest image
+    stems = list(images)
+    pairs = [
+        Pair(stems[position], images[stems[position]], files[order[scan]], float(image_times[position]))
+        for scan, position in sorted(best.items(), key=lambda one: image_times[one[1]])
+    ]
+    if not pairs:
+        raise DatasetError(
+            f"No image of {next(iter(images.values())).parent} has a scan within {most_ms:g} ms, the nearest is "
+            f"{apart.min():.0f} ms off; check that both clocks are the same, or give a larger --max-time-difference."
+        )
+    farthest = float(max(apart[position] for position in best.values()))
+    note = f"Paired by time: {len(pairs)} frames, image and scan up to {farthest:.0f} ms apart"
+    left_images, left_scans = len(images) - len(pairs), len(names) - len(pairs)
+    if left_images or left_scans:
+        note += f"; {left_images} images and {left_scans} scans are left out"
+    notes = [f"{note}."]
+    if farthest > WORTH_A_WARNING_MS:
+        notes.append(
+            f"At 50 km/h {farthest:.0f} ms are {farthest / 1000 * 50 / 3.6 * 100:.0f} cm: frames taken while driving "
+            "are only as good; those taken at standstill are not affected."
+        )
+    return Pairing(pairs, tuple(notes))
+
+
+def times_of(files: Mapping[str, Path]) -> Floats | None:
+    """Seconds of files by stem, of `TIMES` beside them or of their names; None where neither tells.
+
+    Raises:
+        DatasetError: `TIMES` is there and does not fit the files.
+    """
+    path = next(iter(files.values())).parent / TIMES
+    if path.exists():
+        lines = [line.strip() for line in read_text(path, "Times", TEXT_BYTES).splitlines()]
+        words = [line for line in lines if line and not line.startswith("#")]
+        seconds = [_seconds(word) for word in words]
+        if None in seconds:
+            raise DatasetError(
+                f"{path}: {words[seconds.index(None)]!r} is no time; write seconds, or nanoseconds since 1970, or "
+                "2026-11-26 13:02:25.594."
+            )
+        if len(seconds) != len(files):
+            raise DatasetError(f"{path} has {len(seconds)} times for {len(files)} files; write one a line.")
+        return np.array(seconds, dtype=np.float64)
+    if not all(re.fullmatch(r"\d{10,19}|\d{9,10}[._]\d+", stem) for stem in files):
+        return None
+    seconds = [_seconds(stem.replace("_", ".")) for stem in files]
+    return None if None in seconds else np.array(seconds, dtype=np.float64)
+
+
+def _seconds(word: str) -> float | None:
+    """Seconds of a time in any of the usual forms."""
+    if re.fullmatch(r"\d+", word) and (unit := CLOCK_DIGITS.get(len(word))) is not None:
+        return int(word) * unit if int(word) * unit < NEWEST else None
+    try:
+        number = float(word)
+    except ValueError:
+        return _of_date(word)
+    return number if np.isfinite(number) and abs(number) < NEWEST else None
+
+
+def _of_date(word: str) -> float | None:
+    """Seconds of a date as KITTI writes it, with up to nine digits of a second."""
+    match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})[ T](\d{2}:\d{2}:\d{2})(\.\d+)?Z?", word)
+    if match is None:
+        return None
+    try:
+        whole = datetime.datetime.fromisoformat(f"{match[1]}T{match[2]}+00:00").timestamp()
+    except ValueError:
+        return None
+    return whole + float(match[3] or 0)

@@ -1,0 +1,121 @@
+"""Images and scans of one moment: by their names, by times in files, and by names that are times."""
+
+from __future__ import annotations
+
+import pytest
+from numpy.testing import assert_allclose
+
+from calibnet.errors import DatasetError
+
+
+def rename(files, stems):
+    files[:] = [path.rename(path.with_stem(stem)) for path, stem in zip(files, stems, strict=True)]
+
+
+def write_times(files, times):
+    (files[0].parent / "timestamps.txt").write_text("".join(f"{time}\n" for time in times))
+
+
+def test_a_name_without_its_partner_is_a_bad_frame(write_layout):
+    layout = write_layout("folder")
+    layout.scans[1].unlink()
+    sequence = layout.open()
+    assert sequence.notes == ("1 of 3 names have an image or a scan only (0001).",)
+    assert [sequence[0].index, sequence[2].index] == [0, 2]
+    with pytest.raises(DatasetError, match=r"no scan for 0001 \(.*0001\.png\); add it, or remove this file"):
+        sequence[1]
+    layout.images[2].unlink()
+    with pytest.raises(DatasetError, match=r"no image for 0002 \(.*0002\.bin\)"):
+        layout.open()[2]
+
+
+def test_names_that_have_nothing_in_common_are_refused(write_layout):
+    layout = write_layout("folder")
+    rename(layout.scans, ["a", "b", "c"])
+    with pytest.raises(
+        DatasetError, match=r"\(3 images, the first 0000\) and .* \(3 scans, the first a\) have no name"
+    ):
+        layout.open()
+
+
+def test_each_image_gets_the_scan_that_is_nearest_in_time(write_layout):
+    layout = write_layout("folder")
+    rename(layout.scans, ["a", "b", "c"])
+    write_times(layout.images, [10.00, 10.10, 10.20])
+    write_times(layout.scans, [9.990, 10.109, 10.500])
+    sequence = layout.open()
+    assert sequence.notes[0] == (
+        "Paired by time: 2 frames, image and scan up to 10 ms apart; 1 images and 1 scans are left out."
+    )
+    assert [(one.image.stem, one.scan.stem) for one in sequence.files] == [("0000", "a"), ("0001", "b")]
+    assert_allclose([frame.timestamp for frame in sequence], [0.0, 0.1])
+    assert len(sequence.notes) == 1
+
+
+def test_a_scan_goes_to_one_image_only(write_layout):
+    """A camera of 30 Hz beside a scanner of 10 Hz."""
+    layout = write_layout("folder")
+    write_times(layout.images, [1.000, 1.033, 1.066])
+    write_times(layout.scans, [1.030, 2.0, 3.0])
+    sequence = layout.open(max_time_difference=40)
+    assert [(one.image.stem, one.scan.stem) for one in sequence.files] == [("0001", "0000")]
+
+
+def test_a_large_difference_is_said_in_centimetres(write_layout):
+    layout = write_layout("folder")
+    write_times(layout.images, [1.00, 2.00, 3.00])
+    write_times(layout.scans, [1.03, 2.00, 3.00])
+    assert layout.open(max_time_difference=50).notes[1].startswith("At 50 km/h 30 ms are 42 cm")
+    with pytest.raises(
+        DatasetError, match=r"has a scan within 1 ms, the nearest is 2000 ms off; check that both clocks"
+    ):
+        write_times(layout.scans, [5.0, 6.0, 7.0])
+        layout.open(max_time_difference=1)
+
+
+@pytest.mark.parametrize(
+    ("images", "scans"),
+    [
+        (["1532402927612460000", "1532402927712460000", "1532402927812460000"],) * 2,
+        (
+            ["1532402927612460", "1532402927712460", "1532402927812460"],
+            ["1532402927.612", "1532402927.712", "1532402927.812"],
+        ),
+        (["1532402927612", "1532402927712", "1532402927812"], ["1532402927_61", "1532402927_71", "1532402927_81"]),
+    ],
+)
+def test_names_that_are_times_are_times(images, scans, write_layout):
+    layout = write_layout("folder")
+    rename(layout.images, images)
+    layout.scans[:] = [path.rename(path.parent / f"{stem}.bin") for path, stem in zip(layout.scans, scans, strict=True)]
+    frames = list(layout.open(max_time_difference=5))
+    assert [frame.index for frame in frames] == [0, 1, 2]
+    assert_allclose([frame.timestamp for frame in frames], [0.0, 0.1, 0.2], atol=1e-5)
+
+
+def test_dates_of_kitti_are_times(write_layout):
+    layout = write_layout("folder")
+    for files in (layout.images, layout.scans):
+        write_times(files, [f"2011-09-26 13:02:2{second}.594360375" for second in (5, 6, 8)])
+    assert_allclose([frame.timestamp for frame in layout.open(max_time_difference=5)], [0, 1, 3], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("times", "problem"),
+    [
+        (["1.0", "soon", "3.0"], "'soon' is no time"),
+        (["1.0", "2.0"], "has 2 times for 3 files"),
+        (["2011-99-26 13:02:25", "1", "2"], "is no time"),
+    ],
+)
+def test_times_that_are_none(times, problem, write_layout):
+    layout = write_layout("folder")
+    write_times(layout.images, times)
+    with pytest.raises(DatasetError, match=problem):
+        layout.open()
+
+
+def test_times_that_are_asked_for_and_missing(write_layout):
+    layout = write_layout("folder")
+    with pytest.raises(DatasetError, match=r"images knows no times to pair by; write .*timestamps\.txt"):
+        layout.open(max_time_difference=20)
