@@ -143,6 +143,8 @@ class CascadeTrace:
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (preparation, resizing, image features).
         wider: stages of wider ranges that ran before them, because a first try left the range it searched.
+        again: one more look of the last stage from where the run arrived, which tells most about the result; it is not
+            applied. None where the rest speaks against the result already, or too few points are in the picture there.
         verdict: whether the result is good; None from a method that does not say.
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
     """
@@ -152,6 +154,7 @@ class CascadeTrace:
     milliseconds: dict[str, float] = field(default_factory=dict)
     match_error_limit_px: float = math.inf
     wider: tuple[StageTrace, ...] = ()
+    again: StageTrace | None = field(default=None, repr=False)
     verdict: Verdict | None = None
 
     @property

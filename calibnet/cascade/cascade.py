@@ -18,6 +18,7 @@ from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.judging.causes import match_error_of, misfit_of
+from calibnet.judging.coefficients import Coefficients, load_coefficients
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.judge import judge
 from calibnet.network.config import load_preset
@@ -46,6 +47,7 @@ class Cascade:
         skipped: Sequence[SkippedStage] = (),
         common: Matrix6 | None = None,
         wider: Sequence[Stage] = (),
+        coefficients: Coefficients | None = None,
     ) -> None:
         """Use ``Cascade.load`` unless the networks are already there.
 
@@ -55,7 +57,9 @@ class Cascade:
             common: covariance of what the networks get wrong in all frames of a drive alike; that of
                 `calibnet.weights.manifest.Manifest` by default.
             wider: stages of wider ranges, coarse to fine, kept for calibrations that leave the first stage's range.
+            coefficients: of the verdict, fitted to these networks; without them nothing is accepted.
         """
+        self.coefficients = coefficients or Coefficients()
         self.stages, self.skipped, self.wider = list(stages), list(skipped), list(wider)
         if not stages:
             reasons = " ".join(stage.reason for stage in skipped)
@@ -93,7 +97,14 @@ class Cascade:
         loaded = [stage for stage in found.values() if stage is not None]
         skipped = [skipped_stage(number, preset) for number, stage in found.items() if stage is None]
         before = [load_stage(number, manifest, folder or PACKAGE) for number in range(1, numbers[0] if wider else 1)]
-        return cls(loaded, skipped, manifest.common, [stage for stage in before if stage is not None])
+        kept = [stage for stage in before if stage is not None]
+        return cls(loaded, skipped, manifest.common, kept, load_coefficients(manifest, folder))
+
+    @property
+    def unjudged(self) -> str:
+        """Why none of its results can be accepted; empty where they can."""
+        doubt = self.coefficients.doubt_of(self.stages[-1].range)
+        return doubt if isinstance(doubt, str) else ""
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct the extrinsic of one frame.
@@ -120,7 +131,8 @@ class Cascade:
                 before = self._run(wider, views, start)
                 stages = self._run(self.stages, views, before[-1].after, detail)
                 trace = CascadeTrace(start, stages, clock.parts, limit, before)
-            trace = replace(trace, verdict=judge(views.frame, start, trace, self._again(views, trace)))
+            trace = replace(trace, again=self._again(views, trace))
+            trace = replace(trace, verdict=judge(views.frame, start, trace, self.coefficients))
         return upright.undo(trace, initial)
 
     def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
@@ -140,7 +152,9 @@ class Cascade:
             trace = None
         verdict = None if trace is None else trace.verdict
         if verdict is None or verdict.word != ACCEPTED:
-            verdict = judge(frame, start, trace, None, match_error_of(self.stages[0]), misfit_of(self.calibrate))
+            verdict = judge(
+                frame, start, trace, self.coefficients, match_error_of(self.stages[0]), misfit_of(self.calibrate)
+            )
         return upright.undo_verdict(verdict)
 
     def calibrate_drive(
@@ -162,7 +176,7 @@ class Cascade:
         estimate = solve_drive(self.stages, frames, start, self.common, observer)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
             estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer)
-        verdict = judge_drive(estimate, start, self.stages[0].range)
+        verdict = judge_drive(estimate, start, self.stages[0].range, self.coefficients.doubt_of(self.stages[-1].range))
         return upright.undo_drive(replace(estimate, verdict=verdict))
 
     def _run(

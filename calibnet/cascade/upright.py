@@ -85,8 +85,9 @@ class Upright:
         if not self:
             return trace
         stages, wider = (tuple(map(self._real_stage, part)) for part in (trace.stages, trace.wider))
+        again = None if trace.again is None else self._real_stage(trace.again)
         verdict = None if trace.verdict is None else self.undo_verdict(trace.verdict)
-        return replace(trace, initial=initial, stages=stages, wider=wider, verdict=verdict)
+        return replace(trace, initial=initial, stages=stages, wider=wider, again=again, verdict=verdict)
 
     def undo_verdict(self, verdict: Verdict) -> Verdict:
         """The verdict on an upright frame or drive, of the real camera."""

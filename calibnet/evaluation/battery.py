@@ -13,7 +13,8 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.audit import other_drive
-from calibnet.evaluation.corruptions import Corruption, corruptions, unaltered
+from calibnet.evaluation.corruptions import Corruption, corruptions
+from calibnet.evaluation.faults import unaltered
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic

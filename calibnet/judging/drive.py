@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from calibnet.geometry import MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.doubt import Doubt
 from calibnet.trace import MARGIN, DriveEstimate
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word, moved
 
@@ -11,22 +12,27 @@ LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Standard deviations, over all axes, beyond which the frames agree on too little."""
 
 
-def judge_drive(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange) -> Verdict:
+def judge_drive(
+    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, doubt: Doubt | str
+) -> Verdict:
     """Whether the extrinsic that was solved from a drive is good.
 
     Args:
         estimate: of the drive.
         initial: ``camera_from_lidar`` that it started from.
         searched: the range that was to be searched around it.
+        doubt: as `calibnet.judging.coefficients.Coefficients.doubt_of` has it; without one nothing is accepted.
     """
-    word, reason = _word(estimate, initial, searched)
+    word, reason = _word(estimate, initial, searched, doubt)
     there = estimate.camera_from_lidar
     return Verdict(
         word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped
     )
 
 
-def _word(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange) -> tuple[Word, str]:
+def _word(
+    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, doubt: Doubt | str
+) -> tuple[Word, str]:
     used, skipped = estimate.frames, len(estimate.skipped)
     if 2 * skipped >= used + skipped:
         return REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}"
@@ -42,4 +48,6 @@ def _word(estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationR
             f"The frames leave it open to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.0f} cm (one "
             "standard deviation); more frames of other places help."
         )
+    if isinstance(doubt, str):
+        return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {doubt}"
     return ACCEPTED, f"{used} frames agree."

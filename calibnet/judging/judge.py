@@ -8,9 +8,10 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.plausibility import ROW_STEP, Implausible, bit_depth, of_camera, of_extrinsic, ranges, up
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
+from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import covariance
-from calibnet.judging.witnesses import Doubt, load_doubt, reach, witnesses
-from calibnet.trace import MARGIN, CascadeTrace, StageTrace
+from calibnet.judging.witnesses import reach, witnesses
+from calibnet.trace import MARGIN, CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
 
 FARTHEST_REACH = 1.6
@@ -25,10 +26,9 @@ def judge(
     frame: Frame,
     guess: Extrinsic,
     trace: CascadeTrace | None,
-    again: StageTrace | None = None,
+    coefficients: Coefficients,
     match_error: Measure | None = None,
     misfit: Measure | None = None,
-    doubt: Doubt | None = None,
 ) -> Verdict:
     """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
 
@@ -36,10 +36,9 @@ def judge(
         frame: that was calibrated.
         guess: ``camera_from_lidar`` that it started from, 4x4.
         trace: of the run; None where it could not be run because too few points fall into the picture.
-        again: one more look of the last stage from where the run arrived; without it less is accepted.
+        coefficients: that were fitted to the weights; without any nothing is accepted.
         match_error: where picture and scan do not fit, finds out why by `calibnet.judging.causes.PICTURE_AND_SCAN`.
         misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
-        doubt: how witnesses are summed up; by default as it was fitted to the weights that ship with the package.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
     of_scan = ranges(frame.points), up(frame.points)
@@ -61,7 +60,9 @@ def judge(
 
     def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
         going = moved(trace.initial, last.after)
-        return Verdict(word, _because(reason, causes), last.after, going, causes, covariance(last))
+        return Verdict(
+            word, _because(reason, causes), last.after, going, causes, covariance(trace, coefficients.spread)
+        )
 
     if float(frame.image[::ROW_STEP].std()) < BLANK:
         return verdict(REJECTED, "The picture shows nothing.")
@@ -82,8 +83,12 @@ def judge(
         word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
         return verdict(word, f"The LiDAR {gone}.", why(LENSES, misfit))
 
-    doubt = doubt or load_doubt(again is not None)
-    wrong = doubt(witnesses(trace, again))
+    doubt = coefficients.doubt_of(last.range)
+    if isinstance(doubt, str):
+        return verdict(
+            CANNOT_TELL, f"Picture and scan fit together, but how sure that is cannot be told. {doubt}", suspects
+        )
+    wrong = doubt(witnesses(trace))
     if wrong < doubt.accepted_below:
         return verdict(ACCEPTED, f"Picture and scan fit together (match error {last.match_error_px:.1f} px).")
     if math.isnan(wrong):

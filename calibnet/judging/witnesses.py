@@ -1,15 +1,13 @@
 """What tells right from wrong: a few numbers of one run, none of which needs the network again.
 
-`Doubt` sums them up to the probability that a result is wrong; docs/decisions.md says how it was fitted.
+`calibnet.judging.doubt.Doubt` sums them up to the probability that a result is wrong; docs/decisions.md says what each
+adds.
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
-from dataclasses import dataclass, fields
-from functools import cache
-from importlib.resources import files
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +18,8 @@ from calibnet.trace import CascadeTrace, StageTrace
 
 AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
 """What the axes of a correction are to a user: turns about the camera's x, y and z, then moves along them."""
+LEAST = 1e-6
+"""What is smaller counts as this much, so that it has a logarithm."""
 
 
 @dataclass(frozen=True)
@@ -64,29 +64,43 @@ class Witnesses:
         match_error: logarithm of the error, in pixels, that the last stage expects of its matches.
         earlier_error: likewise of the stage before it.
         misfit: logarithm of the last stage's `misfit`.
+        lens: logarithm of the least cost of its matches with another lens, relative to that with the pose alone;
+            0 where no lens explains them better.
+        stated: logarithm of the deviation of the translation, in centimetres, that its information states.
         reach: how far the run went, in ranges searched.
+        last_reach: how far the last stage went, in its own ranges.
+        again_reach: how far it would have gone, had it been applied once more.
     """
 
     match_error: float
     earlier_error: float
     misfit: float
+    lens: float
+    stated: float
     reach: float
+    last_reach: float
+    again_reach: float
 
 
-def witnesses(trace: CascadeTrace, again: StageTrace | None = None) -> Witnesses:
+def witnesses(trace: CascadeTrace) -> Witnesses:
     """The witnesses of a run of at least one stage.
 
-    Args:
-        trace: of the run.
-        again: one more look of the last stage from where the run arrived, which tells more than its last one.
+    Where the last stage looked again from where the run arrived, that look is asked instead of its last one: it tells
+    more. Without it, `Witnesses.again_reach` is not a number.
     """
-    last = again or trace.stages[-1]
-    earlier = trace.stages[-2] if len(trace.stages) > 1 else trace.stages[-1]
+    last, again = trace.stages[-1], trace.again
+    asked = again or last
+    earlier = trace.stages[-2] if len(trace.stages) > 1 else last
+    alone, bent = misfit(asked), bent_misfit(asked)
     return Witnesses(
-        match_error=math.log(last.match_error_px),
+        match_error=math.log(asked.match_error_px),
         earlier_error=math.log(earlier.match_error_px),
-        misfit=math.log(max(misfit(last), 1e-6)),
-        reach=reach(trace.initial, trace.stages[-1].after, trace.stages[0].range).share,
+        misfit=math.log(max(alone, LEAST)),
+        lens=math.log(max(min(bent, alone), LEAST) / max(alone, LEAST)),
+        stated=_stated(asked),
+        reach=reach(trace.initial, last.after, trace.stages[0].range).share,
+        last_reach=reach(last.before, last.after, last.range).share,
+        again_reach=math.nan if again is None else reach(again.before, again.after, again.range).share,
     )
 
 
@@ -101,51 +115,21 @@ def misfit(stage: StageTrace) -> float:
     return _fit(stage, PINHOLE).cost / len(stage.matches.points)
 
 
-def lens_gain(stage: StageTrace) -> float:
-    """What the best lens of another kind gains over a pose alone with a stage's last matches, as a log likelihood."""
+def bent_misfit(stage: StageTrace) -> float:
+    """The `misfit` with whichever other lens explains the matches best, fitted together with the pose."""
     if stage.matches is None or not len(stage.matches.points):
         return math.nan
-    alone = _fit(stage, PINHOLE).cost
-    return max(alone - _fit(stage, lens).cost for lens in LENSES)
+    return min(_fit(stage, lens).cost for lens in LENSES) / len(stage.matches.points)
+
+
+def _stated(stage: StageTrace) -> float:
+    """Logarithm of a stage's stated deviation of the translation, in centimetres."""
+    if stage.information is None:
+        return math.nan
+    return math.log(100 * math.sqrt(np.trace(np.linalg.inv(stage.information)[:3, :3])))
 
 
 def _fit(stage: StageTrace, lens: Lens) -> Fit:
     assert stage.matches is not None
     prior = stage.range.information
     return fit(stage.matches, stage.looked_from, stage.camera, stage.looked_from, prior, lens)
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """Logistic regression of a wrong result on the witnesses.
-
-    Attributes:
-        intercept: of the logarithm of the odds.
-        weights: of the witnesses, by name.
-        accepted_below: probability of being wrong below which a result is accepted.
-        rejected_above: probability above which it is rejected; in between nobody can tell.
-    """
-
-    intercept: float
-    weights: dict[str, float]
-    accepted_below: float
-    rejected_above: float
-
-    def __call__(self, of: Witnesses) -> float:
-        """Probability that the result is wrong; not a number where a witness is missing."""
-        odds = self.intercept + sum(weight * getattr(of, name) for name, weight in self.weights.items())
-        return 1 / (1 + math.exp(-min(max(odds, -50.0), 50.0)))
-
-
-@cache
-def load_doubt(again: bool = True) -> Doubt:
-    """The coefficients that ship with the package; ``doubt.toml`` says what they were fitted to.
-
-    Args:
-        again: whether the last stage looked again from where it had arrived.
-    """
-    content = tomllib.loads(files("calibnet.judging").joinpath("doubt.toml").read_text(encoding="utf-8"))
-    part = content["again" if again else "once"]
-    unknown = part["weights"].keys() - {field.name for field in fields(Witnesses)}
-    assert not unknown, unknown
-    return Doubt(part["intercept"], part["weights"], part["accepted_below"], part["rejected_above"])

@@ -75,7 +75,7 @@ def open_data(spec: str) -> list[Sequence]:
         )
     root = Path(root_text)
     if not root.is_dir():
-        raise DatasetError(f"There is no folder {root}; {spec!r} names it as training data.")
+        raise DatasetError(f"There is no folder {root}; {spec!r} names it.")
     found = list(find_sequences(dataset, root, name))
     if not found:
         raise DatasetError(

@@ -102,6 +102,8 @@ def evaluate(
     cascade = Cascade.load(preset, stages or stages_within(range_), weights, wider=stages is None)
     for skipped in cascade.skipped:
         say(skipped.reason, err=True)
+    if cascade.unjudged:
+        say(f"No result will be accepted: {cascade.unjudged}", err=True)
     if battery:
         run_battery(cascade, opened, range_, repeats, seed, lambda: find_sequences(dataset, root), json_file)
         return

@@ -42,6 +42,7 @@ COMMANDS = {
     "check": LazyCommand("inspector.cli.check:check", "Fail when a recording is rejected or exceeds limits; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
+    "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
     "benchmark": LazyCommand(
         "inspector.cli.benchmark:benchmark", "Milliseconds of the cascade by part, stage and frame."

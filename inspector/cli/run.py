@@ -184,6 +184,8 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
         console.print(note, markup=False, soft_wrap=True)
     for stage in cascade.skipped:
         console.print(f"Skipped: {stage.reason}", style="yellow", markup=False, soft_wrap=True)
+    if cascade.unjudged:
+        console.print(f"No result will be accepted: {cascade.unjudged}", style="yellow", markup=False, soft_wrap=True)
 
 
 def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:

@@ -187,6 +187,13 @@ def train(
         if every_stage:
             console.print(f"Stage ±{step.range}, {number} of {len(steps)} to go, in {step.output}", style="bold")
         train_stage(step, console, save and step_file(save, step, output) if every_stage else save, resume)
+    if every_stage:
+        console.print(
+            "Before any of their results is accepted, the verdict has to be fitted to them: "
+            f"calib-inspect fit-verdict --weights {output} --data …",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:

@@ -85,6 +85,7 @@ class FakeCascade:
     """Moves to the dataset's extrinsic, leaving `LEFTOVER` of the error at every stage."""
 
     skipped: ClassVar = [SkippedStage(2, RANGES[1], "Stage 2 (±10°/1 m) has no weights: train it.")]
+    unjudged = ""
 
     def __init__(
         self,

@@ -9,7 +9,8 @@ import pytest
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.battery import PLAIN, Battery, BatteryRun, run_battery
-from calibnet.evaluation.corruptions import Corruption, grey, unaltered
+from calibnet.evaluation.corruptions import Corruption
+from calibnet.evaluation.faults import grey, unaltered
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, range_of, transform
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, StageTrace

@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
+from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
-from calibnet.evaluation import corruptions as faults
+from calibnet.evaluation import faults
 from calibnet.evaluation.corruptions import Corruption, corruptions
 from calibnet.geometry import PinholeCamera, project, transform
 from calibnet.verdict import CAUSES
@@ -29,7 +30,7 @@ def spot(u: int, v: int) -> np.ndarray:
     return image
 
 
-def seen_at(frame: faults.Frame, point: tuple[float, float, float]) -> tuple[float, float]:
+def seen_at(frame: Frame, point: tuple[float, float, float]) -> tuple[float, float]:
     """Pixel at which the frame's truth sees a point of the LiDAR frame."""
     u, v = project(np.array([[*point, 0.0]], np.float32), frame.camera_from_lidar, frame.camera).pixels[0]
     return float(u), float(v)
@@ -80,7 +81,7 @@ def test_bytes_of_a_picture_with_more_bits() -> None:
     image = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
     frame = replace(FRAME, image=image)
     assert faults.high_byte(12)(frame).image.max() == 15
-    low = faults.low_byte(12, 0)(frame).image
+    low = faults.low_byte(12)(frame).image
     assert (low // 16 == image % 16).all()  # 12 bits are 16 times as bright, and go round after 16 steps
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
-from calibnet.evaluation import corruptions as faults
+from calibnet.evaluation import faults
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import LENSES, PICTURE_AND_SCAN, Attempt, Search, cause, match_error_of, misfit_of
 from tests.support.boxes import boxes

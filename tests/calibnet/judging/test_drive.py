@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, miscalibration
+from calibnet.judging.doubt import Doubt
 from calibnet.judging.drive import judge_drive
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import BadFrame
 from tests.support.boxes import REFERENCE
+
+DOUBT = Doubt(0.0, {}, 0.6, 0.8)
 
 
 def estimate(
@@ -36,8 +39,15 @@ def estimate(
     ],
 )
 def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -> None:
-    verdict = judge_drive(drive, REFERENCE, RANGES[2])
+    verdict = judge_drive(drive, REFERENCE, RANGES[2], DOUBT)
     assert verdict.word == word and reason in verdict.reason
     assert verdict.used == drive.frames and verdict.skipped == drive.skipped
     np.testing.assert_array_equal(verdict.camera_from_lidar, drive.camera_from_lidar)
     np.testing.assert_array_equal(verdict.covariance, drive.covariance)
+
+
+def test_by_no_coefficients_no_drive_is_accepted() -> None:
+    verdict = judge_drive(estimate(), REFERENCE, RANGES[2], "Nothing was fitted.")
+    assert verdict.word == "cannot tell"
+    assert verdict.reason == "10 frames agree, but how sure that is cannot be told. Nothing was fitted."
+    assert judge_drive(estimate(yaw=6.1), REFERENCE, RANGES[2], "Nothing was fitted.").word == "rejected"

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, miscalibration
-from calibnet.judging.witnesses import Doubt, Witnesses, lens_gain, load_doubt, misfit, reach, witnesses
+from calibnet.judging.coefficients import load_coefficients
+from calibnet.judging.doubt import Doubt
+from calibnet.judging.witnesses import Witnesses, bent_misfit, misfit, reach, witnesses
+from calibnet.trace import CascadeTrace
 from calibnet.verdict import BadFrame, Cause, Verdict, moved
+from calibnet.weights.manifest import load_manifest
 from tests.support.drive import REFERENCE
 from tests.support.matches import matches, run
 
@@ -57,7 +62,9 @@ def test_witnesses_of_a_run_that_fits_and_of_one_that_does_not() -> None:
     bent = matches(np.eye(4), lambda places: places * (1 - 0.3 * (places**2).sum(axis=1, keepdims=True)), noise=0.5)
     wrong = witnesses(run(guess, REFERENCE, bent))
     assert wrong.misfit > found.misfit + 0.5
-    assert lens_gain(fits.stages[-1]) < 1 and lens_gain(run(guess, REFERENCE, bent).stages[-1]) > 10
+    assert wrong.lens < -0.5 < -0.05 < found.lens <= 0
+    curved = run(guess, REFERENCE, bent).stages[-1]
+    assert bent_misfit(curved) < 0.5 * misfit(curved) and bent_misfit(fits.stages[-1]) > 0.95 * misfit(fits.stages[-1])
 
 
 def test_a_look_again_counts_instead_of_the_last_one() -> None:
@@ -65,8 +72,17 @@ def test_a_look_again_counts_instead_of_the_last_one() -> None:
         run(REFERENCE, REFERENCE, matches(np.eye(4)), 3.0),
         run(REFERENCE, REFERENCE, matches(np.eye(4)), 1.0),
     )
-    again = witnesses(trace, other.stages[-1])
+    again = witnesses(replace(trace, again=other.stages[-1]))
     assert (again.match_error, again.earlier_error) == (pytest.approx(0.0), pytest.approx(np.log(3)))
+    assert again.again_reach == 0 and np.isnan(witnesses(trace).again_reach)
+
+
+def test_how_far_the_last_stage_went_and_what_it_states() -> None:
+    moved = miscalibration([0, 0.5, 0], [0, 0, 0.02]) @ REFERENCE
+    last = replace(run(REFERENCE, moved, matches(np.eye(4))).stages[1], number=5, range=RANGES[4])
+    found = witnesses(CascadeTrace(REFERENCE, (last,)))
+    assert found.last_reach == pytest.approx(0.5, abs=0.02)  # of ±1 degree
+    assert found.stated == pytest.approx(np.log(100 * np.sqrt(1 / 4e4 + 1 / 4e4 + 1 / 1e4)))
 
 
 def test_without_matches_the_witness_is_missing_and_doubt_is_not_a_number() -> None:
@@ -76,14 +92,20 @@ def test_without_matches_the_witness_is_missing_and_doubt_is_not_a_number() -> N
     assert np.isnan(doubt(witnesses(trace)))
 
 
+NOTHING = Witnesses(*[0.0] * 8)
+
+
 def test_doubt_is_a_logistic_regression() -> None:
     doubt = Doubt(1.0, {"reach": 2.0, "match_error": -1.0}, 0.1, 0.9)
-    assert doubt(Witnesses(0.5, 0, 0, 1.0)) == pytest.approx(1 / (1 + np.exp(-2.5)))
+    assert doubt(replace(NOTHING, match_error=0.5, reach=1.0)) == pytest.approx(1 / (1 + np.exp(-2.5)))
 
 
-@pytest.mark.parametrize("again", [False, True])
-def test_the_coefficients_that_ship_doubt_what_is_worse(again: bool) -> None:
-    doubt = load_doubt(again)
-    assert 0 < doubt.accepted_below < doubt.rejected_above <= 1
-    good, bad = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), 0.6), Witnesses(1.6, 1.6, -3.5, 1.5)
+def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_doubt_what_is_worse() -> None:
+    coefficients = load_coefficients(load_manifest("compact"))
+    assert coefficients.missing == "", "fit them again: calib-inspect fit-verdict"
+    doubt = coefficients.doubt
+    assert doubt is not None and 0 < doubt.accepted_below < doubt.rejected_above <= 1
+    good = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), -0.02, np.log(0.3), 0.6, 0.3, 0.1)
+    bad = Witnesses(1.6, 1.6, -3.5, -0.2, np.log(0.9), 1.1, 1.2, 1.0)
     assert doubt(good) < doubt.accepted_below < doubt(bad)
+    assert coefficients.fitted["false_accept_rate"] <= 0.01

@@ -30,6 +30,7 @@ class KnownCascade:
 
     loaded: dict[str, Any]
     skipped = (SimpleNamespace(reason="Stage 1 has no weights."),)
+    unjudged = "The verdict was fitted to other weights."
 
     @classmethod
     def load(

@@ -1,0 +1,204 @@
+"""From runs of a known truth to the coefficients of the verdict, and how well they do on sequences left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.verdict_runs import VerdictRun
+from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.types import Floats
+from calibnet.judging.covariance import Spread
+from calibnet.judging.doubt import Doubt
+from calibnet.judging.witnesses import Witnesses
+
+Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
+"""Of the last stage, and of the first one."""
+NAMES = tuple(one.name for one in fields(Witnesses))
+RIDGE = 3.0
+"""Times the squares of the coefficients of standardised witnesses: what is added to the negative log likelihood."""
+FALSE_ACCEPTS = 0.01
+"""Share of all runs that may be accepted and wrong, left out by sequence. Half of these runs have no fault; where every
+fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
+GOOD_REJECTED = 0.02
+"""Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
+LEAST_DEG = 1e-3
+"""Common deviation of the rotation that is as good as none."""
+FEWEST = 10
+"""Good and bad results, each, below which nothing can be fitted."""
+CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
+"""Shares of accepted and wrong runs at which the operating curve is told."""
+
+
+@dataclass(frozen=True)
+class FitFigures:
+    """How well the verdict does on sequences that were left out of the fit in turn.
+
+    Attributes:
+        runs, plain: how many in all, and without a fault.
+        sequences: how many.
+        good: plain runs that end within the limits of a frame.
+        false_accept_rate: share of all runs that are accepted and wrong.
+        acceptance_of_good: share of the good plain runs that are accepted.
+        wrong_rejected: share of the wrong runs that are rejected.
+        spread: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected.
+        curve: acceptance of good plain runs at given shares of false accepts.
+    """
+
+    runs: int
+    plain: int
+    sequences: int
+    good: int
+    false_accept_rate: float
+    acceptance_of_good: float
+    wrong_rejected: float
+    spread: float
+    curve: list[dict[str, float]] = field(default_factory=list)
+
+
+def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spread, FitFigures]:
+    """Fit doubt and spread to runs.
+
+    Args:
+        runs: of a known truth.
+        ranges: of the stage that ended them, and the one searched around the guess.
+
+    Raises:
+        CalibrationError: too few of them end right, or wrong.
+    """
+    asked = [run for run in runs if run.witnesses is not None and np.isfinite(list(run.witnesses.values())).all()]
+    good = np.array([run.good for run in asked], bool)
+    if min(int(good.sum()), int((~good).sum())) < FEWEST:
+        raise CalibrationError(
+            f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
+            f"seem to fit; {FEWEST} of each at least are needed to tell them apart. Make more runs, or add other data."
+        )
+    values = np.array([[run.witnesses[name] for name in NAMES] for run in asked if run.witnesses is not None])
+    odds = left_out(values, ~good, [run.sequence for run in asked])
+    plain = np.array([run.plain for run in asked], bool)
+    accepted_below = threshold(odds, ~good, FALSE_ACCEPTS * len(runs))
+    rejected_above = max(float(np.quantile(odds[good], 1 - GOOD_REJECTED)), accepted_below)
+    intercept, weights = regression(values, ~good)
+    doubt = Doubt(
+        rounded(intercept),
+        {name: rounded(weight) for name, weight in zip(NAMES, weights, strict=True)},
+        rounded(probability(accepted_below)),
+        rounded(probability(rejected_above)),
+    )
+    kept = [run for run, of in zip(asked, odds, strict=True) if run.plain and of < rejected_above]
+    spread = fit_spread(kept, ranges)
+    accepted = odds < accepted_below
+    wrong = [run for run in runs if not run.good]
+    told_wrong = len(wrong) - int((odds[~good] <= rejected_above).sum())
+    figures = FitFigures(
+        runs=len(runs),
+        plain=sum(run.plain for run in runs),
+        sequences=len({run.sequence for run in runs}),
+        good=sum(run.plain and run.good for run in runs),
+        false_accept_rate=float((accepted & ~good).sum() / len(runs)),
+        acceptance_of_good=_acceptance(accepted & good & plain, runs),
+        wrong_rejected=told_wrong / max(len(wrong), 1),
+        spread=mean_square(kept, ranges, spread),
+        curve=[
+            {
+                "false_accepts": share,
+                "acceptance_of_good": _acceptance(
+                    (odds < threshold(odds, ~good, share * len(runs))) & good & plain, runs
+                ),
+            }
+            for share in CURVE
+        ],
+    )
+    return doubt, spread, figures
+
+
+def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:
+    """Share of the good plain runs, of all that were made, that are accepted."""
+    return float(accepted.sum() / max(sum(run.plain and run.good for run in runs), 1))
+
+
+def regression(values: Floats, wrong: NDArray[np.bool_]) -> tuple[float, Floats]:
+    """Logistic regression: intercept and coefficients ``[W]`` of the witnesses ``[N, W]``, in their own units."""
+    mean, deviation = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-9)
+    design = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
+    target = wrong.astype(np.float64)
+
+    def cost(beta: Floats) -> tuple[float, Floats]:
+        odds = design @ beta
+        penalty = np.concatenate([[0.0], beta[1:]])
+        likelihood = np.logaddexp(0, odds) - target * odds
+        gradient = design.T @ (1 / (1 + np.exp(-odds)) - target) + 2 * RIDGE * penalty
+        return float(likelihood.sum() + RIDGE * penalty @ penalty), gradient
+
+    beta = minimize(cost, np.zeros(design.shape[1]), jac=True, method="BFGS").x
+    weights = beta[1:] / deviation
+    return float(beta[0] - mean @ weights), np.asarray(weights)
+
+
+def left_out(values: Floats, wrong: NDArray[np.bool_], sequences: Sequence[str]) -> Floats:
+    """Logarithms of the odds ``[N]`` of being wrong, each from a fit without the runs of its own sequence."""
+    odds, names = np.zeros(len(values)), np.array(sequences)
+    for name in dict.fromkeys(sequences):
+        own = names == name
+        others = ~own if len(set(sequences)) > 1 else own
+        intercept, weights = regression(values[others], wrong[others])
+        odds[own] = intercept + values[own] @ weights
+    return odds
+
+
+def threshold(odds: Floats, wrong: NDArray[np.bool_], most: float) -> float:
+    """The odds below which at most so many wrong results lie."""
+    ranked = np.sort(odds[wrong])
+    allowed = int(most)
+    return float(ranked[allowed]) if allowed < len(ranked) else float("inf")
+
+
+def rounded(value: float) -> float:
+    """To six digits, which is more than is known."""
+    return float(f"{value:.6g}")
+
+
+def probability(odds: float) -> float:
+    """Of the logarithm of the odds."""
+    return float(1 / (1 + np.exp(-np.clip(odds, -50, 50))))
+
+
+def fit_spread(runs: Sequence[VerdictRun], ranges: Ranges) -> Spread:
+    """The spread under which errors are likeliest, widened until their mean square is 1 a degree of freedom.
+
+    Where no stage states an information, or too few runs remain, the default.
+    """
+    known = [run for run in runs if run.information is not None]
+    if len(known) < FEWEST:
+        return Spread()
+
+    def spread(logarithms: Floats, widened: float = 1.0) -> Spread:
+        share, translation, rotation = np.exp(logarithms) * np.array([1 / widened, widened**0.5, widened**0.5])
+        return Spread(rounded(share), rounded(translation), rounded(max(rotation, LEAST_DEG)))
+
+    def cost(logarithms: Floats) -> float:
+        squares, covariances = squared_errors(known, ranges, spread(logarithms))
+        # of Student's t with four degrees of freedom: a few gross errors must not widen all others
+        return float((0.5 * np.linalg.slogdet(covariances)[1] + 5.0 * np.log1p(squares / 4.0)).sum())
+
+    start = np.log(list(asdict(Spread()).values()))
+    found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 400, "xatol": 0.01, "fatol": 0.01}).x
+    return spread(found, max(mean_square(known, ranges, spread(found)), 1e-3))
+
+
+def mean_square(runs: Sequence[VerdictRun], ranges: Ranges, spread: Spread) -> float:
+    """Mean squared error by the covariance, a degree of freedom; 1 where it is right. Not a number without runs."""
+    known = [run for run in runs if run.information is not None]
+    return float(squared_errors(known, ranges, spread)[0].mean() / 6) if known else float("nan")
+
+
+def squared_errors(runs: Sequence[VerdictRun], ranges: Ranges, spread: Spread) -> tuple[Floats, Floats]:
+    """Squared errors ``[N]`` by the covariance, and the covariances ``[N, 6, 6]``."""
+    informations, offsets = np.array([run.information for run in runs]), np.array([run.offset for run in runs])
+    covariances = spread.covariance(informations, *ranges, np.array([run.match_error_px for run in runs]))
+    return np.einsum("ni,nij,nj->n", offsets, np.linalg.inv(covariances), offsets), covariances

@@ -1,0 +1,189 @@
+"""Making the runs that a verdict is fitted to, in several processes; each is kept in a file as soon as it is made."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from signal import SIG_IGN, SIGINT, signal
+from threading import Thread
+from typing import Any
+
+from calibnet.datasets.frame import Sequence
+from calibnet.errors import ConfigError
+from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
+from calibnet.judging.witnesses import Witnesses
+from calibnet.runtime.reading import MEGABYTE, read_text
+from calibnet.runtime.writing import check_output
+
+BATCH = 8
+"""Runs a process that are asked for at once: time is looked at between batches."""
+LARGEST = 256 * MEGABYTE
+"""Bytes of a log of runs, of 2 kB each."""
+SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
+"""Of the first synthetic drive; training draws its scenes from other seeds."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a stream of runs is made of, in words that another process understands.
+
+    Attributes:
+        preset, weights, stages: of the cascade.
+        data: as `calibnet.training.data.open_data` takes them.
+        synthetic: drives of the synthetic world besides.
+        seed: of everything random.
+    """
+
+    preset: str
+    weights: Path
+    stages: tuple[int, ...]
+    data: tuple[str, ...]
+    synthetic: int
+    seed: int
+
+    def sequences(self) -> list[Sequence]:
+        """Open all data.
+
+        Raises:
+            ConfigError: there is none.
+            DatasetError: some of it cannot be found.
+        """
+        from calibnet.datasets.synthetic import SyntheticSequence
+        from calibnet.training.data import open_data
+
+        found = [sequence for spec in self.data for sequence in open_data(spec)]
+        found += [SyntheticSequence(SYNTHETIC_SEED + number, SYNTHETIC_LENGTH) for number in range(self.synthetic)]
+        if not found:
+            raise ConfigError("There is nothing to run on: give --data, or --synthetic above 0.")
+        return found
+
+    def open(self) -> RunStream:
+        """The stream, its cascade loaded; one thread, as several processes share the cores."""
+        import torch
+
+        from calibnet.cascade import Cascade
+
+        torch.set_num_threads(1)
+        return RunStream(Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
+
+
+class RunLog:
+    """Runs in a file, one a line, under a key that says what they depend on; lines of other keys are left alone."""
+
+    def __init__(self, path: Path, key: dict[str, Any]) -> None:
+        """Read what there is.
+
+        Args:
+            path: of the file; it need not be there.
+            key: what the runs depend on besides their number.
+        """
+        self.path, self.key = path, json.dumps(key, sort_keys=True)
+        self.known: dict[int, VerdictRun | None] = {}
+        check_output(path, None)
+        text = read_text(path, "Log of runs", LARGEST, remedy="remove it") if path.is_file() else ""
+        for line in text.splitlines():
+            try:
+                entry = json.loads(line)
+                if entry["key"] == self.key:
+                    run = entry["run"]
+                    self.known[entry["number"]] = None if run is None else whole(VerdictRun(**run))
+            except (ValueError, KeyError, TypeError):
+                continue  # cut short when it was written, or of another version: it is run again
+
+    def add(self, number: int, run: VerdictRun | None) -> None:
+        """Take in a run, and write it down at once."""
+        self.known[number] = run
+        entry = {"key": self.key, "number": number, "run": None if run is None else asdict(run)}
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry) + "\n")
+
+
+def whole(run: VerdictRun) -> VerdictRun:
+    """The run, if it has all witnesses that are asked today.
+
+    Raises:
+        KeyError: it has others.
+    """
+    if run.witnesses is not None and run.witnesses.keys() != {one.name for one in fields(Witnesses)}:
+        raise KeyError(f"run {run.number} was made with other witnesses")
+    return run
+
+
+Runner = Callable[[Iterable[int]], Iterator[VerdictRun | None]]
+"""Makes the runs of some numbers, in their order."""
+
+
+@contextmanager
+def runner(source: Source, workers: int) -> Iterator[Runner]:
+    """What makes runs: so many processes, or with 0 this one."""
+    if not workers:
+        stream = source.open()
+        yield lambda numbers: map(stream.run, numbers)
+        return
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _open, (source,))
+    try:
+        yield lambda numbers: pool.map(_run, numbers)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def collect(
+    log: RunLog,
+    runs: int,
+    run: Runner,
+    workers: int = 0,
+    go_on: Callable[[], bool] = lambda: True,
+    observer: Callable[[int], None] = lambda done: None,
+) -> list[VerdictRun]:
+    """The first runs of a stream; those that the log knows are not run again.
+
+    Args:
+        log: that keeps them.
+        runs: how many.
+        run: makes them.
+        workers: processes that it has.
+        go_on: whether there is time for more.
+        observer: called after each with how many there are.
+    """
+    missing = [number for number in range(runs) if number not in log.known]
+    done = runs - len(missing)
+    observer(done)
+    size = BATCH * max(workers, 1)
+    for numbers in (missing[start : start + size] for start in range(0, len(missing), size)):
+        if not go_on():
+            break
+        for number, made in zip(numbers, run(numbers), strict=True):
+            log.add(number, made)
+            done += 1
+            observer(done)
+    return [made for number in range(runs) if (made := log.known.get(number)) is not None]
+
+
+_stream: RunStream | None = None
+
+
+def _open(source: Source) -> None:
+    """Open the stream of this process, which ends with the one that started it, however that ends."""
+    global _stream
+    Thread(target=_end_with_parent, daemon=True).start()
+    signal(SIGINT, SIG_IGN)  # of Ctrl-C the parent alone speaks
+    _stream = source.open()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def _run(number: int) -> VerdictRun | None:
+    assert _stream is not None
+    return _stream.run(number)

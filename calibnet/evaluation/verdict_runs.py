@@ -1,0 +1,175 @@
+"""Runs to fit the verdict to: plain frames and frames with the battery's faults, and what witnesses say of each.
+
+The stream of runs has no end, and each depends on the seed and its number alone: a longer one begins with
+a shorter one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from calibnet.cascade import Cascade
+from calibnet.cascade.prepared import prepared
+from calibnet.cascade.upright import Upright
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Sequence as FrameSequence
+from calibnet.datasets.selection import spread
+from calibnet.errors import CalibnetError
+from calibnet.evaluation.battery import FRAME_LIMITS, PLAIN
+from calibnet.evaluation.corruptions import Corruption, corruptions
+from calibnet.geometry import MiscalibrationRange, invert, pose_error, sample_miscalibration
+from calibnet.geometry.se3 import pose_vector
+from calibnet.geometry.types import Extrinsic
+from calibnet.judging.coefficients import Coefficients
+from calibnet.judging.doubt import Doubt
+from calibnet.judging.witnesses import witnesses
+from calibnet.verdict import ACCEPTED
+
+FRAMES = 8
+"""Of a sequence, spread over it: neighbours of a drive say the same."""
+KEPT = 16
+"""Frames in memory, of some 10 MB each."""
+PLAIN_SHARE = 0.5
+"""Of the runs: those without a fault tell how many good results are accepted."""
+
+
+@dataclass(frozen=True)
+class VerdictRun:
+    """One calibration from a random guess.
+
+    Attributes:
+        number: in the stream.
+        sequence, frame: what was calibrated.
+        fault, strength: what was put into it, see `calibnet.evaluation.corruptions`.
+        rotation_deg, translation_cm: how far off it ended.
+        witnesses: by name; None where the verdict does not ask them, because picture and scan do not fit, for instance.
+        offset: the result against the truth, ``(translation m, rotation rad)`` in the camera frame.
+        information: ``[6, 6]`` that the last stage states, None without one.
+        match_error_px: that it expects.
+    """
+
+    number: int
+    sequence: str
+    frame: int
+    fault: str
+    strength: str
+    rotation_deg: float
+    translation_cm: float
+    witnesses: dict[str, float] | None
+    offset: list[float]
+    information: list[list[float]] | None
+    match_error_px: float
+
+    @property
+    def good(self) -> bool:
+        """Whether the result is within the limits of a frame."""
+        return self.rotation_deg <= FRAME_LIMITS[0] and self.translation_cm <= FRAME_LIMITS[1]
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing was put into the frame."""
+        return self.fault == PLAIN.name
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What a run starts with.
+
+    Attributes:
+        sequence: that the frame is from.
+        fault: that was put into it.
+        frame: with it; its extrinsic is the truth.
+        guess: ``camera_from_lidar`` to start from.
+    """
+
+    sequence: str
+    fault: Corruption
+    frame: Frame
+    guess: Extrinsic
+
+
+class RunStream:
+    """The runs on some sequences with a cascade, by number."""
+
+    def __init__(self, cascade: Cascade, sequences: Sequence[FrameSequence], seed: int) -> None:
+        """A run is a random frame of a random sequence, every sequence as often as the others.
+
+        Args:
+            cascade: what calibrates; its verdict is set to accept whatever its witnesses would be asked for.
+            sequences: at least one; other pictures come from another one of them.
+            seed: of everything random.
+        """
+        self.cascade, self.sequences, self.seed = asking(cascade), list(sequences), seed
+        self.read = lru_cache(KEPT)(lambda sequence, position: self.sequences[sequence][position])
+
+    def run(self, number: int) -> VerdictRun | None:
+        """The run of this number; None where its frame cannot be read or has too few points in the picture."""
+        try:
+            return measured(self.cascade, self.drawn(number), number)
+        except CalibnetError:
+            return None
+
+    def drawn(self, number: int) -> Drawn:
+        """What is run under this number.
+
+        Raises:
+            DatasetError: its frame cannot be read.
+        """
+        generator = np.random.default_rng([self.seed, number])
+        which = int(generator.integers(len(self.sequences)))
+        sequence = self.sequences[which]
+        position = int(generator.choice(spread(len(sequence), FRAMES)))
+        fault = PLAIN if generator.random() < PLAIN_SHARE else self._fault(which, position, generator)
+        frame, first = self.read(which, position), self.cascade.stages[0].range
+        range_ = MiscalibrationRange(fault.farther * first.rotation_deg, fault.farther * first.translation_m)
+        guess = sample_miscalibration(range_, generator) @ frame.camera_from_lidar
+        return Drawn(sequence.name, fault, fault.alter(frame), guess)
+
+    def _fault(self, which: int, position: int, generator: np.random.Generator) -> Corruption:
+        """Any fault that this frame can have, each name as often as the others."""
+        others = [other for other in range(len(self.sequences)) if other != which]
+        donors = [self.read(int(generator.choice(others)), 0)] if others else []
+        named: dict[str, list[Corruption]] = {}
+        for fault in corruptions(self.sequences[which], position, donors):
+            named.setdefault(fault.name, []).append(fault)
+        strengths = named[str(generator.choice(list(named)))]
+        return strengths[int(generator.integers(len(strengths)))]
+
+
+def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
+    """Calibrate a frame, and note what witnesses say of it.
+
+    Raises:
+        CalibrationError: too few points fall into the picture.
+    """
+    upright = Upright.of(drawn.guess, cascade.stages[0].range)
+    frame, start = prepared(drawn.frame, upright), upright.extrinsic(drawn.guess)
+    trace = cascade.calibrate(frame, start)
+    last, truth = trace.stages[-1], frame.camera_from_lidar
+    error = pose_error(last.after, truth)
+    asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
+    return VerdictRun(
+        number,
+        drawn.sequence,
+        frame.index,
+        drawn.fault.name,
+        drawn.fault.strength,
+        error.rotation_deg,
+        error.translation_cm,
+        asdict(witnesses(trace)) if asked else None,
+        pose_vector(last.after @ invert(truth)).tolist(),
+        None if last.information is None else last.information.tolist(),
+        last.match_error_px,
+    )
+
+
+def asking(cascade: Cascade) -> Cascade:
+    """The cascade with a verdict that accepts whatever its witnesses would be asked for."""
+    everything = Doubt(0.0, {}, accepted_below=1.0, rejected_above=1.0)
+    finest = cascade.stages[-1].range
+    cascade.coefficients = Coefficients(everything, weights={finest: ""}, missing="")
+    return cascade

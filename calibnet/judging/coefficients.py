@@ -1,0 +1,119 @@
+"""What verdicts are made with: coefficients that were fitted to one set of weights, and hold for no other.
+
+They lie beside the manifest, in ``PRESET-verdict.toml``, which `calib-inspect fit-verdict` writes, and name the weights
+they belong to by fingerprints. Where a set has none of its own, nothing is accepted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from calibnet.errors import WeightsError
+from calibnet.geometry import MiscalibrationRange
+from calibnet.judging.covariance import Spread
+from calibnet.judging.doubt import Doubt
+from calibnet.judging.witnesses import Witnesses
+from calibnet.runtime.reading import parse_toml, read_text
+from calibnet.runtime.writing import write_whole
+from calibnet.weights.fingerprint import fingerprint
+from calibnet.weights.manifest import PACKAGE, Manifest
+
+HEAD = (
+    "# How verdicts on the weights beside this file are made; `calib-inspect fit-verdict` writes it.\n"
+    "# It holds for these weights alone. docs/decisions.md (Doubt) says how it is fitted.\n"
+)
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Coefficients of the verdict.
+
+    Attributes:
+        doubt: how witnesses are summed up; None where nothing was fitted.
+        spread: how far results lie from the truth.
+        weights: fingerprints of the stages that were run, by range; the finest of them ends a run that can be judged.
+        missing: a sentence that says why there are none; empty where there are.
+        fitted: what they were fitted to, and what came of it.
+    """
+
+    doubt: Doubt | None = None
+    spread: Spread = field(default_factory=Spread)
+    weights: Mapping[MiscalibrationRange, str] = field(default_factory=dict)
+    missing: str = "The verdict has not been fitted to these networks."
+    fitted: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def doubt_of(self, last: MiscalibrationRange) -> Doubt | str:
+        """How to sum up the witnesses of a run, or a sentence that says why nothing can be said of it.
+
+        Args:
+            last: range of the stage that ended it.
+        """
+        if self.doubt is None:
+            return self.missing
+        finest = min(self.weights, default=last)
+        if last != finest:
+            return f"The verdict was fitted to runs that end with the stage of {finest.label}, not with {last.label}."
+        return self.doubt
+
+    def write(self, path: Path) -> None:
+        """Write them as TOML."""
+        import tomli_w
+
+        assert self.doubt is not None
+        content = {
+            "weights": {str(range_): of for range_, of in self.weights.items()},
+            "doubt": asdict(self.doubt),
+            "spread": asdict(self.spread),
+            "fitted": dict(self.fitted),
+        }
+        write_whole(path, (HEAD + tomli_w.dumps(content)).encode())
+
+
+def coefficients_path(preset: str, folder: Path | None = None) -> Path:
+    """Where the coefficients of a preset's weights lie: in ``folder``, or in the package."""
+    return (folder or PACKAGE) / f"{preset}-verdict.toml"
+
+
+def load_coefficients(manifest: Manifest, folder: Path | None = None) -> Coefficients:
+    """The coefficients that were fitted to the weights in a folder; without any, `Coefficients.missing` says why.
+
+    A copy of the weights that ship with the package needs no file of its own: the package's is for the same weights.
+
+    Raises:
+        WeightsError: a file of coefficients is malformed.
+    """
+    where = folder or PACKAGE
+    mend = f"`calib-inspect fit-verdict --weights {where} --data …` fits it"
+    other = ""
+    for path in dict.fromkeys([coefficients_path(manifest.preset, folder), coefficients_path(manifest.preset)]):
+        if not path.is_file():
+            continue
+        read = _read(path)
+        changed = [range_ for range_, known in read.weights.items() if fingerprint(where, manifest, range_) != known]
+        if not changed:
+            return read
+        if path.parent == where:
+            stages = ", ".join(range_.label for range_ in changed)
+            other = (
+                f"Since the verdict was fitted to the weights in {where}, these have changed: {stages}; {mend} anew."
+            )
+    return Coefficients(missing=other or f"The verdict has not been fitted to the weights in {where}; {mend}.")
+
+
+def _read(path: Path) -> Coefficients:
+    remedy = "fit them again with `calib-inspect fit-verdict`"
+    text = read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy)
+    try:
+        content = parse_toml(text)
+        doubt = Doubt(**content["doubt"])
+        weights = {MiscalibrationRange.parse(range_): of for range_, of in content["weights"].items()}
+        if unknown := doubt.weights.keys() - {field.name for field in fields(Witnesses)}:
+            raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
+        return Coefficients(doubt, Spread(**content["spread"]), weights, "", content.get("fitted", {}))
+    except (TypeError, KeyError, ValueError, AttributeError) as error:
+        raise WeightsError(
+            f"{path} holds no coefficients of a verdict ({error}); {remedy}."
+        ) from None

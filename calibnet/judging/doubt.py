@@ -1,0 +1,33 @@
+"""How likely a result is wrong, by its witnesses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from calibnet.judging.witnesses import Witnesses
+
+LARGEST_ODDS = 50.0
+"""Of which the logarithm is taken: beyond it, probabilities are 0 and 1 all the same."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Logistic regression of a wrong result on the witnesses.
+
+    Attributes:
+        intercept: of the logarithm of the odds.
+        weights: of the witnesses, by name.
+        accepted_below: probability of being wrong below which a result is accepted.
+        rejected_above: probability above which it is rejected; in between nobody can tell.
+    """
+
+    intercept: float
+    weights: dict[str, float]
+    accepted_below: float
+    rejected_above: float
+
+    def __call__(self, of: Witnesses) -> float:
+        """Probability that the result is wrong; not a number where a witness is missing."""
+        odds = self.intercept + sum(weight * getattr(of, name) for name, weight in self.weights.items())
+        return odds if math.isnan(odds) else 1 / (1 + math.exp(-min(max(odds, -LARGEST_ODDS), LARGEST_ODDS)))

@@ -1,0 +1,124 @@
+"""``calib-inspect fit-verdict``: coefficients of the verdict for a set of weights."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from inspector.cli.options import FOLDER, STAGES
+from inspector.cli.output import say
+
+if TYPE_CHECKING:
+    from calibnet.evaluation.verdict_fit import FitFigures
+
+
+@click.command("fit-verdict")
+@click.option("--weights", type=FOLDER, required=True, help="Folder of the weights; the coefficients go there.")
+@click.option("--preset", default="compact", show_default=True, help="Network of the weights.")
+@click.option(
+    "--data",
+    multiple=True,
+    metavar="DATASET:DIR[:SEQ]",
+    help="Frames whose own extrinsic is true and that were not trained on. Repeatable; many rigs are better.",
+)
+@click.option(
+    "--synthetic",
+    type=click.IntRange(0),
+    default=3,
+    show_default=True,
+    help="Drives of the synthetic world besides, each with sensors of its own.",
+)
+@click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Calibrations to fit to.")
+@click.option(
+    "--minutes",
+    type=click.FloatRange(0, min_open=True),
+    help="Stop there if --runs are not done by then; what was run is kept, and counts the next time.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option(
+    "--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run, from their first's range."
+)
+@click.option("--workers", type=click.IntRange(0), help="Processes, of one thread each.  [default: as many as cores]")
+def fit_verdict(
+    weights: Path,
+    preset: str,
+    data: tuple[str, ...],
+    synthetic: int,
+    runs: int,
+    minutes: float | None,
+    seed: int,
+    stages: tuple[int, ...],
+    workers: int | None,
+) -> None:
+    """Fit the verdict to weights of your own: without that, none of their results is accepted.
+
+    Calibrates frames of a known extrinsic from random guesses, half of them with one of the battery's faults, and fits
+    what tells right from wrong. Writes PRESET-verdict.toml beside the weights, for these weights alone: fit it again
+    after training on. Runs are kept in PRESET-verdict.jsonl as they are made; the same
+    command goes on from there.
+
+    \b
+    calib-inspect fit-verdict --weights runs --data kitti-raw:KITTI/raw:2011_09_26/0048 --data folder:RIGS
+    """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from calibnet.evaluation.verdict_fit import fit_verdict as fit
+    from calibnet.evaluation.verdict_log import RunLog, Source, collect, runner
+    from calibnet.geometry import RANGES
+    from calibnet.judging.coefficients import Coefficients, coefficients_path
+    from calibnet.weights.fingerprint import fingerprints
+
+    source = Source(preset, weights, stages, data, synthetic, seed)
+    source.sequences()  # what is wrong with them is said before anything is started
+    marks = fingerprints(preset, weights, [RANGES[number - 1] for number in stages])
+    path = coefficients_path(preset, weights)
+    key = {"weights": {str(range_): mark for range_, mark in marks.items()}}
+    key |= {name: value for name, value in asdict(source).items() if name not in ("preset", "weights", "stages")}
+    log = RunLog(path.with_suffix(".jsonl"), key)
+    until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
+    processes = (os.cpu_count() or 1) if workers is None else workers
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress, runner(source, processes) as run:
+        task = progress.add_task("calibrating", total=runs)
+        made = collect(
+            log,
+            runs,
+            run,
+            processes,
+            lambda: time.monotonic() < until,
+            lambda done: progress.update(task, completed=done),
+        )
+    doubt, spread, figures = fit(made, (RANGES[max(stages) - 1], RANGES[min(stages) - 1]))
+    fitted = {"data": [short(spec) for spec in data], "synthetic": synthetic, "seed": seed, **asdict(figures)}
+    Coefficients(doubt, spread, marks, "", fitted).write(path)
+    for line in told(figures):
+        console.print(line, soft_wrap=True)
+    say(path)
+
+
+def short(spec: str) -> str:
+    """``DATASET:DIR[:SEQ]`` without what is before the folder's own name, which is different on every machine."""
+    dataset, folder, *sequence = spec.split(":")
+    return ":".join([dataset, Path(folder).name, *sequence])
+
+
+def told(figures: FitFigures) -> Iterator[str]:
+    """The figures in sentences."""
+    yield (
+        f"{figures.runs} runs on {figures.sequences} sequences, {figures.plain} of them without a fault, of which "
+        f"{figures.good} end right. With each sequence left out of the fit in turn:"
+    )
+    yield f"  accepted though wrong: {figures.false_accept_rate:.1%} of all runs"
+    yield f"  accepted: {figures.acceptance_of_good:.0%} of the good runs without a fault"
+    yield f"  rejected: {figures.wrong_rejected:.0%} of the wrong runs"
+    points = (f"{point['acceptance_of_good']:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
+    yield f"  accepted of the good at other shares of false accepts: {', '.join(points)}"
+    yield f"  squared error by the stated covariance, a degree of freedom: {figures.spread:.2f}"

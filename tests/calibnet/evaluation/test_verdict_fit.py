@@ -1,0 +1,83 @@
+"""From runs of a known truth to coefficients, on runs that follow known ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.verdict_fit import NAMES, fit_spread, fit_verdict, left_out, mean_square, regression, threshold
+from calibnet.evaluation.verdict_runs import VerdictRun
+from calibnet.geometry import RANGES
+from calibnet.judging.covariance import Spread
+
+LAST = RANGES[4]
+BOTH = (LAST, RANGES[2])
+STATED = np.diag([4e3, 4e3, 1e3, 4e5, 4e5, 4e5]) + LAST.information
+
+
+def runs(count: int, spread: Spread, seed: int = 0, sharpness: float = 3.0) -> list[VerdictRun]:
+    """Results that lie as far off as a spread says, whose match error tells, more or less sharply, which are wrong."""
+    generator, made = np.random.default_rng(seed), []
+    for number in range(count):
+        error = float(generator.uniform(1, 4))
+        wrong = generator.random() < 1 / (1 + np.exp(-sharpness * (error - 2.5)))
+        offset = generator.multivariate_normal(np.zeros(6), spread.covariance(STATED, *BOTH, error))
+        said = {name: float(generator.normal()) for name in NAMES} | {"match_error": error}
+        made.append(
+            VerdictRun(
+                number, f"drive {number % 7}", number, "none" if number % 2 else "grey", "", 2.0 if wrong else 0.3, 9.0,
+                said, offset.tolist(), STATED.tolist(), error,
+            )
+        )  # fmt: skip
+    return made
+
+
+def test_the_witness_that_tells_is_found_and_the_others_are_not_believed() -> None:
+    doubt, _, figures = fit_verdict(runs(800, Spread()), BOTH)
+    assert doubt.weights["match_error"] == pytest.approx(3.0, abs=0.5)
+    assert max(abs(doubt.weights[name]) for name in NAMES if name != "match_error") < 0.4
+    assert -doubt.intercept / doubt.weights["match_error"] == pytest.approx(2.5, abs=0.15)
+    assert (figures.runs, figures.plain, figures.sequences) == (800, 400, 7)
+    assert figures.false_accept_rate == 8 / 800  # as many as may be, and no more
+    assert 0.2 < figures.acceptance_of_good < 0.8 < 1 - doubt.accepted_below < 1
+    shares = [point["acceptance_of_good"] for point in figures.curve]
+    assert shares == sorted(shares) and shares[0] < shares[-1] and figures.curve[3]["false_accepts"] == 0.01
+    assert shares[3] == figures.acceptance_of_good
+
+
+def test_what_witnesses_do_not_tell_is_not_accepted() -> None:
+    doubt, _, figures = fit_verdict(runs(800, Spread(), sharpness=0.0), BOTH)
+    assert figures.acceptance_of_good < 0.1 and doubt.accepted_below < 0.5
+
+
+def test_each_sequence_is_judged_by_a_fit_to_the_others() -> None:
+    values = np.random.default_rng(0).normal(size=(40, 1))
+    wrong = values[:, 0] > 0
+    names = ["a"] * 20 + ["b"] * 20
+    wrong[20:] = ~wrong[20:]  # the other way round in one of them: a fit to its own runs would know
+    odds = left_out(values, wrong, names)
+    assert np.mean((odds > 0) == wrong) < 0.1
+    intercept, weights = regression(values[:20], wrong[:20])
+    np.testing.assert_allclose(odds[20:], intercept + values[20:] @ weights, atol=1e-6)
+
+
+def test_a_threshold_lets_so_many_wrong_ones_through() -> None:
+    odds, wrong = np.array([-3.0, -2, -1, 0, 1, 2]), np.array([False, True, False, True, False, True])
+    assert [threshold(odds, wrong, most) for most in (0, 1, 1.9, 2, 3)] == [-2, 0, 0, 2, np.inf]
+
+
+@pytest.mark.parametrize("spread", [Spread(0.05, 0.07, 0.4), Spread(0.5, 0.02, 0.1)])
+def test_the_spread_is_found_and_covers_the_errors(spread: Spread) -> None:
+    made = runs(400, spread)
+    found = fit_spread(made, BOTH)
+    assert mean_square(made, BOTH, found) == pytest.approx(1.0, abs=0.05)
+    truth, estimate = (of.covariance(STATED, *BOTH, 2.0) for of in (spread, found))
+    np.testing.assert_allclose(np.sqrt(np.diag(estimate)), np.sqrt(np.diag(truth)), rtol=0.15)
+    assert fit_spread(made[:5], BOTH) == Spread()
+
+
+def test_too_few_runs_of_a_kind_are_a_sentence() -> None:
+    few = [run for run in runs(200, Spread()) if run.good][:40]
+    with pytest.raises(CalibrationError, match="Of 40 runs 40 end right and 0 wrong"):
+        fit_verdict(few, BOTH)

@@ -1,0 +1,79 @@
+"""Coefficients of the verdict, bound to the weights they were fitted to."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from calibnet.errors import WeightsError
+from calibnet.geometry import RANGES
+from calibnet.judging.coefficients import Coefficients, coefficients_path, load_coefficients
+from calibnet.judging.covariance import Spread
+from calibnet.judging.doubt import Doubt
+from calibnet.weights.fingerprint import fingerprints
+from calibnet.weights.manifest import PACKAGE, Manifest, StageEntry, StageSettings, load_manifest
+
+MANIFEST = Manifest("mine", stages=(StageEntry(RANGES[3], "four"), StageEntry(RANGES[4], "five")))
+DOUBT = Doubt(-1.5, {"match_error": 2.0, "reach": 0.25}, 0.25, 0.75)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "four").write_bytes(b"of stage 4")
+    (tmp_path / "five").write_bytes(b"of stage 5")
+    MANIFEST.write(tmp_path / "mine.toml")
+    marks = fingerprints("mine", tmp_path, [RANGES[3], RANGES[4]])
+    Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), marks, "", {"runs": 90}).write(coefficients_path("mine", tmp_path))
+    return tmp_path
+
+
+def test_they_are_read_as_they_were_written(folder: Path) -> None:
+    coefficients = load_coefficients(MANIFEST, folder)
+    assert coefficients.doubt_of(RANGES[4]) == DOUBT and coefficients.missing == ""
+    assert coefficients.spread == Spread(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
+    other = coefficients.doubt_of(RANGES[3])
+    assert isinstance(other, str) and "end with the stage of ±1°/0.1 m" in other
+
+
+def test_weights_that_were_trained_on_or_are_used_otherwise_have_none(folder: Path) -> None:
+    used = replace(MANIFEST.stages[1], settings=StageSettings(gain=1.5))
+    for manifest in (MANIFEST.with_stage(used), MANIFEST):
+        (folder / "five").write_bytes(b"of stage 5" if manifest is not MANIFEST else b"trained on")
+        coefficients = load_coefficients(manifest, folder)
+        assert coefficients.doubt is None and coefficients.doubt_of(RANGES[4]) == coefficients.missing
+        assert "have changed: ±1°/0.1 m; `calib-inspect fit-verdict --weights" in coefficients.missing
+
+
+def test_own_weights_without_any_are_told_how_to_get_them_and_a_copy_needs_none(tmp_path: Path) -> None:
+    manifest = load_manifest("compact")
+    empty = load_coefficients(manifest, tmp_path)
+    assert empty.doubt is None
+    assert empty.missing == (
+        f"The verdict has not been fitted to the weights in {tmp_path}; "
+        f"`calib-inspect fit-verdict --weights {tmp_path} --data …` fits it."
+    )
+    for stage in manifest.stages:
+        shutil.copy(PACKAGE / stage.file, tmp_path)
+    assert load_coefficients(manifest, tmp_path) == load_coefficients(manifest)
+    (tmp_path / manifest.file(RANGES[4])).write_bytes(b"trained on")
+    assert load_coefficients(manifest, tmp_path).doubt is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [("match_error", "matcherror", "no witness is called matcherror"), ("[spread]", "[sprawl]", "'spread'")],
+)
+def test_a_malformed_file_is_a_sentence(folder: Path, old: str, new: str, said: str) -> None:
+    path = coefficients_path("mine", folder)
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(WeightsError, match=said):
+        load_coefficients(MANIFEST, folder)
+
+
+def test_a_stage_without_weights_has_no_fingerprint(folder: Path) -> None:
+    (folder / "four").unlink()
+    with pytest.raises(WeightsError, match=r"There are no weights of ±2°/0\.2 m in"):
+        fingerprints("mine", folder, [RANGES[3], RANGES[4]])

@@ -1,0 +1,68 @@
+"""``calib-inspect fit-verdict``: from a folder of weights to its coefficients."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from calibnet.evaluation import verdict_log
+from calibnet.evaluation.verdict_runs import VerdictRun
+from calibnet.geometry import RANGES
+from calibnet.judging.coefficients import load_coefficients
+from calibnet.judging.covariance import Spread
+from calibnet.weights.manifest import load_manifest
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from tests.calibnet.evaluation.test_verdict_fit import runs
+
+
+class Known:
+    """A stream of runs that are there already."""
+
+    made = 0
+
+    def run(self, number: int) -> VerdictRun:
+        Known.made += 1
+        return runs(number + 1, Spread(), seed=1)[number]
+
+
+@pytest.fixture
+def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Files that stand for the stages' weights, and runs in no time."""
+    for stage in load_manifest("compact").stages:
+        (tmp_path / stage.file).write_bytes(stage.file.encode())
+    monkeypatch.setattr(verdict_log.Source, "open", lambda source: Known())
+    return tmp_path
+
+
+def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights: Path) -> None:
+    arguments = ["fit-verdict", "--weights", str(weights), "--runs", "300", "--workers", "0"]
+    Known.made = 0
+    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    assert result.exit_code == 0 and result.stdout.strip() == str(weights / "compact-verdict.toml")
+    assert "300 runs on 7 sequences, 150 of them without a fault" in result.stderr
+    coefficients = load_coefficients(load_manifest("compact", weights), weights)
+    assert coefficients.missing == "" and coefficients.fitted["seed"] == 0
+    assert set(coefficients.weights) == set(RANGES[2:]) and coefficients.fitted["false_accept_rate"] == 0.01
+    before = (weights / "compact-verdict.toml").read_bytes()
+    assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
+    assert Known.made == 300 and (weights / "compact-verdict.toml").read_bytes() == before
+    (weights / load_manifest("compact").file(RANGES[4])).write_bytes(b"trained on")
+    assert load_coefficients(load_manifest("compact", weights), weights).doubt is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--synthetic", "0"], "There is nothing to run on: give --data, or --synthetic above 0."),
+        (["--data", "folder:/nowhere"], "There is no folder /nowhere; 'folder:/nowhere' names it."),
+        (["--runs", "4"], "Make more runs, or add other data."),
+    ],
+)
+def test_what_cannot_be_done_is_a_sentence(
+    weights: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    assert run(cli, ["fit-verdict", "--weights", str(weights), "--workers", "0", *arguments]) == 3
+    assert said in capsys.readouterr().err and not (weights / "compact-verdict.toml").exists()
