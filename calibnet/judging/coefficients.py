@@ -114,6 +114,4 @@ def _read(path: Path) -> Coefficients:
             raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
         return Coefficients(doubt, Spread(**content["spread"]), weights, "", content.get("fitted", {}))
     except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise WeightsError(
-            f"{path} holds no coefficients of a verdict ({error}); {remedy}."
-        ) from None
+        raise WeightsError(f"{path} holds no coefficients of a verdict ({error}); {remedy}.") from None

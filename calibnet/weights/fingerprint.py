@@ -43,4 +43,4 @@ def fingerprints(preset: str, folder: Path, ranges: Iterable[MiscalibrationRange
 def _digest(path: Path, changed: int) -> str:
     """Digest of a file's bytes; read again when the file has changed."""
     with open_file(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return hashlib.sha256(file.read()).hexdigest()
