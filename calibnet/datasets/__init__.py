@@ -1,6 +1,6 @@
 """Where frames come from: `open_sequence` by name, one module per source, all of them a `Sequence`.
 
-Importing this package is cheap; a source's module (and OpenCV, pykitti, Open3D with it) is
+Importing this package is cheap; a source's module (and OpenCV with it) is
 imported when a sequence of it is opened.
 """
 

@@ -6,9 +6,6 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
 from calibnet.datasets.frame import Original
@@ -80,8 +77,7 @@ class Folder(PairedSequence):
 
     def _picture(self, files: FrameFiles) -> Picture:
         path, camera = files.needed.image, self._rectification.camera
-        image = read_image(path)
-        check_size(image, camera, path)
+        image = read_image(path, (camera.width, camera.height))
         if camera.is_pinhole:
             return Picture(image)
         return Picture(self._rectification(image), Original(image, camera))
@@ -95,8 +91,7 @@ def rectification(camera: CameraModel, images: list[Path]) -> Rectification:
     pictures = []
     for position in spread(len(images), LOOKED_AT):
         with suppress(DatasetError):
-            pictures.append(read_image(images[position]))
-    pictures = [picture for picture in pictures if picture.shape[:2] == (camera.height, camera.width)]
+            pictures.append(read_image(images[position], (camera.width, camera.height)))
     return without_black(middle, pictures) if pictures else middle
 
 
@@ -157,20 +152,6 @@ def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
     found = read_folder(folder, Wanted(picture=next(pictures, None)))
     assert found.camera is not None and found.camera_from_lidar is not None
     return calibration_path(folder), found.camera, found.camera_from_lidar
-
-
-def check_size(image: NDArray[np.uint8], camera: CameraModel, path: Path) -> None:
-    """See that a picture is of the size that the camera is calibrated for.
-
-    Raises:
-        DatasetError: it is not.
-    """
-    height, width = image.shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise DatasetError(
-            f"Image {path} is {width}x{height} and its calibration is for {camera.width}x{camera.height}; calibrate "
-            "at the images' size or resize them."
-        )
 
 
 def _frames(pairs: list[Pair]) -> list[FrameFiles]:

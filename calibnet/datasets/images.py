@@ -2,45 +2,118 @@
 
 from __future__ import annotations
 
+import io
+import warnings
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
+from calibnet.runtime.reading import MEGABYTE, read_file
 
+LARGEST_BYTES = 256 * MEGABYTE
+"""Of a picture's file."""
+MOST_PIXELS = 100_000_000
+"""Of a picture: 300 MB once it is decoded."""
+FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
+DEPTHS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "I;16", "I;16B", "I;16L"}
+"""Kinds of pixels, as Pillow calls them, that are a camera's; others have 32 bits."""
+BITS_PER_SAMPLE = 258
+"""TIFF's tag."""
+MISSING, MISSING_ROWS = 128, 8
+"""What a JPEG decoder puts where data is missing, and rows of it at the end that are no accident."""
 _END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
 """First bytes of a PNG or JPEG file to the marker that ends a whole one."""
-
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
 
-def read_image(path: Path) -> NDArray[np.uint8]:
-    """Read an image as ``[H, W, 3]`` uint8 RGB; grey images get three equal channels, 16 bits become `eight_bits`.
+class ImageError(ValueError):
+    """What is wrong with a picture, in words that continue a sentence."""
 
-    An orientation tag is ignored: a calibration is of the pixels as they are stored.
+
+def read_image(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+    """Read an image as ``[H, W, 3]`` uint8 RGB; see `decode_image`.
+
+    Args:
+        path: the file.
+        size: width and height that the calibration is for, if it says.
 
     Raises:
-        DatasetError: the file is missing, truncated or no image.
+        DatasetError: the file is missing, truncated, no image, or of another size.
     """
+    data = read_file(path, "Image", LARGEST_BYTES)
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise DatasetError(f"Image {path} cannot be read ({error.strerror}); restore it.") from None
-    for start, end in _END_OF_FILE.items():
-        # Checked before decoding: what a decoder makes of half a file depends on its version.
-        if data.startswith(start) and data.rfind(end) < 0:
-            raise DatasetError(f"Image {path} is truncated; copy or download it again.")
-    image = None
-    if data:
+        return decode_image(data, size)
+    except ImageError as error:
+        raise DatasetError(f"Image {path} {error}.") from None
+
+
+def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+    """An image as ``[H, W, 3]`` uint8 RGB; grey images get three equal channels, 16 bits become `eight_bits`.
+
+    An orientation tag is ignored: a calibration is of the pixels as they are stored. The size is taken from the header,
+    before any pixel is decoded.
+
+    Args:
+        data: of a PNG, JPEG, BMP, TIFF or WebP file.
+        size: width and height that it must have.
+
+    Raises:
+        ImageError: it is truncated, damaged, no image, too large, or of another size.
+    """
+    damaged, truncated = (f"is {what}; copy or download it again" for what in ("damaged or not an image", "truncated"))
+    if any(data.startswith(start) and data.rfind(end) < 0 for start, end in _END_OF_FILE.items()):
+        raise ImageError(truncated)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what is odd but can be read
+        try:
+            image = Image.open(io.BytesIO(data), formats=FORMATS)
+        except Image.DecompressionBombError:
+            raise ImageError(f"has more than {MOST_PIXELS // 10**6} million pixels; resize it") from None
+        except Exception:  # a header is parsed by many hands, which fail in as many ways
+            raise ImageError(damaged) from None
+        if image.width * image.height > MOST_PIXELS:
+            raise ImageError(
+                f"is {image.width}x{image.height}, more than {MOST_PIXELS // 10**6} million pixels; resize it"
+            )
+        if size is not None and image.size != size:
+            raise ImageError(
+                f"is {image.width}x{image.height} and its calibration is for {size[0]}x{size[1]}; calibrate at the "
+                "images' size or resize them"
+            )
+        if image.mode not in DEPTHS:
+            raise ImageError(f"has pixels of an unusual kind ({image.mode}); store 8 or 16 bits a channel")
+        try:
+            eight = np.array(image.convert("RGB"), np.uint8)
+        except MemoryError:
+            raise
+        except Exception as error:
+            raise ImageError(truncated if "truncated" in str(error) else damaged) from None
+    if image.format in ("JPEG", "MPO") and (eight[-MISSING_ROWS:] == MISSING).all():
+        raise ImageError("is truncated, its lower part is missing; copy or download it again")
+    return _sixteen(data, damaged) if _is_deep(image, data) else eight
+
+
+def _is_deep(image: Image.Image, data: bytes) -> bool:
+    """Whether a channel has 16 bits, of which Pillow keeps eight."""
+    if image.format == "TIFF":
+        return bool(max(getattr(image, "tag_v2", {}).get(BITS_PER_SAMPLE, (8,))) > 8)
+    return image.format == "PNG" and data[24] > 8
+
+
+def _sixteen(data: bytes, damaged: str) -> NDArray[np.uint8]:
+    """A picture of 16 bits a channel, which is known to be whole."""
+    try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), AS_STORED)
-    if image is None:
-        raise DatasetError(f"Image {path} is damaged or not an image; copy or download it again.")
-    if image.dtype == np.uint16:
-        image = eight_bits(np.asarray(image, np.uint16))
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+    except cv2.error:
+        image = None
+    if image is None or image.dtype != np.uint16:
+        raise ImageError(damaged)
+    return cv2.cvtColor(eight_bits(np.asarray(image, np.uint16)), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
 
 
 def eight_bits(image: NDArray[np.uint16]) -> NDArray[np.uint8]:

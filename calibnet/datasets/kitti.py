@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,14 @@ from calibnet.datasets.calibration import Calibration, checked_intrinsics, check
 from calibnet.datasets.paired import FrameFiles
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Extrinsic, Floats
+from calibnet.runtime.reading import TEXT_BYTES, read_text
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 NOMINAL_PERIOD = 0.1
 """Seconds between two frames of KITTI's 10 Hz, for frames without a recorded time."""
+
+LATEST_S = 1e11
+"""Seconds since 1970, of the year 5138."""
 
 DATE_OF_FOCAL_LENGTH = {721.5377: "2011_09_26", 707.0912: "2011_09_30", 718.856: "2011_10_03"}
 """Recording date, and so the rig, of a rectified focal length: odometry folders name no date."""
@@ -32,12 +37,13 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
         DatasetError: the file or a key is missing, a row has another count or no finite numbers, or
             its matrix is singular or no rotation.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise DatasetError(f"Calibration {path} cannot be read ({reason}); get it from KITTI's calib zip.") from None
-    rows = {key.strip(): text.split() for key, colon, text in (line.partition(":") for line in lines) if colon}
+    lines = read_text(path, "Calibration", remedy="get it from KITTI's calib zip").split("\n")
+    rows: dict[str, list[str]] = {}
+    for line in lines:
+        key, colon, text = line.partition(":")
+        name = key.strip()
+        if colon and rows.setdefault(name, text.split()) != text.split() and name in sizes:
+            raise DatasetError(f"Calibration {path} has two rows {name!r}; keep the right one.")
     values = {}
     for key, size in sizes.items():
         if key not in rows:
@@ -86,6 +92,30 @@ def camera_folder(parent: Path, prefix: str, camera: int) -> Path:
             f"cameras there: {present or 'none, unpack the images'}."
         )
     return folder
+
+
+def read_times(path: Path, seconds: Callable[[str], float]) -> list[float]:
+    """The times of a drive's frames, in seconds.
+
+    Args:
+        path: the file, one time a line.
+        seconds: the time of a line; it raises ``ValueError`` where it is none.
+
+    Raises:
+        DatasetError: the file is missing, or a line is no time.
+    """
+    remedy = "get it from KITTI"
+    times = []
+    for number, line in enumerate(read_text(path, "List of times", TEXT_BYTES, remedy=remedy).splitlines(), start=1):
+        if not line.strip():
+            continue
+        try:
+            times.append(round(seconds(line), 6))
+        except (ValueError, OverflowError):
+            times.append(math.nan)
+        if not abs(times[-1]) < LATEST_S:
+            raise DatasetError(f"List of times {path}: line {number} is no time ({line[:40]!r}); {remedy}.")
+    return times
 
 
 def times_of(files: Mapping[str, Path], times: Sequence[float], path: Path) -> dict[str, float]:

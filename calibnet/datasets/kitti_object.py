@@ -16,6 +16,7 @@ from calibnet.datasets.kitti import (
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
 from calibnet.errors import DatasetError
 from calibnet.geometry import transform
+from calibnet.runtime.reading import TEXT_BYTES, read_text
 
 PARTS = ("training", "testing")
 
@@ -49,7 +50,7 @@ class KittiObject(PairedSequence):
             for stem in stems:
                 if stem not in images and stem not in scans:
                     raise DatasetError(
-                        f"{root / 'ImageSets' / split}.txt lists {stem}, which {folder} does not have; "
+                        f"{root / 'ImageSets' / split}.txt lists {stem[:60]!r}, which {folder} does not have; "
                         "get the frame or take it off the list."
                     )
         check_paired(images, scans)
@@ -69,10 +70,10 @@ class KittiObject(PairedSequence):
 
 def _listed(folder: Path, split: str) -> list[str]:
     path = folder / f"{split}.txt"
-    if not path.is_file():
+    if not path.exists():
         present = ", ".join([*PARTS, *(file.stem for file in sorted(folder.glob("*.txt")))])
         raise DatasetError(f"{path} does not exist, there is no split {split!r}; splits there: {present}.")
-    stems = path.read_text(encoding="utf-8").split()
+    stems = read_text(path, "List of frames", TEXT_BYTES).split()
     if not stems:
         raise DatasetError(f"{path} is empty; list one frame a line, for instance 000007.")
     return stems

@@ -1,15 +1,11 @@
 """KITTI odometry: ``sequences/SS/{calib.txt,times.txt,image_N,velodyne}``.
 
-Calibration and times come through pykitti. The files are listed here, because pykitti looks for
-one image type at a time and finds nothing below a path with brackets.
+Read here rather than by pykitti, which opens whatever has a file's name and waits for it.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-
-import numpy as np
-import pykitti
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
@@ -18,11 +14,12 @@ from calibnet.datasets.kitti import (
     camera_folder,
     frame_files,
     read_calibration_file,
+    read_times,
     rectified_calibration,
     times_of,
 )
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
-from calibnet.errors import DatasetError
+from calibnet.geometry import transform
 
 CALIBRATION_ROWS = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "Tr": 12}
 
@@ -47,11 +44,12 @@ class KittiOdometry(PairedSequence):
         velodyne = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
         scans = files_by_stem(velodyne, (".bin",), "scans")
         check_paired(images, scans)
-        read_calibration_file(folder / "calib.txt", CALIBRATION_ROWS)
-        kitti = _open(Path(root), sequence)
-        projection = getattr(kitti.calib, f"P_rect_{camera}0")
-        self._fixed = rectified_calibration(projection, kitti.calib.T_cam0_velo)
-        seconds = [time.total_seconds() for time in kitti.timestamps]
+        rows = read_calibration_file(folder / "calib.txt", CALIBRATION_ROWS)
+        camera0_from_lidar = rows["Tr"].reshape(3, 4)
+        self._fixed = rectified_calibration(
+            rows[f"P{camera}"].reshape(3, 4), transform(camera0_from_lidar[:, :3], camera0_from_lidar[:, 3])
+        )
+        seconds = read_times(folder / "times.txt", float)
         files = frame_files(images, scans, times_of(images, seconds, folder / "times.txt"))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"
@@ -59,25 +57,6 @@ class KittiOdometry(PairedSequence):
 
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
-
-
-class _Reader(pykitti.odometry):  # type: ignore[misc]  # pykitti has no types
-    """pykitti's reader without the poses: calibration needs none, and some sequences have none."""
-
-    def _load_poses(self) -> None:
-        self.poses: list[np.ndarray] = []
-
-
-def _open(root: Path, sequence: str) -> _Reader:
-    times = root / "sequences" / sequence / "times.txt"
-    try:
-        return _Reader(str(root), sequence)
-    except FileNotFoundError as error:
-        raise DatasetError(f"{error.filename} does not exist; get it from KITTI's calib zip.") from None
-    except ValueError as error:
-        raise DatasetError(
-            f"{times} or calib.txt beside it is malformed ({error}); get both from KITTI's calib zip."
-        ) from None
 
 
 def _sequence_folder(root: Path, sequence: str) -> Path:

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import io
+import math
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from calibnet.datasets.cloud_header import check_complete
+from calibnet.datasets.cloud_table import MOST_BYTES, CloudError, Columns
+from calibnet.datasets.pcd import read_pcd
+from calibnet.datasets.ply import read_ply
 from calibnet.errors import DatasetError
+from calibnet.runtime.reading import read_file
+
+FARTHEST_M = 1e5
+"""Coordinates beyond are marks of points without a return, as NaN is."""
 
 POINT_BYTES = 16
 """One point of a KITTI ``.bin``: x, y, z, intensity as float32."""
@@ -33,13 +43,14 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     Raises:
         DatasetError: the file is missing, truncated, empty, malformed or without a finite point.
     """
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise DatasetError(f"Scan {path} cannot be read ({error.strerror}); restore it.") from None
-    if size == 0:
+    data = read_file(path, "Scan", MOST_BYTES)
+    if not data:
         raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame or copy the scan again.")
-    return clean_points(_READERS[path.suffix.lower()](path), path)
+    try:
+        points = _READERS[path.suffix.lower()](data)
+    except CloudError as error:
+        raise DatasetError(f"Scan {path} cannot be read: {error}; copy it again or write it anew.") from None
+    return clean_points(points, path)
 
 
 def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32]:
@@ -52,7 +63,7 @@ def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32
     """
     if len(points) == 0:
         raise DatasetError(f"Scan {path} is empty; remove the frame or record it again.")
-    finite = np.isfinite(points[:, :3])
+    finite = np.abs(points[:, :3]) < FARTHEST_M  # false for NaN
     if not finite.all():
         points = points[finite.all(axis=1)]
         if len(points) == 0:
@@ -67,57 +78,72 @@ def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32
     return clean
 
 
-def _read_bin(path: Path) -> NDArray[np.float32]:
-    data = path.read_bytes()
+def _read_bin(data: bytes) -> NDArray[np.float32]:
     if len(data) % POINT_BYTES:
-        raise DatasetError(
-            f"Scan {path} is truncated: {len(data)} bytes are no multiple of {POINT_BYTES} "
-            "(x, y, z, intensity as float32); copy or download it again."
+        raise CloudError(
+            f"it is truncated, {len(data)} bytes are no multiple of {POINT_BYTES} (x, y, z, intensity as float32)"
         )
-    return np.frombuffer(data, np.float32).reshape(-1, 4)
+    return np.frombuffer(data, "<f4").reshape(-1, 4)
 
 
-def _read_npy(path: Path) -> NDArray[np.floating]:
-    try:
-        points = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise DatasetError(f"Scan {path} is truncated or not a .npy array ({error}); write it again.") from None
+def _read_npy(data: bytes) -> NDArray[np.float32]:
+    points = read_array(data)
     if points.ndim != 2 or points.shape[1] < 3 or points.dtype.kind not in "fiu":
-        raise DatasetError(
-            f"Scan {path} is an array {points.shape} of {points.dtype}; save [N, 4] numbers: x, y, z, intensity."
-        )
-    return _with_intensity(points[:, :3], points[:, 3] if points.shape[1] > 3 else None)
+        raise CloudError(f"it is an array {points.shape} of {points.dtype} and not [N, 4] numbers: x, y, z, intensity")
+    x, y, z = points[:, :3].T
+    return _joined(x, y, z, points[:, 3] if points.shape[1] > 3 else None)
 
 
-def _read_open3d(path: Path) -> NDArray[np.floating]:
-    check_complete(path)  # Open3D fills what a truncated file lacks with whatever is in memory
-    import open3d as o3d
+def read_array(data: bytes) -> NDArray[np.generic]:
+    """The array of a ``.npy`` file; its header is held against its bytes before anything is allocated.
 
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        try:
-            cloud = o3d.t.io.read_point_cloud(path)
-        except RuntimeError as error:
-            raise DatasetError(f"Scan {path} cannot be read by Open3D ({error}); write it again.") from None
-    if cloud.is_empty():
-        raise DatasetError(f"Scan {path} is empty or damaged; write it again or remove the frame.")
-    attributes = {name.lower(): values for name, values in cloud.point.items()}
-    name = next((name for name in INTENSITY_NAMES if name in attributes), None)
-    return _with_intensity(cloud.point.positions.numpy(), None if name is None else attributes[name].numpy())
+    Raises:
+        CloudError: it is no such file, or has another length.
+    """
+    file = io.BytesIO(data)
+    try:
+        version = npy.read_magic(file)
+        read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that Python 2 wrote it
+            shape, by_column, dtype = read_header(file)
+    except Exception:  # the header is a Python literal, and fails in as many ways
+        raise CloudError("it is truncated or not a .npy array") from None
+    length, promised = len(data) - file.tell(), math.prod(shape) * dtype.itemsize
+    if dtype.hasobject or dtype.kind not in "fiu" or any(side < 0 for side in shape) or length != promised:
+        what = f"an array {str(shape)[:60]} of {str(dtype)[:40]}"
+        raise CloudError(f"its header promises {what}, of {promised} bytes, and it holds {length}")
+    return np.frombuffer(data, dtype, offset=file.tell()).reshape(shape, order="F" if by_column else "C")
 
 
-def _with_intensity(xyz: NDArray[np.floating], intensity: NDArray[np.floating] | None) -> NDArray[np.float32]:
-    points = np.zeros((len(xyz), 4), np.float32)
-    points[:, :3] = xyz
-    if intensity is not None:
-        points[:, 3] = intensity.reshape(-1)
+def _table(read: Callable[[bytes], Columns]) -> Callable[[bytes], NDArray[np.float32]]:
+    """A reader of columns as a reader of points."""
+
+    def points(data: bytes) -> NDArray[np.float32]:
+        columns = read(data)
+        if missing := [axis for axis in "xyz" if axis not in columns]:
+            raise CloudError(f"it has no column {', '.join(missing)}")
+        intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
+        return _joined(columns["x"], columns["y"], columns["z"], intensity)
+
     return points
 
 
-_READERS: dict[str, Callable[[Path], NDArray[np.floating]]] = {
+def _joined(
+    x: NDArray[np.generic], y: NDArray[np.generic], z: NDArray[np.generic], intensity: NDArray[np.generic] | None
+) -> NDArray[np.float32]:
+    points = np.zeros((len(x), 4), np.float32)
+    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is dropped as such
+        for place, values in enumerate((x, y, z) if intensity is None else (x, y, z, intensity)):
+            points[:, place] = values
+    return points
+
+
+_READERS: dict[str, Callable[[bytes], NDArray[np.float32]]] = {
     ".bin": _read_bin,
     ".npy": _read_npy,
-    ".pcd": _read_open3d,
-    ".ply": _read_open3d,
+    ".pcd": _table(read_pcd),
+    ".ply": _table(read_ply),
 }
 
 SCAN_SUFFIXES = tuple(_READERS)

@@ -104,7 +104,8 @@ def _error(frame: RecordedFrame, camera_from_lidar: Extrinsic) -> str:
 def _still(run: RecordedRun, frame: RecordedFrame, step: Step) -> Image.Image:
     """The frame's image with the points of one extrinsic, below a line that says which and how far off it is."""
     points = run.overlay(step.overlay, frame.index)
-    drawn = Image.open(io.BytesIO(draw_overlay(run.image(frame.index), points.uv, points.rgb)))
+    size = (frame.camera.width, frame.camera.height)
+    drawn = Image.open(io.BytesIO(draw_overlay(run.image(frame.index), points.uv, points.rgb, size)))
     overlay = drawn.resize((WIDTH, round(drawn.height * WIDTH / drawn.width)), Image.Resampling.LANCZOS)
     picture = Image.new("RGB", (WIDTH, CAPTION_HEIGHT + overlay.height), BACKGROUND)
     picture.paste(overlay, (0, CAPTION_HEIGHT))

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibnet.datasets.images import ImageError, decode_image
 from calibnet.errors import CalibnetError
 from inspector.colors import FAR_M, NEAR_M, depth_colors
 
@@ -20,6 +21,10 @@ POINT_SHARE = 0.2
 DIMMED = 0.75
 """Brightness that is left of the image, so that points stand out from a bright road."""
 JPEG_QUALITY = 86
+FARTHEST_PX = 1e5
+"""Points beyond are not drawn: they are not in the picture."""
+TALLEST = 8
+"""Height, as a multiple of the width, of what a camera sees."""
 SHIFT = 4
 """Binary digits after the point in the positions that cv2 draws at."""
 SCALE_LABELS_M = (3, 5, 10, 20, 40, 80)
@@ -29,22 +34,31 @@ class PictureError(CalibnetError):
     """A picture of the recording cannot be decoded."""
 
 
-def draw_overlay(image_jpeg: bytes, pixels: NDArray[np.floating], colors: NDArray[np.uint8]) -> bytes:
+def draw_overlay(
+    image_jpeg: bytes, pixels: NDArray[np.floating], colors: NDArray[np.uint8], size: tuple[int, int] | None = None
+) -> bytes:
     """Draw points over an image; returns a JPEG `PICTURE_WIDTH` wide.
 
     Args:
         image_jpeg: the image as recorded.
         pixels: ``[M, 2]``, ``(u, v)`` with whole numbers at pixel centres, far to near.
         colors: ``[M, 3]`` RGB.
+        size: width and height that the image must have.
 
     Raises:
-        PictureError: the image cannot be decoded.
+        PictureError: the image cannot be decoded, or is of another size.
     """
-    image = cv2.imdecode(np.frombuffer(image_jpeg, dtype=np.uint8), cv2.IMREAD_COLOR)
-    if image is None:
-        raise PictureError("An image in the recording cannot be decoded; record the run again.")
+    try:
+        image = cv2.cvtColor(decode_image(image_jpeg, size), cv2.COLOR_RGB2BGR)
+    except ImageError as error:
+        what = str(error).partition(";")[0]
+        raise PictureError(f"An image in the recording {what}; record the run again.") from None
+    if image.shape[0] > TALLEST * image.shape[1]:
+        raise PictureError("An image in the recording is a strip and no picture; record the run again.")
     scale = PICTURE_WIDTH / image.shape[1]
     size = (PICTURE_WIDTH, round(image.shape[0] * scale))
+    near = (np.abs(pixels) < FARTHEST_PX).all(axis=1)  # false for NaN
+    pixels, colors = pixels[near], colors[near]
     canvas = cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC)
     canvas = cv2.convertScaleAbs(canvas, alpha=DIMMED)
     one = 1 << SHIFT

@@ -91,11 +91,12 @@ def copy_recording(source: Path, target: Path) -> None:
 def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) -> Example:
     """Draw one frame before and after and, where there is one, with the reference."""
     index = run.frames[position].index
-    image = run.image(index)
+    camera, image = run.frames[position].camera, run.image(index)
+    size = (camera.width, camera.height)
     files = {}
     for shown, entity in _overlays(run.has_reference).items():
         files[shown] = f"{PICTURES}/{name}_{shown}.jpg"
-        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index)), Kind.JPEG)
+        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index), size), Kind.JPEG)
     return Example(name, position, files)
 
 

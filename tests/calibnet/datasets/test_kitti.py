@@ -91,7 +91,7 @@ def test_odometry_times_come_from_the_file(write_layout):
     with pytest.raises(DatasetError, match=r"times\.txt has 2 times for 3 frames"):
         layout.open()
     times.write_text("0.0\nsoon\n0.2\n")
-    with pytest.raises(DatasetError, match=r"times\.txt.*malformed"):
+    with pytest.raises(DatasetError, match=r"times\.txt: line 2 is no time"):
         layout.open()
     times.unlink()
     with pytest.raises(DatasetError, match=r"times\.txt does not exist"):
@@ -112,7 +112,7 @@ def test_raw_times_are_optional_and_fall_back_to_ten_hertz(write_layout):
     assert [frame.timestamp for frame in layout.open()] == [0.0, 1.0, 2.0]
     stamps = next(layout.root.rglob("oxts/timestamps.txt"))
     stamps.write_text("2011-01-02 10:00:00.000000000\nyesterday\n")
-    with pytest.raises(DatasetError, match=r"timestamps\.txt.*malformed"):
+    with pytest.raises(DatasetError, match=r"timestamps\.txt: line 2 is no time"):
         layout.open()
     stamps.unlink()
     assert_allclose([frame.timestamp for frame in layout.open()], [0.0, 0.3, 0.6])
@@ -154,7 +154,7 @@ def test_object_list_selects_frames_in_its_order(write_layout):
     assert [frame.index for frame in layout.open(split="val")] == [8, 1]
     lists = layout.root / "ImageSets" / "val.txt"
     lists.write_text("000008\n000009\n")
-    with pytest.raises(DatasetError, match=r"val\.txt lists 000009"):
+    with pytest.raises(DatasetError, match=r"val\.txt lists '000009'"):
         layout.open(split="val")
     lists.write_text("\n")
     with pytest.raises(DatasetError, match=r"val\.txt is empty"):
