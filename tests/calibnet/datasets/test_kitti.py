@@ -94,7 +94,7 @@ def test_odometry_times_come_from_the_file(write_layout):
     with pytest.raises(DatasetError, match=r"times\.txt: line 2 is no time"):
         layout.open()
     times.unlink()
-    with pytest.raises(DatasetError, match=r"times\.txt does not exist"):
+    with pytest.raises(DatasetError, match=r"times\.txt cannot be read"):
         layout.open()
 
 
