@@ -16,6 +16,7 @@ from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
+from calibnet.geometry.known import Held, Known
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.judging.causes import match_error_of, misfit_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
@@ -48,6 +49,7 @@ class Cascade:
         common: Matrix6 | None = None,
         wider: Sequence[Stage] = (),
         coefficients: Coefficients | None = None,
+        known: Known | None = None,
     ) -> None:
         """Use ``Cascade.load`` unless the networks are already there.
 
@@ -58,6 +60,7 @@ class Cascade:
                 `calibnet.weights.manifest.Manifest` by default.
             wider: stages of wider ranges, coarse to fine, kept for calibrations that leave the first stage's range.
             coefficients: of the verdict, fitted to these networks; without them nothing is accepted.
+            known: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
         """
         self.coefficients = coefficients or Coefficients()
         self.stages, self.skipped, self.wider = list(stages), list(skipped), list(wider)
@@ -65,6 +68,7 @@ class Cascade:
             reasons = " ".join(stage.reason for stage in skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
         self.common = Manifest("").common if common is None else common
+        self.known = known or Known()
         self.device = stages[0].device
         self.image_branches = image_branches([stage.network for stage in (*stages, *wider)])
 
@@ -75,6 +79,7 @@ class Cascade:
         stages: tuple[int, ...] | None = None,
         folder: Path | None = None,
         wider: bool = False,
+        known: Known | None = None,
     ) -> Cascade:
         """Load the weights of a preset, and its manifest, which says how they are used.
 
@@ -83,6 +88,7 @@ class Cascade:
             stages: numbers 1 (coarsest) to 5 (finest); all by default.
             folder: where the weights lie; the package's own by default.
             wider: keep the stages before the first one as well, for calibrations that leave its range.
+            known: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
 
         Raises:
             ConfigError: there is no such preset or stage.
@@ -98,7 +104,7 @@ class Cascade:
         skipped = [skipped_stage(number, preset) for number, stage in found.items() if stage is None]
         before = [load_stage(number, manifest, folder or PACKAGE) for number in range(1, numbers[0] if wider else 1)]
         kept = [stage for stage in before if stage is not None]
-        return cls(loaded, skipped, manifest.common, kept, load_coefficients(manifest, folder))
+        return cls(loaded, skipped, manifest.common, kept, load_coefficients(manifest, folder), known)
 
     @property
     def unjudged(self) -> str:
@@ -122,17 +128,21 @@ class Cascade:
             self.stages[-1].match_error_limit_px,
             Upright.of(initial, self.stages[0].range),
         )
-        start = upright.extrinsic(initial)
+        start, held = upright.extrinsic(initial), self._held(initial, upright)
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(prepared(frame, upright), clock)
             clock("preparation")
-            trace = CascadeTrace(start, self._run(self.stages, views, start, detail), clock.parts, limit)
+            trace = CascadeTrace(start, self._run(self.stages, views, start, detail, held), clock.parts, limit)
             if wider := self._covering(trace.arrived @ invert(start)):
-                before = self._run(wider, views, start)
-                stages = self._run(self.stages, views, before[-1].after, detail)
+                before = self._run(wider, views, start, held=held)
+                stages = self._run(self.stages, views, before[-1].after, detail, held)
                 trace = CascadeTrace(start, stages, clock.parts, limit, before)
-            trace = replace(trace, again=self._again(views, trace))
-            trace = replace(trace, verdict=judge(views.frame, start, trace, self.coefficients))
+            trace = replace(trace, again=self._again(views, trace, held))
+            verdict = judge(views.frame, start, trace, self.coefficients)
+            if held is not None and verdict.covariance is not None:
+                narrowed = held.narrowed(verdict.covariance, verdict.camera_from_lidar)
+                verdict = replace(verdict, covariance=narrowed)
+            trace = replace(trace, verdict=verdict)
         return upright.undo(trace, initial)
 
     def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
@@ -173,24 +183,30 @@ class Cascade:
         """
         upright = Upright.of(initial, self.stages[0].range)
         start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
-        estimate = solve_drive(self.stages, frames, start, self.common, observer)
+        held = self._held(initial, upright)
+        estimate = solve_drive(self.stages, frames, start, self.common, observer, held)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
-            estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer)
+            estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer, held)
         verdict = judge_drive(estimate, start, self.stages[0].range, self.coefficients.doubt_of(self.stages[-1].range))
         return upright.undo_drive(replace(estimate, verdict=verdict))
 
     def _run(
-        self, stages: Sequence[Stage], views: ImageViews, initial: Extrinsic, detail: bool = False
+        self,
+        stages: Sequence[Stage],
+        views: ImageViews,
+        initial: Extrinsic,
+        detail: bool = False,
+        held: Held | None = None,
     ) -> tuple[StageTrace, ...]:
         """Some stages, each from where the one before arrived."""
         branches = dict(zip((*self.stages, *self.wider), self.image_branches, strict=True))
         traces: list[StageTrace] = []
         for stage in stages:
             before = traces[-1].after if traces else initial
-            traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail))
+            traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail, held))
         return tuple(traces)
 
-    def _again(self, views: ImageViews, trace: CascadeTrace) -> StageTrace | None:
+    def _again(self, views: ImageViews, trace: CascadeTrace, held: Held | None) -> StageTrace | None:
         """One more look of the last stage, from where a run arrived: it tells most about the result.
 
         None where the rest speaks against it already.
@@ -200,9 +216,13 @@ class Cascade:
             return None
         last, branch = self.stages[-1], self.image_branches[len(self.stages) - 1]
         try:
-            return last.look(views.frame, views.of(last, branch), trace.arrived)
+            return last.look(views.frame, views.of(last, branch), trace.arrived, held=held)
         except CalibrationError:  # too few points are left in the picture: the run itself was fine
             return None
+
+    def _held(self, initial: Extrinsic, upright: Upright) -> Held | None:
+        """What is known of an extrinsic, as the upright camera has it; None for nothing."""
+        return self.known.about(initial).turned(upright.rotation) if self.known else None
 
     def _covering(self, moved: Transform) -> list[Stage]:
         """The wider stages with which to start again after moving so far; none where the first stage's range covers it.

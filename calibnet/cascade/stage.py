@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +19,9 @@ from calibnet.datasets.images import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled
+from calibnet.geometry.known import Held, inverse
 from calibnet.geometry.types import Extrinsic, Transform
+from calibnet.judging.covariance import Spread
 from calibnet.network.batch import Cut, lidar_input, make_batch
 from calibnet.network.convolution import pack
 from calibnet.network.displacement import DisplacementField, expected_error
@@ -80,7 +82,9 @@ class Stage:
             clock("image_features")
         return view
 
-    def correct(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+    def correct(
+        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, held: Held | None = None
+    ) -> StageTrace:
         """Look at a frame, and again from where that arrives, until the next stage can take over.
 
         Args:
@@ -88,20 +92,23 @@ class Stage:
             view: its image, as `view` gives it.
             before: the extrinsic to correct.
             detail: keep the intermediate results of the first look.
+            held: what is known of the extrinsic beforehand.
 
         Raises:
             CalibrationError: see `look`.
         """
-        look = trace = self.look(frame, view, before, detail)
+        look = trace = self.look(frame, view, before, detail, held)
         for _ in range(self.settings.looks - 1):
             if self.is_settled(look.correction):
                 break
-            look = self.look(frame, view, look.after)
+            look = self.look(frame, view, look.after, held=held)
             trace = trace.followed_by(look)
         return trace
 
     @torch.inference_mode()
-    def look(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+    def look(
+        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, held: Held | None = None
+    ) -> StageTrace:
         """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
 
         Raises:
@@ -130,7 +137,8 @@ class Stage:
                 f"Stage {self.number} found no finite correction for frame {frame.index} ({frame.source}); "
                 "train its weights again if this happens on every frame."
             )
-        return StageTrace(
+        information = None if output.pose.information is None else output.pose.information[0].double().cpu().numpy()
+        trace = StageTrace(
             self.number,
             self.range,
             camera,
@@ -138,11 +146,12 @@ class Stage:
             correction @ before,
             correction,
             clock.parts,
-            None if output.pose.information is None else output.pose.information[0].double().cpu().numpy(),
+            information,
             stage_detail(self.network.config, lidar, cut, output) if detail else None,
             float(expected_error(output.field, inputs.cells[0])[0]),
             matches_of(output.field, inputs.cells[0]),
         )
+        return trace if held is None else holding(trace, held)
 
     def is_settled(self, correction: Transform) -> bool:
         """Whether the next stage can take over: what a look has corrected is within that stage's range."""
@@ -153,6 +162,18 @@ class Stage:
         """The correction of a batch of one, extended by the stage's gain."""
         estimate: Transform = output.pose.correction[0].double().cpu().numpy()
         return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
+
+
+def holding(look: StageTrace, held: Held) -> StageTrace:
+    """A look as what is known of the extrinsic leaves it; its information stays what the network states.
+
+    The network is believed as far as its results are found to be right, which is less than it states.
+    """
+    firm = None
+    if look.information is not None:
+        firm = inverse(Spread().covariance(look.information, look.range, look.range, look.match_error_px))
+    correction = held.corrected(look.correction, firm, look.before)
+    return replace(look, correction=correction, after=correction @ look.before)
 
 
 def matches_of(found: DisplacementField, cells: Tensor) -> Matches:

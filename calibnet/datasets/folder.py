@@ -15,8 +15,9 @@ from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
 from calibnet.datasets.scans import SCAN_SUFFIXES
 from calibnet.datasets.selection import spread
-from calibnet.errors import DatasetError
+from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry.camera_model import CameraModel
+from calibnet.geometry.known import Known, parse_angle, parse_axes, parse_length
 from calibnet.geometry.rectification import Rectification, central, said_of, without_black
 from calibnet.geometry.types import Extrinsic
 
@@ -66,6 +67,7 @@ class Folder(PairedSequence):
         pinhole, extrinsic = self._rectification.pinhole, self.calibration.camera_from_lidar
         remarks = [*of_lens(self.calibration.camera), *of_camera(pinhole), *of_extrinsic(extrinsic)]
         refuse(remarks, f"Calibration {calibration_path(root)}")
+        self.known = known_of(self.calibration, calibration_path(root))
         self._fixed = Calibration(pinhole.matrix, extrinsic)
         files = _frames(pairing.pairs)
         name = root.resolve().name
@@ -152,6 +154,23 @@ def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
     found = read_folder(folder, Wanted(picture=next(pictures, None)))
     assert found.camera is not None and found.camera_from_lidar is not None
     return calibration_path(folder), found.camera, found.camera_from_lidar
+
+
+def known_of(calibration: CalibrationFile, path: Path) -> Known:
+    """What a calibration file says is known of its extrinsic.
+
+    Raises:
+        DatasetError: it says so wrongly.
+    """
+    said = calibration.known
+    try:
+        return Known.of(
+            parse_axes(said["fix"]) if "fix" in said else (),
+            parse_length(said["prior_translation"]) if "prior_translation" in said else None,
+            parse_angle(said["prior_rotation"]) if "prior_rotation" in said else None,
+        )
+    except ConfigError as error:
+        raise DatasetError(f"Calibration {path}: {error}") from None
 
 
 def _frames(pairs: list[Pair]) -> list[FrameFiles]:

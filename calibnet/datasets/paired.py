@@ -44,10 +44,12 @@ class FrameFiles:
         Raises:
             DatasetError: one is missing.
         """
-        if self.image is None or self.scan is None:
-            there, what = (self.image, "scan") if self.scan is None else (self.scan, "image")
-            raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
-        return Both(self.image, self.scan)
+        if self.image is not None and self.scan is not None:
+            return Both(self.image, self.scan)
+        there = self.image or self.scan
+        assert there is not None, "a frame has one file at least"
+        what = "image" if self.image is None else "scan"
+        raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
 
 
 class Picture(NamedTuple):

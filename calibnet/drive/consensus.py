@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibnet.alignment import Evidence, align
+from calibnet.geometry.known import Held, inverse
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vector6
 from calibnet.trace import Estimate
@@ -32,15 +33,20 @@ REWEIGHTINGS = 10
 class Consensus:
     """Frames' corrections of one common extrinsic, and what they agree on."""
 
-    def __init__(self, before: Extrinsic, prior: Matrix6) -> None:
+    def __init__(
+        self, before: Extrinsic, prior: Matrix6, held: Held | None = None, common: Matrix6 | None = None
+    ) -> None:
         """Start with no frame.
 
         Args:
             before: ``camera_from_lidar`` that all corrections are relative to.
             prior: information of the range the stage was trained for. Every frame's information
                 contains it; the estimate counts it once.
+            held: what is known of the extrinsic beforehand, counted once as well.
+            common: covariance of what the networks get wrong in all frames alike, against which that is weighed.
         """
-        self.before, self.prior = before, prior
+        self.before, self.prior, self.held = before, prior, held
+        self.common = np.zeros((6, 6)) if common is None else common
         self._vectors: list[Vector6] = []
         self._informations: list[Matrix6] = []
 
@@ -53,11 +59,18 @@ class Consensus:
         self._informations.append(FIRM * self.prior if information is None else information)
 
     def estimate(self) -> Estimate:
-        """What the frames so far agree on.
+        """What the frames so far agree on, and what is known beforehand.
 
         Raises:
             ValueError: there are none.
         """
+        mean, covariance = self._agreed()
+        if self.held is not None:
+            mean, covariance = self.held.fused(mean, inverse(covariance + self.common), self.before)
+        return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
+
+    def _agreed(self) -> tuple[Vector6, Matrix6]:
+        """The correction of all frames, without what is known beforehand, and its covariance."""
         if not self._vectors:
             raise ValueError("There is no frame to estimate from.")
         vectors, informations = np.array(self._vectors), np.array(self._informations)
@@ -71,7 +84,7 @@ class Consensus:
         if len(vectors) > 1:
             freedom = 6 * (weights.sum() - weights.max())
             covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))
-        return Estimate(pose_from_vector(mean) @ self.before, covariance, len(vectors))
+        return mean, covariance
 
     def aligned(self, evidence: Sequence[Evidence], common: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
         """What the frames and the evidence of some of them agree on.
@@ -86,10 +99,14 @@ class Consensus:
                 default.
         """
         agreed = self.estimate()
-        known, *others = (pose_vector(one.camera_from_lidar @ invert(self.before)) for one in (agreed, *starts))
+        others = [pose_vector(one.camera_from_lidar @ invert(self.before)) for one in starts]
+        likely, covariance = self._agreed()
+        covariance = covariance + common
+        if self.held is not None:
+            likely, covariance = self.held.fused(likely, inverse(covariance), self.before)
         if agreed.rotation_deg > FARTHEST_ROTATION_DEG or agreed.translation_cm > 100 * FARTHEST_TRANSLATION_M:
             evidence = ()
-        correction, covariance = align(evidence, known, agreed.covariance + common, others)
+        correction, covariance = align(evidence, likely, covariance, others)
         return Estimate(pose_from_vector(correction) @ self.before, covariance, agreed.frames)
 
     def _solve(self, vectors: Floats, informations: Floats, weights: Floats) -> tuple[Matrix6, Vector6]:

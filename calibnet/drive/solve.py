@@ -14,6 +14,7 @@ from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
+from calibnet.geometry.known import Held
 from calibnet.geometry.types import Extrinsic, Matrix6
 from calibnet.trace import DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import BadFrame
@@ -54,6 +55,7 @@ def solve_drive(
     initial: Extrinsic,
     common: Matrix6,
     observer: Callable[[int, int], None] | None = None,
+    held: Held | None = None,
 ) -> DriveEstimate:
     """Correct the extrinsic that all frames share.
 
@@ -68,6 +70,7 @@ def solve_drive(
         initial: ``camera_from_lidar`` to start from.
         common: covariance of what the networks get wrong in all frames alike.
         observer: called before each frame is read, with the number of frames read so far and to be read in all.
+        held: what is known of the extrinsic beforehand.
 
     Raises:
         CalibrationError: no frame could be calibrated.
@@ -87,7 +90,7 @@ def solve_drive(
     extrinsic = initial
     for stage in stages:
         for _ in range(LOOKS):
-            extrinsic = agree(stage, read, some, extrinsic).estimate().camera_from_lidar
+            extrinsic = agree(stage, read, some, extrinsic, held=held, common=common).estimate().camera_from_lidar
 
     aligns = is_finest(stages[-1].range)
     evidence = list[Evidence]()
@@ -102,7 +105,7 @@ def solve_drive(
         convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
 
     skipped = list[BadFrame]()
-    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped)
+    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped, held, common)
     of_networks = consensus.estimate()
     final = estimate(consensus, of_networks, *convergence.latest)
     convergence.end(final)
@@ -123,6 +126,8 @@ def agree(
     extrinsic: Extrinsic,
     taken_in: Callable[[int, Frame, Consensus], None] | None = None,
     skipped: list[BadFrame] | None = None,
+    held: Held | None = None,
+    common: Matrix6 | None = None,
 ) -> Consensus:
     """What one look of a stage at each of some frames of a drive comes to.
 
@@ -133,13 +138,15 @@ def agree(
         extrinsic: under which it looks.
         taken_in: called after each frame that could be calibrated, with its position and the consensus so far.
         skipped: takes in the frames that could not be read or calibrated.
+        held: what is known of the extrinsic beforehand.
+        common: what that is weighed against, see `Consensus`.
 
     Raises:
         CalibrationError: none of the frames could be calibrated.
         DatasetError: none could be read.
     """
     failure: CalibnetError | None = None
-    consensus = Consensus(extrinsic, stage.range.information)
+    consensus = Consensus(extrinsic, stage.range.information, held, common)
     for position in positions:
         index = position
         try:

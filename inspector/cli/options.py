@@ -6,7 +6,7 @@ import math
 import re
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -94,6 +94,25 @@ class MiscalibrationType(click.ParamType["Transform"]):
         return miscalibration(numbers[:3], numbers[3:])
 
 
+class QuantityType(click.ParamType[Any]):
+    """A text that one of the parsers of `calibnet.geometry.known` reads."""
+
+    def __init__(self, name: str, parser: str) -> None:
+        self.name, self.parser = name, parser
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse the text; a value that is parsed already is kept."""
+        from calibnet.errors import ConfigError
+        from calibnet.geometry import known
+
+        if not isinstance(value, str):
+            return value
+        try:
+            return getattr(known, self.parser)(value)
+        except ConfigError as error:
+            self.fail(str(error), param, ctx)
+
+
 class PartsType(click.ParamType[frozenset[Part]]):
     """Names of `Part` with commas between them."""
 
@@ -142,5 +161,8 @@ PARTS = PartsType()
 DETAIL = WordType(Detail)
 COLORING = WordType(Coloring)
 MISCALIBRATION = MiscalibrationType()
+AXES = QuantityType("AXIS,AXIS", "parse_axes")
+LENGTH = QuantityType("LENGTH", "parse_length")
+ANGLE = QuantityType("ANGLE", "parse_angle")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""

@@ -13,7 +13,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from inspector.cli.errors import ExitCode, fail
-from inspector.cli.options import COLORING, DETAIL, FOLDER, FRAMES, MISCALIBRATION, PARTS, RANGE, SEED, STAGES
+from inspector.cli.options import (
+    ANGLE,
+    AXES,
+    COLORING,
+    DETAIL,
+    FOLDER,
+    FRAMES,
+    LENGTH,
+    MISCALIBRATION,
+    PARTS,
+    RANGE,
+    SEED,
+    STAGES,
+)
 from inspector.cli.output import say
 from inspector.cli.viewing import saved_lines, viewing_options
 from inspector.run.options import DEFAULT_RANGE, OptionsError, RunOptions
@@ -53,6 +66,14 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         show_default=True,
         help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
     ),
+    click.option(
+        "--fix",
+        type=AXES,
+        help="Axes of the start that are known exactly, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z keep the "
+        "camera's place as seen from the LiDAR.",
+    ),
+    click.option("--prior-translation", type=LENGTH, help="The camera's place is known to this, on each axis."),
+    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
@@ -128,7 +149,7 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
     numbers = options.stages or options.start.stages
     if verify and options.stages is None:  # how far off the calibration is, is what is asked
         numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
-    cascade = Cascade.load(options.preset, numbers, options.weights, wider=options.stages is None)
+    cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.known)
     stages = [stage.number for stage in cascade.stages]
     console = Console(stderr=True, highlight=False)
     announce(console, options, cascade)
@@ -178,7 +199,8 @@ def choose_outputs(options: RunOptions, viewing: Viewing, report: Path | None) -
 def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     """Say what is about to run, and which stages cannot."""
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
-    what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}, stages {numbers}"
+    known = f", {options.known.words}" if options.known else ""
+    what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
     console.print(what, markup=False, soft_wrap=True)
     for note in getattr(options.sequence, "notes", ()):
         console.print(note, markup=False, soft_wrap=True)

@@ -11,6 +11,7 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import select_frames
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.known import Known
 from calibnet.geometry.types import Transform
 from inspector.record.contents import Coloring, Contents, Detail, Part
 from inspector.run.start import Start
@@ -37,6 +38,9 @@ class RunOptions:
         seed: of everything random.
         drive: after the frames, also solve the drive's extrinsic from all of them.
         on_bad_frame: ``"skip"`` a frame that cannot be used, or ``"stop"`` there.
+        fix: axes of the start that are known exactly, names of `calibnet.geometry.known.AXES`; None as an empty one.
+        prior_translation: standard deviation, in metres, to which the camera's place is known beforehand.
+        prior_rotation: likewise its rotation, in radians.
         stages: to run; None for those within the miscalibration.
         preset: network to use.
         weights: folder of its weights; None for those of the package.
@@ -58,6 +62,9 @@ class RunOptions:
     seed: int = 0
     drive: bool = False
     on_bad_frame: str = "skip"
+    fix: tuple[str, ...] | None = None
+    prior_translation: float | None = None
+    prior_rotation: float | None = None
     stages: tuple[int, ...] | None = None
     preset: str = "compact"
     weights: Path | None = None
@@ -112,6 +119,18 @@ class RunOptions:
         return Start(self.range or DEFAULT_RANGE, self.seed, self.per_frame, self.miscalibration, self.as_is)
 
     @property
+    def known(self) -> Known:
+        """What is known of the start: as asked for, else as the dataset says (`known` of a sequence).
+
+        Raises:
+            ConfigError: it contradicts itself.
+        """
+        asked = self.fix or None, self.prior_translation, self.prior_rotation
+        if any(one is not None for one in asked):
+            return Known.of(asked[0] or (), *asked[1:])
+        return getattr(self.sequence, "known", None) or Known()
+
+    @property
     def contents(self) -> Contents:
         """What is recorded of each frame."""
         return Contents.of(self._level, self.parts or frozenset(), self.color)
@@ -130,6 +149,7 @@ class RunOptions:
             "camera": "" if self.camera is None else str(self.camera),
             "start": str(self.start),
             "seed": self.seed,
+            **({"known": self.known.words} if self.known else {}),
             "stages": ",".join(map(str, stages)),
             "preset": self.preset,
             "detail": str(self.detail or Detail.FULL),

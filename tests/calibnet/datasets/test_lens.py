@@ -63,6 +63,16 @@ def test_a_file_without_a_lidar_needs_a_guess(write_layout):
         layout.open(guess=layout.calibration)
 
 
+def test_the_file_says_what_is_known(write_layout, write_calibration):
+    layout = write_layout("folder")
+    assert not layout.open().known
+    layout.calibration.write_text(write_calibration(fix="[x, y, z]", prior_rotation="0.5deg"))
+    assert layout.open().known.words == "known to 0.5°; x, y, z fixed"
+    layout.calibration.write_text(write_calibration(prior_translation=2))
+    with pytest.raises(DatasetError, match=r"calibration\.yaml: '2' is not a length with its unit"):
+        layout.open()
+
+
 def test_the_calibration_may_have_any_name(write_layout, write_calibration):
     layout = write_layout("folder")
     other = layout.calibration.rename(layout.root / "front.yml")

@@ -1,0 +1,72 @@
+"""Calibrations under what is known beforehand: frame by frame, and as one drive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calibnet.cascade import Cascade, Stage
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import RANGES, euler_xyz, invert, miscalibration
+from calibnet.geometry.known import AXES, Known
+from calibnet.geometry.types import Extrinsic
+from tests.support.scene import REFERENCE, make_frame
+from tests.support.tiny import tiny_network
+
+INITIAL = miscalibration([2.0, -1.0, 3.0], [0.2, -0.1, 0.3]) @ REFERENCE
+
+
+@pytest.fixture(scope="module")
+def frame() -> Frame:
+    return make_frame(3)
+
+
+def cascade(known: Known) -> Cascade:
+    """Random networks, which want to move everything."""
+    stages = [Stage(number, RANGES[number - 1], tiny_network(seed=number, stage=number)) for number in (4, 5)]
+    return Cascade(stages, known=known)
+
+
+def moved(after: Extrinsic) -> dict[str, float]:
+    """Degrees and centimetres by which each axis was moved."""
+    delta = after @ invert(INITIAL)
+    pitch, yaw, roll = np.degrees(euler_xyz(delta[:3, :3]))
+    return dict(zip(AXES, [roll, pitch, yaw, *(100 * delta[:3, 3])], strict=True))
+
+
+@pytest.mark.parametrize("fixed", [("x", "y", "z"), ("roll", "pitch")])
+def test_fixed_axes_stay_in_every_stage_and_the_others_move(frame: Frame, fixed: tuple[str, ...]) -> None:
+    trace = cascade(Known.of(fixed)).calibrate(frame, INITIAL)
+    for stage in trace.stages:
+        found = moved(stage.after)
+        assert all(abs(found[axis]) < 0.01 for axis in fixed), found
+        np.testing.assert_allclose(stage.correction @ stage.before, stage.after, atol=1e-12)
+    found = moved(trace.arrived)
+    assert max(abs(found[axis]) for axis in AXES if axis not in fixed) > 0.05
+
+
+def test_fixed_axes_stay_in_a_drive_whose_edges_are_aligned(frame: Frame) -> None:
+    free, held = (cascade(known).calibrate_drive([frame, frame], INITIAL) for known in (Known(), Known.of("xyz")))
+    assert max(abs(moved(free.camera_from_lidar)[axis]) for axis in "xyz") > 0.1
+    for estimate in (held, held.networks):
+        assert estimate is not None
+        assert all(abs(moved(estimate.camera_from_lidar)[axis]) < 0.02 for axis in "xyz")
+    assert held.translation_cm < 0.01 < free.translation_cm
+    assert held.verdict is not None and held.verdict.covariance is not None
+
+
+def test_what_is_known_well_is_moved_less(frame: Frame) -> None:
+    found = [
+        np.linalg.norm(
+            cascade(Known.of((), sigma)).calibrate_drive([frame, frame], INITIAL).camera_from_lidar - INITIAL
+        )
+        for sigma in (0.001, 0.1)
+    ]
+    assert found[0] < found[1]
+
+
+def test_the_covariance_of_a_frame_knows_what_is_fixed(frame: Frame) -> None:
+    verdict = cascade(Known.of("xyz")).calibrate(frame, INITIAL).verdict
+    assert verdict is not None
+    if verdict.covariance is not None:
+        assert np.sqrt(np.trace(verdict.covariance[:3, :3])) < 1e-4
