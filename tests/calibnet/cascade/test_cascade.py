@@ -482,7 +482,7 @@ def wandering(monkeypatch: pytest.MonkeyPatch, corrections: dict[int, list[float
     """Let stages move by so many metres along x, whatever they see, the next number at each look; returns who ran."""
     ran: list[int] = []
 
-    def correct(stage: Stage, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+    def correct(stage: Stage, frame: Frame, view: View, before: Extrinsic, *_: Any) -> StageTrace:
         ran.append(stage.number)
         correction = miscalibration([0, 0, 0], [corrections[stage.number].pop(0), 0, 0])
         return StageTrace(stage.number, stage.range, frame.camera, before, correction @ before, correction)
