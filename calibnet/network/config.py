@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import itertools
-import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib import resources
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+
+from annotated_types import Interval, Len
 
 from calibnet.errors import ConfigError
 from calibnet.network.heads import HEADS
+from calibnet.runtime.reading import parse_toml
+from calibnet.runtime.schema import validated
 
 Head: TypeAlias = str
 """A name in `calibnet.network.heads.HEADS`."""
+Pixels = Annotated[int, Interval(ge=32, le=4096)]
+Channels = Annotated[int, Interval(ge=1, le=1024)]
+Few = Annotated[int, Interval(ge=0, le=8)]
 Normalization = Literal["group", "batch"]
 ImageEncoder = Literal["own", "efficientnet-lite0"]
 
@@ -21,27 +27,30 @@ ImageEncoder = Literal["own", "efficientnet-lite0"]
 class NetworkConfig:
     """Sizes and switches of one network; every field is a key of a preset's TOML.
 
-    The five booleans at the end are the rows of the paper's ablation (its last table).
+    The five booleans at the end are the rows of the paper's ablation (its last table). Bounds are far from what anybody
+    would train, and keep a file from asking for a network that no memory holds.
     """
 
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
     name: str
-    input_height: int  # pixels; other aspect ratios keep the area
-    input_width: int
+    input_height: Pixels  # other aspect ratios keep the area
+    input_width: Pixels
     share_extractor: bool  # image and LiDAR depth run through the same trunk (the paper's arithmetic)
     share_image_branch: bool  # all stages use one image branch, computed once a frame
-    widths: tuple[int, ...]  # channels at 1/2, 1/4, 1/8, 1/16, 1/32
-    blocks: tuple[int, ...]  # residual blocks at each of these
-    feature_channels: int  # channels of the features that are matched
+    widths: Annotated[tuple[Channels, ...], Len(1, 6)]  # channels at 1/2, 1/4, 1/8, 1/16, 1/32
+    blocks: Annotated[tuple[Few, ...], Len(1, 6)]  # residual blocks at each of these
+    feature_channels: Channels  # channels of the features that are matched
     normalization: Normalization
     scales: tuple[int, ...]  # strides of the cost volumes, fine to coarse, each twice the one before
-    radius: int  # of the search window, in cells, the same at every scale
-    groups: int  # of the group-wise correlation
-    concat_channels: int  # of each branch in the concatenation volume
-    volume_channels: int | tuple[int, ...]  # of the 3-D hourglasses: the same at all scales, or one a scale
-    hourglass_blocks: int | tuple[int, ...]  # pairs of 3-D convolutions at each scale: the same, or one a hourglass
-    hourglasses: int  # one after the other
+    radius: Annotated[int, Interval(ge=2, le=16)]  # of the search window, in cells, the same at every scale
+    groups: Channels  # of the group-wise correlation
+    concat_channels: Annotated[int, Interval(ge=0, le=256)]  # of each branch in the concatenation volume
+    volume_channels: Channels | tuple[Channels, ...]  # of the 3-D hourglasses: the same at all scales, or one a scale
+    hourglass_blocks: Few | tuple[Few, ...]  # pairs of 3-D convolutions at each scale: the same, or one a hourglass
+    hourglasses: Few  # one after the other
     convolve_finest: bool  # 3-D convolutions at the finest scale as well, which holds most of their work
-    context_channels: int  # of the 2-D network that turns volumes into displacements
+    context_channels: Channels  # of the 2-D network that turns volumes into displacements
     head: Head
     image_encoder: ImageEncoder = "own"  # or one that starts from ImageNet instead of from nothing
     multi_scale_features: bool = True
@@ -74,14 +83,6 @@ class NetworkConfig:
             (
                 len(_each(self.hourglass_blocks, self.hourglasses)) != self.hourglasses,
                 "hourglass_blocks has one a hourglass",
-            ),
-            (
-                self.normalization not in get_args(Normalization),
-                f"normalization must be one of {', '.join(get_args(Normalization))}",
-            ),
-            (
-                self.image_encoder not in get_args(ImageEncoder),
-                f"image_encoder must be one of {', '.join(get_args(ImageEncoder))}",
             ),
             (
                 self.image_encoder != "own" and self.share_extractor,
@@ -121,15 +122,8 @@ def _each(value: int | tuple[int, ...], number: int) -> tuple[int, ...]:
 
 
 def parse_config(values: dict[str, Any], origin: str) -> NetworkConfig:
-    """Build a config from TOML values; ``ConfigError`` names unknown and missing keys."""
-    names = {f.name for f in fields(NetworkConfig)}
-    if unknown := sorted(set(values) - names):
-        raise ConfigError(f"{origin} has unknown keys: {', '.join(unknown)}.")
-    arguments: dict[str, Any] = {key: tuple(v) if isinstance(v, list) else v for key, v in values.items()}
-    try:
-        return NetworkConfig(**arguments)
-    except TypeError as error:
-        raise ConfigError(f"{origin} is not a complete network: {error}.") from None
+    """Build a config from the values of a file; ``ConfigError`` names the first that is wrong, unknown or missing."""
+    return validated(NetworkConfig, values, origin, ConfigError, "compare it with the presets of this version")
 
 
 def preset_names() -> list[str]:
@@ -143,4 +137,4 @@ def load_preset(name: str) -> NetworkConfig:
     if name not in preset_names():
         raise ConfigError(f"There is no preset {name!r}; choose one of {', '.join(preset_names())}.")
     text = (resources.files("calibnet.network") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-    return parse_config({"name": name, **tomllib.loads(text)}, f"Preset {name!r}")
+    return parse_config({"name": name, **parse_toml(text)}, f"Preset {name!r}")

@@ -169,11 +169,11 @@ class Trainer:
 
     def _resume(self) -> None:
         tensors, state = read_checkpoint(self.checkpoint)
-        theirs, ours = state["options"], asdict(self.options)
+        theirs, ours = state.options, asdict(self.options)
         if any(theirs.get(key) != ours[key] for key in ("preset", "range", "head")):
             raise ConfigError(f"{self.checkpoint} is of another preset, range or head; choose another --output folder.")
         restore(tensors, self.network, self.average, self.optimizer.optimizer)
-        self.steps, self.seconds = int(state["steps"]), float(state["seconds"])
+        self.steps, self.seconds = state.steps, state.seconds
 
     def _save_weights(self, figures: ValidationFigures | None) -> Path:
         path = weights_path(self.options.preset, self.range, self.folder)

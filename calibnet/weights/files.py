@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.runtime.reading import require_file
+from calibnet.runtime.reading import parse_json, require_file
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
 from calibnet.weights.manifest import PACKAGE, load_manifest
 
@@ -56,8 +58,23 @@ def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:
     return {name: t for name, t in state.items() if not (t.data_ptr() in seen or seen.add(t.data_ptr()))}  # type: ignore[func-returns-value]
 
 
-def read_header(path: Path) -> dict[str, Any]:
-    """The header of a weights file: ``config``, ``range`` and ``record``.
+@dataclass(frozen=True)
+class Header:
+    """What a weights file says of itself.
+
+    Attributes:
+        config: of the network, as a preset has it.
+        range: of the stage, as degrees and metres.
+        record: of its training.
+    """
+
+    config: dict[str, Any]
+    range: str
+    record: dict[str, Any]
+
+
+def read_header(path: Path) -> Header:
+    """The header of a weights file.
 
     Raises:
         WeightsError: the file is missing, cut short or not ours.
@@ -71,22 +88,21 @@ def read_header(path: Path) -> dict[str, Any]:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}
     except (SafetensorError, OSError) as error:
-        raise WeightsError(f"{path} is not a complete safetensors file ({error}); copy or train it again.") from None
+        said = one_line(error, 200)
+        raise WeightsError(f"{path} is not a complete safetensors file ({said}); copy or train it again.") from None
     if HEADER not in metadata:
         raise WeightsError(f"{path} was not written by calib-inspect: its header has no {HEADER!r} entry.")
+    origin = f"The {HEADER!r} entry in the header of {path}"
     try:
-        header: dict[str, Any] = json.loads(metadata[HEADER])
-    except ValueError:
-        header = {}
-    if not header.keys() >= {"config", "range", "record"}:
-        raise WeightsError(f"The {HEADER!r} entry in the header of {path} is not complete; copy or train it again.")
-    return header
+        content = parse_json(metadata[HEADER])
+    except ValueError as error:
+        raise WeightsError(f"{origin} is no JSON ({error}); copy or train it again.") from None
+    return validated(Header, content, origin, WeightsError, "copy or train it again")
 
 
 def read_record(path: Path) -> dict[str, Any]:
     """The training record: data, minutes, samples, seed, commit, validation figures."""
-    record: dict[str, Any] = read_header(path)["record"]
-    return record
+    return read_header(path).record
 
 
 def load_network(path: Path) -> CalibrationNetwork:
@@ -95,24 +111,29 @@ def load_network(path: Path) -> CalibrationNetwork:
     Raises:
         WeightsError: the file is missing, cut short, foreign or does not fit its own config.
     """
+    import torch
     from safetensors.torch import load_file
 
     from calibnet.network.config import parse_config
     from calibnet.network.network import CalibrationNetwork
 
     header = read_header(path)
-    values = {key: value for key, value in header["config"].items() if key not in MOVED}
+    values = {key: value for key, value in header.config.items() if key not in MOVED}
     try:
-        config = parse_config(values, f"The header of {path}")
-        network = CalibrationNetwork(config, MiscalibrationRange.parse(header["range"]))
+        config, range_ = parse_config(values, f"The header of {path}"), MiscalibrationRange.parse(header.range)
+        with torch.device("meta"):  # its size costs no memory there
+            promised = CalibrationNetwork(config, range_).state_dict()
     except ConfigError as error:
         raise WeightsError(f"{error} Use the version of calib-inspect that wrote it, or train it again.") from None
-    tensors = {name: tensor.float() for name, tensor in load_file(path).items()}
+    stored = load_file(path)
+    tensors = {name: tensor.float() for name, tensor in stored.items() if not tensor.is_complex()}
     if config.share_extractor:  # stored once
         for name in [name for name in tensors if name.startswith("features.image_trunk.")]:
             tensors[name.replace("image_trunk", "lidar_trunk")] = tensors[name]
-    try:
-        network.load_state_dict(tensors)
-    except RuntimeError:  # lists every name and shape
-        raise WeightsError(f"{path} does not fit the network of this version; train it again.") from None
+    if {name: tensor.shape for name, tensor in promised.items()} != {name: t.shape for name, t in tensors.items()}:
+        raise WeightsError(f"{path} does not fit the network of this version; train it again.")
+    if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
+        raise WeightsError(f"{path} holds numbers that are not finite; copy or train it again.")
+    network = CalibrationNetwork(config, range_)
+    network.load_state_dict(tensors)
     return network.eval()

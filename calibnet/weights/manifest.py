@@ -7,20 +7,28 @@ is here and nowhere else, to be read and changed in any editor.
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, ClassVar
 
 import numpy as np
+from annotated_types import Interval, Len, Predicate
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Matrix6
+from calibnet.runtime.reading import parse_toml, read_text
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import write_whole
 
 PACKAGE = Path(__file__).parent
 """Where the weights that ship with the package lie."""
+
+
+def _is_name(text: str) -> bool:
+    """Whether a text names a file, and no folder on the way to one."""
+    return Path(text).name == text and text.isprintable()
 
 
 @dataclass(frozen=True)
@@ -141,23 +149,50 @@ def load_manifest(preset: str, folder: Path | None = None) -> Manifest:
     Raises:
         WeightsError: a manifest is malformed; the message names the file and the key.
     """
-    path = next((path for path in (manifest_path(preset, folder), manifest_path(preset)) if path.is_file()), None)
+    path = next((path for path in (manifest_path(preset, folder), manifest_path(preset)) if path.exists()), None)
     if path is None:
         return Manifest(preset)
+    text = read_text(path, "Manifest of weights", error=WeightsError)
+    origin, remedy = f"{path} is no manifest of weights", "compare it with the one that ships with the package"
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        stages = tuple(_entry(stage) for stage in content.pop("stages", []))
-        manifest = Manifest(**content, stages=stages)
-    except (TypeError, KeyError, ValueError, ConfigError) as error:
-        raise WeightsError(
-            f"{path} is no manifest of weights ({error}); compare it with the one that ships with the package."
-        ) from None
-    if manifest.preset != preset:
-        raise WeightsError(f"{path} is the manifest of preset {manifest.preset}, not of {preset}; rename or mend it.")
-    return manifest
+        read = validated(_ManifestFile, parse_toml(text), origin, WeightsError, remedy)
+        stages = tuple(stage.entry() for stage in read.stages)
+    except (ValueError, ConfigError) as error:
+        raise WeightsError(f"{origin} ({one_line(error, 200)}); {remedy}.") from None
+    if read.preset != preset:
+        raise WeightsError(f"{path} is the manifest of preset {read.preset!r}, not of {preset}; rename or mend it.")
+    return Manifest(read.preset, read.match_error_limit_px, read.common_rotation_deg, read.common_translation_m, stages)
 
 
-def _entry(content: dict[str, Any]) -> StageEntry:
-    range_ = MiscalibrationRange.parse(content.pop("range"))
-    settings = {key: content.pop(key) for key in ("image_size", "looks", "gain") if key in content}
-    return StageEntry(range_, settings=StageSettings(**settings), **content)
+@dataclass(frozen=True)
+class _StageInFile:
+    """A stage as the file has it."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    range: str
+    file: Annotated[str, Predicate(_is_name)]
+    image_size: Annotated[float, Interval(gt=0, le=8)] = 1.0
+    looks: Annotated[int, Interval(ge=1, le=16)] = 1
+    gain: Annotated[float, Interval(gt=0, le=10)] = 1.0
+    run: str = ""
+    recipe: str = ""
+    validation: dict[str, float] = field(default_factory=dict)
+
+    def entry(self) -> StageEntry:
+        settings = StageSettings(self.image_size, self.looks, self.gain)
+        range_ = MiscalibrationRange.parse(self.range)
+        return StageEntry(range_, self.file, settings, self.run, self.recipe, self.validation)
+
+
+@dataclass(frozen=True)
+class _ManifestFile:
+    """The file."""
+
+    __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
+
+    preset: str
+    match_error_limit_px: Annotated[float, Interval(gt=0)] = math.inf
+    common_rotation_deg: Annotated[float, Interval(gt=0, le=45)] = 0.12
+    common_translation_m: Annotated[float, Interval(gt=0, le=10)] = 0.08
+    stages: Annotated[tuple[_StageInFile, ...], Len(0, 20)] = ()

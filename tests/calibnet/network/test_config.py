@@ -26,9 +26,9 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"colour": 3}, "unknown keys: colour"),
+        ({"colour": 3}, "colour is unknown"),
         ({"radius": 3}, "radius must be even"),
-        ({"radius": 0}, "radius must be even"),
+        ({"radius": 0}, "radius: input should be greater than or equal to 2"),
         ({"blocks": [1, 2]}, "widths and blocks"),
         ({"scales": [8, 32]}, "twice the one before"),
         ({"scales": [6, 12]}, "powers of two"),
@@ -39,7 +39,7 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
         ({"volume_channels": [8, 8]}, "volume_channels"),
         ({"hourglass_blocks": [1, 1, 1]}, "hourglass_blocks"),
         ({"head": "transformer"}, "geometric, regression"),
-        ({"normalization": "layer"}, "group, batch"),
+        ({"normalization": "layer"}, "normalization: input should be 'group' or 'batch'"),
         ({"widths": 8}, "mine.toml"),
     ],
 )
@@ -52,5 +52,5 @@ def test_wrong_values_are_named(change: dict[str, Any], said: str) -> None:
 def test_missing_keys_are_named() -> None:
     values = asdict(TINY)
     del values["radius"], values["head"]
-    with pytest.raises(ConfigError, match=r"mine.toml is not a complete network.*radius.*head"):
+    with pytest.raises(ConfigError, match=r"mine.toml: radius is missing.*head is missing"):
         parse_config(values, "mine.toml")

@@ -28,9 +28,9 @@ def test_the_shipped_manifest_lists_the_files_that_ship() -> None:
 @pytest.mark.parametrize("entry", SHIPPED.stages, ids=lambda entry: str(entry.range))
 def test_it_says_of_each_file_what_its_header_says(entry: StageEntry) -> None:
     header = read_header(PACKAGE / entry.file)
-    assert MiscalibrationRange.parse(header["range"]) == entry.range
-    assert entry.validation.keys() == header["record"]["validation"].keys()
-    for key, value in header["record"]["validation"].items():
+    assert MiscalibrationRange.parse(header.range) == entry.range
+    assert entry.validation.keys() == header.record["validation"].keys()
+    for key, value in header.record["validation"].items():
         assert entry.validation[key] == pytest.approx(value, abs=5e-4), key
 
 
@@ -77,10 +77,13 @@ def test_a_stage_trained_anew_takes_the_place_of_the_old_one() -> None:
     ("text", "said"),
     [
         ("preset = ", "no manifest"),
-        ('preset = "paper"', "of preset paper, not of compact"),
+        ('preset = "paper"', "of preset 'paper', not of compact"),
         ('preset = "compact"\nlimit = 3', "limit"),
         ('preset = "compact"\n[[stages]]\nfile = "x"', "range"),
-        ('preset = "compact"\n[[stages]]\nrange = "5/0.5"\nfile = "x"\nlooks = 0', "at least 1"),
+        (
+            'preset = "compact"\n[[stages]]\nrange = "5/0.5"\nfile = "x"\nlooks = 0',
+            "stages.0.looks: input should",
+        ),
         ('preset = "compact"\n[[stages]]\nrange = "wide"\nfile = "x"', "wide"),
         ("", "preset"),
     ],
