@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from calibnet.evaluation.metrics import Distribution, Metrics
+from calibnet.runtime.text import one_line
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
-from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
+from inspector.read.understood import RecordingError
 from inspector.verdicts import explained
 
 SUITE = "calib-inspect check"
@@ -108,6 +109,9 @@ def junit(run: RecordedRun, outcomes: Sequence[Outcome]) -> bytes:
         else:
             failure = {"type": "LimitExceeded", "message": outcome.sentence}
             ElementTree.SubElement(case, "failure", failure).text = f"{run.title}: {outcome.sentence}"
+    for element in suites.iter():
+        element.text = one_line(element.text) if element.text else None
+        element.attrib.update({name: one_line(value) for name, value in element.attrib.items()})
     ElementTree.indent(suites)
     text: bytes = ElementTree.tostring(suites, encoding="utf-8", xml_declaration=True)
     return text + b"\n"

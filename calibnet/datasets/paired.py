@@ -19,6 +19,7 @@ from calibnet.datasets.scans import read_scan
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
+from calibnet.runtime.text import one_line
 
 
 class Both(NamedTuple):
@@ -71,8 +72,8 @@ class PairedSequence(ABC):
     notes: tuple[str, ...] = ()
 
     def __init__(self, name: str, rig: str, files: Sequence[FrameFiles]) -> None:
-        self.name = name
-        self.rig = rig
+        self.name = one_line(name)
+        self.rig = one_line(rig)
         self.files = tuple(files)
         for file in self.files:
             for path in (file.image, file.scan):

@@ -89,7 +89,7 @@ def check_output(path: Path, kind: Kind | None) -> bool:
         return True
     if is_input(status):
         raise OutputError(f"{path} is read by this run and is not replaced; choose another path for the output.")
-    found = _kind_of_file(path)
+    found = kind_of_file(path)
     if found not in (kind, Kind.EMPTY) and not _overwriting:
         raise OutputError(f"{path} is not {kind} but {found}; choose another path, or add --overwrite to replace it.")
     return found is not Kind.EMPTY
@@ -163,7 +163,8 @@ _STARTS = {
 }
 
 
-def _kind_of_file(path: Path) -> Kind:
+def kind_of_file(path: Path) -> Kind:
+    """What a file is; a file that cannot be read is something else."""
     try:
         with open_file(path, remember=False) as file:
             return kind_of_content(file.read(HEAD_BYTES))

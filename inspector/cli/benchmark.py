@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from inspector.cli.options import FOLDER, STAGES
-from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, prepare_json, say, write_json
+from inspector.cli.output import (
+    JSON_FILE,
+    console_beside,
+    make_console,
+    overwrite_option,
+    prepare_json,
+    say,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -45,7 +53,6 @@ def benchmark(
     """
     prepare_json(json_file)
     import torch
-    from rich.console import Console
     from rich.progress import Progress
 
     from calibnet.cascade.cascade import Cascade
@@ -58,7 +65,7 @@ def benchmark(
     for skipped in cascade.skipped:
         say(skipped.reason, err=True)
     frames = list(SyntheticSequence(seed=0, length=SCENES, rig=KITTI_LIKE))
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=make_console(), transient=True) as progress:
         task = progress.add_task("timing", total=timing.WARM_UP + repeats * SCENES)
         result = timing.benchmark(cascade, frames, repeats, lambda: progress.advance(task))
     report(result, console_beside(json_file))

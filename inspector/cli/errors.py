@@ -90,6 +90,10 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
         return fail(sentence) if sentence else unforeseen(error)
     except Exception as error:  # the last net: nobody sees a traceback
         return unforeseen(error)
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # Rust code gave up, which is no Exception
+            raise
+        return unforeseen(error)
     return result if isinstance(result, int) else ExitCode.OK
 
 
@@ -100,7 +104,7 @@ def fail(sentence: str, code: ExitCode = ExitCode.BAD_INPUT) -> int:
     return code
 
 
-def unforeseen(error: Exception) -> int:
+def unforeseen(error: BaseException) -> int:
     """Say that something went wrong which nobody thought of, and keep what its makers need to know in a file."""
     from platform import platform
 

@@ -12,7 +12,15 @@ import click
 from calibnet.datasets import PickedFrames, Sequence, dataset_names, open_sequence, select_frames
 from calibnet.methods.registry import METHODS, open_method
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, STAGES
-from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, prepare_json, say, write_json
+from inspector.cli.output import (
+    JSON_FILE,
+    console_beside,
+    make_console,
+    overwrite_option,
+    prepare_json,
+    say,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -179,11 +187,10 @@ class Bars:
     """Progress on stderr, a bar for each row of the measurement; gone at the end."""
 
     def __enter__(self) -> Bars:
-        from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self.progress = Progress(*columns, console=Console(stderr=True), transient=True)
+        self.progress = Progress(*columns, console=make_console(), transient=True)
         self.tasks: dict[str, TaskID] = {}
         self.progress.start()
         return self

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from inspector.cli.options import FOLDER, STAGES
-from inspector.cli.output import say
+from inspector.cli.output import make_console, say
 
 if TYPE_CHECKING:
     from calibnet.evaluation.verdict_fit import FitFigures
@@ -66,7 +66,6 @@ def fit_verdict(
     \b
     calib-inspect fit-verdict --weights runs --data kitti-raw:KITTI/raw:2011_09_26/0048 --data folder:RIGS
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from calibnet.evaluation.verdict_fit import fit_verdict as fit
@@ -84,7 +83,7 @@ def fit_verdict(
     log = RunLog(path.with_suffix(".jsonl"), key)
     until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
     processes = (os.cpu_count() or 1) if workers is None else workers
-    console = Console(stderr=True, highlight=False)
+    console = make_console()
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress, runner(source, processes) as run:
         task = progress.add_task("calibrating", total=runs)

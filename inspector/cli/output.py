@@ -34,9 +34,18 @@ JSON_FILE = click.Path(dir_okay=False, writable=True, allow_dash=True)
 
 def console_beside(json_file: str | None) -> Console:
     """The console for tables: stderr when the JSON takes stdout."""
+    return make_console(stderr=json_file == "-")
+
+
+def make_console(stderr: bool = True) -> Console:
+    """A console that quotes the foreign text in what it prints, as `say` does."""
     from rich.console import Console
 
-    return Console(stderr=json_file == "-", highlight=False)
+    class Quoting(Console):
+        def print(self, *objects: Any, **options: Any) -> None:
+            super().print(*(lines(one) if isinstance(one, str) else one for one in objects), **options)
+
+    return Quoting(stderr=stderr, highlight=False)
 
 
 def say(text: object, err: bool = False) -> None:

@@ -27,7 +27,7 @@ from inspector.cli.options import (
     SEED,
     STAGES,
 )
-from inspector.cli.output import say
+from inspector.cli.output import make_console, say
 from inspector.cli.viewing import saved_lines, viewing_options
 from inspector.run.options import DEFAULT_RANGE, OptionsError, RunOptions
 
@@ -139,8 +139,6 @@ def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
 
 def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Session:
     """Load the cascade, say what is about to run, and hand back the run."""
-    from rich.console import Console
-
     from calibnet.cascade.cascade import Cascade
     from calibnet.geometry.miscalibration import stages_within
     from inspector.record.recording import RunDescription
@@ -151,7 +149,7 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
         numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
     cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.known)
     stages = [stage.number for stage in cascade.stages]
-    console = Console(stderr=True, highlight=False)
+    console = make_console()
     announce(console, options, cascade)
     provenance = describe_provenance(options.preset, stages, options.weights)
     return Session(

@@ -12,7 +12,7 @@ from calibnet.network.heads import HEADS
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE
 from inspector.cli.options import FOLDER, RANGE, SEED, NumberRange
-from inspector.cli.output import overwrite_option
+from inspector.cli.output import make_console, overwrite_option
 from inspector.cli.training_console import ConsoleObserver, Observers
 
 if TYPE_CHECKING:
@@ -177,9 +177,8 @@ def train(
         after=str(after) if after else None,
         scene_cache=str(scene_cache) if scene_cache else None,
     )
-    from rich.console import Console
 
-    console = Console(stderr=True, highlight=False)
+    console = make_console()
     steps = all_stages(options, RECIPE) if every_stage else [options]
     if not steps:
         console.print(f"All five stages have their weights in {output}; remove those to train again.")

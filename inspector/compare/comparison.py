@@ -12,8 +12,8 @@ from calibnet.errors import ConfigError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error
 from inspector import entities
-from inspector.read.file import RecordingError
 from inspector.read.run import RecordedFrame, RecordedRun
+from inspector.read.understood import RecordingError
 
 SAME_SETTINGS = ("sequence", "rig", "camera")
 """What runs on the same data have in common."""

@@ -10,8 +10,8 @@ from calibnet.datasets.folder import read_calibration_of
 from calibnet.geometry import CameraModel
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, Verdict
-from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun
+from inspector.read.understood import RecordingError
 from inspector.verdicts import explained
 
 

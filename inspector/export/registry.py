@@ -6,9 +6,11 @@ A format is a function from `inspector.export.exported.Exported` to the text of 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from calibnet.runtime.plugins import Registry
+from calibnet.runtime.text import one_line
 
 if TYPE_CHECKING:
     from inspector.export.exported import Exported
@@ -35,5 +37,5 @@ def export_as(name: str, exported: Exported) -> str:
     Raises:
         ConfigError: there is no such format, or its package is broken.
     """
-    text: str = FORMATS.load(name)(exported)
+    text: str = FORMATS.load(name)(replace(exported, origin=one_line(exported.origin)))
     return text

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING
 
 from rerun.chunk import RrdReader
 
-from calibnet.errors import CalibnetError
 from calibnet.runtime.reading import require_file
+from calibnet.runtime.writing import Kind, kind_of_file
 from inspector import entities
+from inspector.read.understood import RecordingError, understood
 from inspector.record.outputs import rerun_binary
 
 if TYPE_CHECKING:
     from rerun.chunk import Chunk, StoreEntry
 
 
-class RecordingError(CalibnetError):
-    """A recording is missing, damaged, foreign, or without what a command needs of it."""
+REPAIR_S = 300.0
+"""Time that the repair of a file may take."""
 
 
 class RecordingFile:
@@ -45,6 +46,8 @@ class RecordingFile:
         if not path.exists():
             raise RecordingError(f"There is no recording {path}; check the path, or make one with --save {path}.")
         require_file(path, "Recording", None, RecordingError, "give a recording that calib-inspect made")
+        if kind_of_file(path) is not Kind.RECORDING:
+            raise self._unreadable()
         self._reader, entries = self._open()
         self._entry = self._ours(entries)
 
@@ -58,14 +61,17 @@ class RecordingFile:
             RecordingError: a chunk is damaged.
         """
         source = self._reader.stream(store=self._entry) if self.cut else self._reader.store(store=self._entry).stream()
-        try:
-            yield from source.filter(content=[f"/{path}" for path in paths])
-        except RuntimeError:
-            raise RecordingError(f"{self.path} is damaged in the middle; copy it again or record it again.") from None
+        with understood(self.path):
+            try:
+                yield from source.filter(content=[f"/{path}" for path in paths])
+            except RuntimeError:
+                raise RecordingError(
+                    f"{self.path} is damaged in the middle; copy it again or record it again."
+                ) from None
 
     def _open(self) -> tuple[RrdReader, list[StoreEntry]]:
         """The file's reader and what the file holds; of a copy where the file ends within a chunk."""
-        with warnings.catch_warnings(record=True) as caught:
+        with understood(self.path), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             with contextlib.suppress(RuntimeError, ValueError):
                 opened = _listed(self.path)
@@ -82,7 +88,8 @@ class RecordingFile:
         self._copy = tempfile.TemporaryDirectory(prefix="calib-inspect-")
         copy = Path(self._copy.name) / "repaired.rrd"
         command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self.path), "-o", str(copy)]
-        subprocess.run(command, capture_output=True, check=False)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            subprocess.run(command, capture_output=True, check=False, timeout=REPAIR_S)
         return copy
 
     def _ours(self, entries: list[StoreEntry]) -> StoreEntry:

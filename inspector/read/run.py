@@ -5,22 +5,24 @@ Comparisons, checks, exports and reports read nothing else, so whoever has the `
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import CameraModel, PoseError, pose_error
+from calibnet.geometry import RANGES, CameraModel, MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.reading import parse_json
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
-from inspector.read.file import RecordingError, RecordingFile
+from inspector.read.file import RecordingFile
+from inspector.read.understood import RecordingError, camera_of, extrinsic_of, understood
 from inspector.read.verdict import former_verdict, read_verdict
+from inspector.record.contents import Coloring
 from inspector.verdicts import of_frames
 
 if TYPE_CHECKING:
@@ -143,8 +145,9 @@ class RecordedRun:
 
     def image(self, index: int) -> bytes:
         """The frame's image as JPEG."""
-        (blob,) = self._row(entities.IMAGE, index, "EncodedImage:blob")
-        return np.asarray(blob.values[0].values).tobytes()
+        with understood(self.path):
+            (blob,) = self._row(entities.IMAGE, index, "EncodedImage:blob")
+            return np.asarray(blob.values[0].values).tobytes()
 
     def overlay(self, entity: str, index: int) -> OverlayPoints:
         """The points drawn over the frame's image, far to near.
@@ -153,11 +156,14 @@ class RecordedRun:
             entity: `entities.OVERLAY_MISCALIBRATED`, ``_CORRECTED``, ``_REFERENCE`` or `entities.overlay_stage`.
             index: the frame's number.
         """
-        positions, colors = self._row(entity, index, "Points2D:positions", "Points2D:colors")
-        rgba = np.asarray(colors.values).astype(np.uint32)
-        rgb = np.stack([rgba >> shift & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
-        uv = np.asarray(positions.values.flatten()).reshape(-1, 2)
-        return OverlayPoints(uv - np.float32(0.5), rgb)  # Rerun's pixel centres are at x.5
+        with understood(self.path):
+            positions, colors = self._row(entity, index, "Points2D:positions", "Points2D:colors")
+            rgba = np.asarray(colors.values).astype(np.uint32)
+            rgb = np.stack([rgba >> shift & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
+            uv = np.asarray(positions.values.flatten()).reshape(-1, 2)
+            if len(uv) != len(rgb):
+                raise ValueError(f"{len(uv)} points of {len(rgb)} colours")
+            return OverlayPoints(uv - np.float32(0.5), rgb)  # Rerun's pixel centres are at x.5
 
     def chunks(self, *paths: str) -> Iterator[Chunk]:
         """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
@@ -180,6 +186,11 @@ def read_run(path: Path) -> RecordedRun:
         RecordingError: the file is missing, damaged, foreign, too old, or has no complete frame.
     """
     file = RecordingFile(path)
+    with understood(path):
+        return _run(path, file)
+
+
+def _run(path: Path, file: RecordingFile) -> RecordedRun:
     tables = _read_tables(file)
     properties = {name: _single(tables.get(f"{PROPERTIES}/{name}", [])) for name in (entities.RUN, entities.PROVENANCE)}
     provenance = properties[entities.PROVENANCE]
@@ -189,25 +200,32 @@ def read_run(path: Path) -> RecordedRun:
         )
     numbers, ranges = provenance.pop("stage_numbers", []), provenance.pop("stage_ranges", [])
     (has_reference,) = provenance.pop("has_reference", [False])
-    frames = _frames(tables, numbers, has_reference, file.cut) if numbers else ()
+    if sorted(set(numbers)) != numbers or not set(numbers) <= set(range(1, len(RANGES) + 1)):
+        raise ValueError(f"stages {numbers}")
+    frames = _frames(tables, numbers, bool(has_reference), file.cut, path) if numbers else ()
     if not frames:
         raise RecordingError(f"{path} ends before its first frame is complete; copy it again or record it again.")
     versions = {name: value for name, (value,) in provenance.items()}
     history = {} if file.cut else _matrices(tables[entities.EXTRINSIC_DRIVE])  # its last row is the result
-    weights = json.loads(versions.pop("weights", "{}"))
+    weights = parse_json(versions.pop("weights", "{}"))
+    settings = {name: value for name, (value,) in properties[entities.RUN].items()}
+    Coloring(settings.get("color", Coloring.DEPTH))
     return RecordedRun(
         path=path,
         title=_single(tables[PROPERTIES]).get("RecordingInfo:name", [path.stem])[0],
-        settings={name: value for name, (value,) in properties[entities.RUN].items()},
+        settings=settings,
         provenance=versions,
-        weights={int(number): record for number, record in weights.items()},
-        stages=tuple(RecordedStage(*stage) for stage in zip(numbers, ranges, strict=True)),
-        has_reference=has_reference,
+        weights={int(number): dict(record) for number, record in weights.items()},
+        stages=tuple(
+            RecordedStage(number, str(MiscalibrationRange.parse(range_)))
+            for number, range_ in zip(numbers, ranges, strict=True)
+        ),
+        has_reference=bool(has_reference),
         frames=frames,
         skipped=tuple(BadFrame(row[entities.FRAME], row["TextLog:text"][0]) for row in _rows(tables[entities.SKIPPED])),
         drive=history[max(history)] if history else None,
-        drive_verdict=_verdict(tables[entities.VERDICT_DRIVE]),
-        given_verdict=_verdict(tables[entities.VERDICT_GIVEN]),
+        drive_verdict=_verdict(tables[entities.VERDICT_DRIVE], path),
+        given_verdict=_verdict(tables[entities.VERDICT_GIVEN], path),
         warning=f"{path} is cut off: only its {len(frames)} complete frames are used." if file.cut else "",
         _file=file,
     )
@@ -233,14 +251,14 @@ def _single(batches: list[RecordBatch]) -> dict[str, list[Any]]:
     }
 
 
-def _verdict(batches: list[RecordBatch]) -> Verdict | None:
+def _verdict(batches: list[RecordBatch], path: Path) -> Verdict | None:
     """The one of static data."""
     text = _single(batches).get(entities.VERDICT)
-    return read_verdict(text[0]) if text else None
+    return read_verdict(text[0], path) if text else None
 
 
 def _frames(
-    tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool
+    tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool, path: Path
 ) -> tuple[RecordedFrame, ...]:
     """The frames of which everything is there."""
     initial = _matrices(tables[entities.EXTRINSIC_INITIAL])
@@ -262,12 +280,12 @@ def _frames(
                 index=index,
                 seconds=row[entities.TIME],
                 source=row["source"][0],
-                camera=_camera(row),
+                camera=camera_of(row, path),
                 initial=initial[index],
                 corrected=corrected[index],
                 stages=of_stages,
                 reference=reference.get(index),
-                verdict=read_verdict(verdicts[index])
+                verdict=read_verdict(verdicts[index], path)
                 if index in verdicts
                 else former_verdict(initial[index], corrected[index], of_stages),
             )
@@ -275,17 +293,9 @@ def _frames(
     return tuple(frames)
 
 
-def _camera(row: dict[str, Any]) -> CameraModel:
-    """The camera of a frame; earlier recordings have rectified pictures, and say no lens."""
-    camera = CameraModel(row["width"][0], row["height"][0], np.reshape(row["camera_matrix"], (3, 3)))
-    if not row.get("lens_model"):
-        return camera
-    return replace(camera, model=row["lens_model"][0], coefficients=np.array(row["lens_coefficients"]))
-
-
 def _matrices(batches: list[RecordBatch]) -> dict[int, Extrinsic]:
     """4x4 matrices by frame."""
-    return {row[entities.FRAME]: np.reshape(row[entities.MATRIX], (4, 4)) for row in _rows(batches)}
+    return {row[entities.FRAME]: extrinsic_of(row[entities.MATRIX]) for row in _rows(batches)}
 
 
 def _rows(batches: list[RecordBatch]) -> Iterator[dict[str, Any]]:

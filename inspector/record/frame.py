@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from calibnet.runtime.text import one_line
 from calibnet.verdict import Verdict
 from inspector import entities
 from inspector.record.contents import Contents, Part
@@ -54,7 +55,7 @@ def _log_camera(rec: Subtree, observation: Observation) -> None:
         width=camera.width,
         height=camera.height,
         camera_matrix=camera.matrix.astype(np.float64).ravel(),
-        source=Path(observation.frame.source).name,
+        source=one_line(Path(observation.frame.source).name),
         lens_model=camera.model,
         lens_coefficients=camera.coefficients.astype(np.float64),
     )

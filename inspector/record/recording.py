@@ -16,6 +16,7 @@ import rerun as rr
 
 from calibnet.datasets.frame import Frame
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.text import one_line
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
 from inspector import entities
@@ -74,8 +75,12 @@ class Recording:
         self._frames = self._unflushed = 0
         self._seconds: dict[int, float] = {}
         blueprint = make_blueprint(layout, self._tabs)
-        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, blueprint)
-        self._stream.rec.send_property(entities.RUN, rr.AnyValues(**description.options))
+        options, title = (
+            {name: _plain(value) for name, value in description.options.items()},
+            one_line(description.title),
+        )
+        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, title, sinks, blueprint)
+        self._stream.rec.send_property(entities.RUN, rr.AnyValues(**options))
         provenance = rr.AnyValues(**description.provenance, **_described(layout))
         self._stream.rec.send_property(entities.PROVENANCE, provenance)
         self._rec = Subtree(self._stream.rec)
@@ -136,6 +141,11 @@ class Recording:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _plain(value: Any) -> Any:
+    """Text that is in UTF-8 and one line, whatever a folder is called."""
+    return one_line(value) if isinstance(value, str) else value
 
 
 def _described(layout: Layout) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
         write_whole(folder / METRICS, _json(figures.as_dict()).encode(), Kind.JSON)
         copy_recording(run.path, folder / RECORDING)
         page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
-        write_whole(folder / PAGE, page.encode(), Kind.PAGE)
+        write_whole(folder / PAGE, page.encode(errors="backslashreplace"), Kind.PAGE)
     except OSError as error:
         raise _cannot_write(error, folder) from None
     finally:

@@ -22,8 +22,8 @@ from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.export.exported import exported_drive, exported_median
 from inspector.export.formats import quaternion_xyzw
-from inspector.read.file import RecordingError
 from inspector.read.run import RecordedRun, read_run
+from inspector.read.understood import RecordingError
 from tests.support.judged import REASON, UNSURE
 
 

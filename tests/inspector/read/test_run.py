@@ -18,8 +18,8 @@ from rerun.chunk import RrdReader
 from calibnet.geometry import MiscalibrationRange, project
 from calibnet.verdict import BadFrame, Cause, Verdict
 from inspector import entities
-from inspector.read.file import RecordingError
 from inspector.read.run import read_run
+from inspector.read.understood import RecordingError
 from inspector.read.verdict import read_verdict
 from inspector.run.start import Start
 from tests.support.judged import REASON
@@ -77,7 +77,7 @@ def test_a_verdict_is_read_as_it_was_written() -> None:
     skipped = (BadFrame(4, "It is cut short."),)
     causes = (Cause("units", "Ranges are in millimetres.", "median 11000"),)
     written = Verdict("cannot tell", "Who knows.", pose, (0.1, 2.5), causes, covariance, 9, skipped)
-    found = read_verdict(json.dumps(written.as_dict()))
+    found = read_verdict(json.dumps(written.as_dict()), Path("run.rrd"))
     assert found.as_dict() == written.as_dict()
     assert found.causes == causes and found.skipped == skipped and found.moved == (0.1, 2.5)
     np.testing.assert_array_equal(found.covariance, covariance)
@@ -102,13 +102,15 @@ def test_of_a_drive_solved_as_one_the_last_estimate_is_the_result(tmp_path: Path
     rec = rr.RecordingStream("calib-inspect")
     rec.save(file)
     rr.send_chunks(RrdReader(full_recording).store().stream(), recording=rec)
-    for index in (0, 2):
+    extrinsics = {index: np.eye(4) for index in (0, 2)}
+    for index, extrinsic in extrinsics.items():
+        extrinsic[0, 3] = index
         rec.set_time("frame", sequence=index)
-        rec.log(entities.EXTRINSIC_DRIVE, rr.AnyValues(camera_from_lidar=np.full(16, float(index))))
+        rec.log(entities.EXTRINSIC_DRIVE, rr.AnyValues(camera_from_lidar=extrinsic.ravel()))
     rec.disconnect()
     drive = read_run(file).drive
     assert drive is not None
-    np.testing.assert_array_equal(drive, np.full((4, 4), 2.0))
+    np.testing.assert_array_equal(drive, extrinsics[2])
     assert read_run(full_recording).drive is None
 
 
