@@ -25,7 +25,9 @@ def invoke(
     """``invoke("seq", "04", ...)`` in an empty folder without a display, with the fake cascade."""
     from calibnet.cascade.cascade import Cascade
 
-    def load(preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Any = None, **_: Any) -> Any:
+    def load(
+        preset: str = "compact", stages: tuple[int, ...] | None = None, folder: Any = None, *_: Any, **__: Any
+    ) -> Any:
         return fakes.FakeCascade(stages or (1, 2, 3, 4, 5))
 
     monkeypatch.setattr(Cascade, "load", staticmethod(load))

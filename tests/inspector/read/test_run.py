@@ -15,7 +15,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from calibnet.geometry import MiscalibrationRange, project
+from calibnet.geometry import MiscalibrationRange, miscalibration, project
 from calibnet.verdict import BadFrame, Cause, Verdict
 from inspector import entities
 from inspector.read.run import read_run
@@ -73,7 +73,7 @@ def test_verdicts_come_back_and_a_rejected_frame_keeps_its_start(record: Callabl
 
 
 def test_a_verdict_is_read_as_it_was_written() -> None:
-    pose, covariance = np.arange(16.0).reshape(4, 4) / 7, np.diag(np.arange(1.0, 7.0)) / 3
+    pose, covariance = miscalibration([10.0, -20.0, 3.0], [0.1, 1 / 7, -0.3]), np.diag(np.arange(1.0, 7.0)) / 3
     skipped = (BadFrame(4, "It is cut short."),)
     causes = (Cause("units", "Ranges are in millimetres.", "median 11000"),)
     written = Verdict("cannot tell", "Who knows.", pose, (0.1, 2.5), causes, covariance, 9, skipped)
