@@ -112,6 +112,25 @@ class Cascade:
         doubt = self.coefficients.doubt_of(self.stages[-1].range)
         return doubt if isinstance(doubt, str) else ""
 
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Of the stages, coarse to fine."""
+        return tuple(stage.number for stage in self.stages)
+
+    def only(self, number: int) -> Cascade:
+        """The same with one of its stages alone, which cannot start again with wider ones.
+
+        Coefficients of the verdict are fitted to what the last stage leaves, so nothing is accepted of any other.
+
+        Raises:
+            ConfigError: it has no such stage.
+        """
+        chosen = [stage for stage in self.stages if stage.number == number]
+        if not chosen:
+            raise ConfigError(f"Stage {number} is not loaded; there are {', '.join(map(str, self.numbers))}.")
+        coefficients = self.coefficients if number == self.numbers[-1] else None
+        return Cascade(chosen, self.skipped, self.common, (), coefficients, self.known)
+
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct the extrinsic of one frame.
 

@@ -35,6 +35,7 @@ COMMANDS = {
     "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
     "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
+    "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand and see what the cascade answers."),
     "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),
     "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
     "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),

@@ -9,6 +9,7 @@ import numpy as np
 
 from calibnet.geometry import CameraModel, invert
 from calibnet.geometry.types import Floats, Rotation
+from calibnet.runtime.text import one_line
 from inspector.export.exported import Exported
 
 AXES = "LiDAR x forward, y left, z up; camera x right, y down, z forward (optical frame); metres"
@@ -93,6 +94,24 @@ def as_json(exported: Exported) -> str:
         **lens(exported.camera),
     }
     return f"{json.dumps(content, indent=2)}\n"
+
+
+def as_calibration(exported: Exported) -> str:
+    """A ``calibration.yaml`` as plain folders have it, which `calib-inspect folder` reads again."""
+    camera, matrix = exported.camera, exported.camera_from_lidar
+    of_lens = {"distortion_model": camera.model, **camera.named, "distortion": camera.distortion.tolist()}
+    content = {"width": camera.width, "height": camera.height, "camera_matrix": camera.matrix.tolist(), **of_lens}
+    rows = [f"{name}: {json.dumps(value)}" for name, value in content.items()]
+    return "\n".join(
+        [
+            f"# Source: calib-inspect, {one_line(exported.origin)}",
+            f"# {CONVENTION}",
+            *rows,
+            "camera_from_lidar:",
+            *(f"  - {json.dumps(row)}" for row in matrix.tolist()),
+            "",
+        ]
+    )
 
 
 def lens(camera: CameraModel) -> dict[str, str | float | list[float]]:

@@ -23,6 +23,7 @@ FORMATS = Registry(
         "ros": "inspector.export.formats:as_ros",
         "opencv": "inspector.export.formats:as_opencv",
         "json": "inspector.export.formats:as_json",
+        "yaml": "inspector.export.formats:as_calibration",
     },
 )
 

@@ -38,10 +38,11 @@ class Guard:
         self._app = app
         self._hosts = {f"{LOCALHOST}:{port}", f"localhost:{port}"}
         self._token = token
-        live = " ".join(f"ws://{host}" for host in sorted(self._hosts))
+        live, pages = (" ".join(f"{scheme}://{host}" for host in sorted(self._hosts)) for scheme in ("ws", "http"))
         self._headers = {
             "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
-            f"connect-src 'self' data: blob: {live}; frame-ancestors 'self'; form-action 'self'; base-uri 'none'",
+            f"connect-src 'self' data: blob: {live}; frame-src {pages}; frame-ancestors {pages}; form-action 'self'; "
+            "base-uri 'none'",
             "cross-origin-resource-policy": "same-origin",
             "referrer-policy": "no-referrer",
             "x-content-type-options": "nosniff",

@@ -98,5 +98,30 @@ def chosen_match(points: StartingPoints, results: StageDetail) -> Match | None:
     return Match(_pair(points.projection.pixels[point]), true)
 
 
+def match_of(points: StartingPoints, row: int) -> Match | None:
+    """A point of the scan, by its row; None where it does not fall into the network's image."""
+    (found,) = np.nonzero(points.projection.index == row)
+    if not len(found):
+        return None
+    true = None if points.displacement is None else _pair(points.displacement[found[0]])
+    return Match(_pair(points.projection.pixels[found[0]]), true)
+
+
+def point_at(projection: Projection, pixel: tuple[float, float], reach: float) -> int | None:
+    """Row in the scan of the point that is seen nearest to a pixel, the nearer one in space where two are as near.
+
+    Args:
+        projection: of the scan.
+        pixel: ``(u, v)``.
+        reach: distance in pixels up to which a point counts; None is returned where there is none.
+    """
+    off = np.linalg.norm(projection.pixels - np.asarray(pixel, np.float32), axis=1)
+    near = np.flatnonzero(off <= reach)
+    if not len(near):
+        return None
+    best = near[np.lexsort((projection.depth[near], np.round(off[near] / max(reach / 4, 1e-6))))[0]]
+    return int(projection.index[best])
+
+
 def _pair(values: NDArray[np.float32]) -> tuple[float, float]:
     return float(values[0]), float(values[1])

@@ -17,13 +17,21 @@ FRAMES_PER_SECOND = 10.0
 """Speed at which frames play: that of KITTI's scanner."""
 
 
-def make_blueprint(layout: Layout, tabs: Sequence[Tab] | None = None, prefix: str = "") -> rrb.Blueprint:
+def make_blueprint(
+    layout: Layout,
+    tabs: Sequence[Tab] | None = None,
+    prefix: str = "",
+    timeline: str = entities.FRAME,
+    following: bool = False,
+) -> rrb.Blueprint:
     """The layout of a recording, or of the part of a recording that lies below a prefix.
 
     Args:
         layout: what the recording contains.
         tabs: which tabs to show; all that it has data for, if not given.
         prefix: of the entities' paths.
+        timeline: that the viewer stands on.
+        following: always show the newest data, until somebody chooses a time.
     """
     shown = wanted_tabs(layout) if tabs is None else tabs
     root = rrb.Tabs(*(tab.view(layout) for tab in shown), active_tab=0, name=prefix.strip("/") or None)
@@ -31,7 +39,12 @@ def make_blueprint(layout: Layout, tabs: Sequence[Tab] | None = None, prefix: st
         _move_below(root, prefix)
     return rrb.Blueprint(
         root,
-        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, fps=FRAMES_PER_SECOND),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=timeline,
+            fps=FRAMES_PER_SECOND,
+            play_state="Following" if following else None,
+        ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,

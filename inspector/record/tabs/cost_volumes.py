@@ -17,7 +17,7 @@ from inspector.record.contents import Contents, Part
 from inspector.record.observation import Grid, Layout, Observation, StageLayout
 from inspector.record.pictures.legends import log_map_legends, log_names
 from inspector.record.pictures.maps import certainty_image, flow_image, reach_px, subcell_match
-from inspector.record.pictures.matches import StartingPoints, chosen_match
+from inspector.record.pictures.matches import StartingPoints, chosen_match, match_of
 from inspector.record.pictures.search_window import SearchWindow
 from inspector.record.pictures.slices import slice_marks, slices_picture
 from inspector.record.subtree import Subtree
@@ -150,6 +150,17 @@ def _log_stage(
             _log_tensors(rec, stage.number, scale)
             rec.log(entities.of_scale(stage.number, scale.stride, SLICES), slices_picture(scale))
             rec.log(entities.of_scale(stage.number, scale.stride, SLICE_MARKS), slice_marks(scale, true))
+
+
+def log_windows(rec: Subtree, observation: Observation, contents: Contents, point: int) -> None:
+    """Move the windows of every stage to the cell of a point, by its row in the scan, where the stage has it."""
+    for stage in observation.trace.stages:
+        if stage.detail is None:
+            continue
+        match = match_of(StartingPoints.of(observation, stage), point)
+        if match is not None:
+            for scale in contents.scales(stage.detail):
+                _log_window(rec, stage.number, scale, SearchWindow(scale, match))
 
 
 def _log_maps(rec: Subtree, number: int, scale: ScaleTrace, true: NDArray[np.float32] | None) -> None:

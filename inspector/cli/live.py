@@ -1,0 +1,197 @@
+"""``calib-inspect live``: a page on which one moves the extrinsic by hand, and the cascade answers."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from inspector.cli.errors import ExitCode
+from inspector.cli.inspect import (
+    DEMO_LENGTH,
+    camera_option,
+    disturbed,
+    folder_options,
+    open_folder,
+    open_object,
+    open_odometry,
+    open_raw,
+    root_option,
+    split_option,
+)
+from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, RANGE, SEED, STAGES
+from inspector.cli.output import overwrite_option, say
+from inspector.cli.recordings import OUTPUT_FILE
+from inspector.cli.run import announce, checked
+from inspector.export.registry import FORMATS
+from inspector.run.options import DEFAULT_RANGE
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+
+_OPTIONS: tuple[Callable[..., Any], ...] = (
+    click.option("--frames", type=FRAMES, default=":", help="Positions to choose from, for instance 0:100:5.  [all]"),
+    click.option(
+        "--range",
+        type=RANGE,
+        help=f"Begin with a miscalibration drawn from ± these, and let the sliders reach so far.  [{DEFAULT_RANGE}]",
+    ),
+    click.option("--miscalibrate", "miscalibration", type=MISCALIBRATION, help="Begin with this one."),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
+    click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
+    click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
+    click.option(
+        "--output",
+        type=OUTPUT_FILE,
+        default=Path("calibration.corrected.yaml"),
+        show_default=True,
+        metavar="FILE",
+        help="Where an accepted calibration goes; never the file that was read.",
+    ),
+    click.option("--format", "form", type=click.Choice(FORMATS.names()), default="yaml", show_default=True),
+    overwrite_option,
+    click.option("--open/--no-open", "open_page", default=True, help="Open a browser, where there is a display."),
+)
+
+
+@dataclass(frozen=True)
+class Keeping:
+    """Where an accepted calibration goes, and whether the page is opened."""
+
+    output: Path
+    form: str
+    open_page: bool
+
+
+def live_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of a live session; those of `Keeping` come as one, ``keeping``."""
+    names = [field.name for field in fields(Keeping)]
+
+    @wraps(command)
+    def packed(**given: Any) -> Any:
+        return command(keeping=Keeping(**{name: given.pop(name) for name in names}), **given)
+
+    decorated: Callable[..., Any] = packed
+    for option in reversed(_OPTIONS):
+        decorated = option(decorated)
+    return decorated
+
+
+@click.group()
+def live() -> None:
+    """Move the extrinsic by hand, see the points follow, let go, and see what the cascade answers, stage by stage.
+
+    A page on this machine, which nobody opens who does not have its address. Every try stays and can be gone back to.
+    Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, Ctrl+Z undoes, the arrows change the frame.
+    """
+
+
+@live.command()
+@click.argument("sequence")
+@root_option
+@camera_option
+@live_options
+def seq(sequence: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
+    """On a KITTI odometry sequence, for instance 04."""
+    return serve_live(open_odometry(sequence, root, camera), keeping, camera=camera, **asked)
+
+
+@live.command()
+@click.argument("date")
+@click.argument("number", metavar="DRIVE")
+@root_option
+@camera_option
+@live_options
+def raw(date: str, number: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
+    """On a KITTI raw drive, for instance 2011_09_26 0005."""
+    return serve_live(open_raw(date, number, root, camera), keeping, camera=camera, **asked)
+
+
+@live.command("object")
+@split_option
+@root_option
+@camera_option
+@live_options
+def object_(split: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
+    """On the frames of the KITTI object detection benchmark."""
+    return serve_live(open_object(split, root, camera), keeping, camera=camera, **asked)
+
+
+@live.command()
+@click.argument("directory", type=FOLDER)
+@folder_options
+@live_options
+def folder(
+    directory: Path,
+    dataset: str,
+    guess: Path | None,
+    camera: str | None,
+    camera_frame: str | None,
+    lidar_frame: str | None,
+    keeping: Keeping,
+    **asked: Any,
+) -> int:
+    """On your own images and scans; without --range their calibration is the guess, and there is no reference."""
+    sequence = open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame)
+    return serve_live(sequence, keeping, camera=camera, as_is=not disturbed(asked), **asked)
+
+
+@live.command()
+@click.option("--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Frames to drive.")
+@live_options
+def demo(length: int, keeping: Keeping, **asked: Any) -> int:
+    """On a drive through the synthetic world: needs no data."""
+    from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
+
+    return serve_live(SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE), keeping, **asked)
+
+
+def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
+    """Serve the page until Ctrl-C or SIGTERM.
+
+    Args:
+        sequence: what to look at.
+        keeping: where an accepted calibration goes.
+        **asked: fields of `RunOptions`.
+    """
+    from rich.console import Console
+
+    from calibnet.cascade.cascade import Cascade
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.live.accept import Target
+    from inspector.live.app import LiveApp
+    from inspector.live.bench import Bench
+    from inspector.live.session import LiveSession
+    from inspector.record.outputs import has_display
+    from inspector.serving.server import PageServer
+    from inspector.serving.viewer_files import fetch_viewer
+
+    options = checked(sequence, asked)
+    target = Target(keeping.output, keeping.form)
+    target.check()
+    cascade = Cascade.load(
+        options.preset, options.stages or options.start.stages, options.weights, wider=options.stages is None
+    )
+    announce(Console(stderr=True, highlight=False), options, cascade)
+    bench = Bench(sequence, options.positions, options.start, options.seed)
+    session = LiveSession(bench, cascade, target, options.range or DEFAULT_RANGE)
+    with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
+        fetch_viewer(Path(viewer))
+        try:
+            with StopRequest() as stop, PageServer(LiveApp(session, Path(viewer)).asgi) as server:
+                say(f"Live at {server.address} until Ctrl-C.")
+                if keeping.open_page and has_display():
+                    webbrowser.open(server.address)
+                while not stop.requested:
+                    time.sleep(0.1)
+        finally:
+            session.close()
+    return ExitCode.OK

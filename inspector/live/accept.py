@@ -1,0 +1,70 @@
+"""Keeping what was found as a calibration: a new file, never the one that was read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.writing import Kind, check_output, write_whole
+from calibnet.verdict import ACCEPTED, Verdict
+from inspector.export.exported import Exported
+from inspector.export.registry import export_as
+from inspector.live.tries import Try
+from inspector.verdicts import explained
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where an accepted calibration goes.
+
+    Attributes:
+        file: that is written; one that this wrote before is replaced.
+        form: of `inspector.export.registry.FORMATS`.
+    """
+
+    file: Path
+    form: str = "yaml"
+
+    def check(self) -> None:
+        """Find out before the work that it may be written.
+
+        Raises:
+            OutputError: it may not.
+        """
+        check_output(self.file, self._kind)
+
+    @property
+    def _kind(self) -> Kind:
+        return Kind.JSON if self.form == "json" else Kind.EXPORT
+
+    def write(self, frame: Frame, extrinsic: Extrinsic, origin: str, verdict: Verdict | None) -> str:
+        """Write it, and say so in a sentence.
+
+        Raises:
+            OutputError: the file may not be replaced.
+        """
+        doubt = doubts(verdict)
+        exported = Exported(
+            extrinsic, frame.as_taken.camera, f"{origin}; {doubt}" if doubt else origin, verdict=verdict
+        )
+        replaced = write_whole(self.file, export_as(self.form, exported).encode(), self._kind)
+        return f"{'Replaced' if replaced else 'Wrote'} {self.file.resolve()}."
+
+
+def verdict_on(extrinsic: Extrinsic, tries: list[Try]) -> Verdict | None:
+    """The newest verdict on just this extrinsic; None where it was set by hand."""
+    for made in reversed(tries):
+        if np.allclose(made.found, extrinsic, atol=1e-9):
+            return made.verdict
+    return None
+
+
+def doubts(verdict: Verdict | None) -> str:
+    """Why one should think twice before keeping a calibration; empty where it is accepted."""
+    if verdict is None:
+        return "set by hand: nothing has judged it"
+    return "" if verdict.word == ACCEPTED else f"{verdict.word}: {explained(verdict)}"

@@ -1,0 +1,115 @@
+"""The page's app: the page and its picture over HTTP, messages and the recording over websockets."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from inspector.live.payload import picture_jpeg, points_bytes
+from inspector.live.session import LiveSession
+from inspector.serving.files import file_route
+from inspector.serving.viewer_files import VIEWER_FILES
+
+PAGE = Path(__file__).parent / "page"
+
+
+class LiveApp:
+    """Connects windows to a session: all of them show the same."""
+
+    def __init__(self, session: LiveSession, viewer: Path) -> None:
+        """Serve a session.
+
+        Args:
+            session: what they act on.
+            viewer: folder with the files of Rerun's web viewer.
+        """
+        self._session = session
+        self._windows: set[WebSocket] = set()
+        self._viewers: set[asyncio.Event] = set()
+        session.tell, session.grown = self._tell_all, self._wake
+        files = {f"/{file.name}": file for file in PAGE.iterdir() if file.is_file()}
+        files |= {f"/viewer/{name}": viewer / name for name in VIEWER_FILES if name != "index.html"}
+        files |= {"/": PAGE / "live.html", "/viewer/": PAGE / "viewer.html", "/viewer/viewer.js": PAGE / "viewer.js"}
+        self.asgi = Starlette(
+            routes=[
+                Route("/picture.jpg", self._answer(picture_jpeg, "image/jpeg")),
+                Route("/points.bin", self._answer(points_bytes, "application/octet-stream")),
+                WebSocketRoute("/control", self._control),
+                WebSocketRoute("/stream", self._stream),
+                file_route(files),
+            ]
+        )
+
+    def _answer(self, make: Callable[[Any], bytes], media_type: str) -> Callable[[Request], Awaitable[Response]]:
+        """Of the frame at hand; the page adds its position to the address, so that nothing old is shown."""
+
+        async def answer(_: Request) -> Response:
+            content = await asyncio.to_thread(make, self._session.bench.frame)
+            return Response(content, media_type=media_type, headers={"cache-control": "no-store"})
+
+        return answer
+
+    async def _control(self, window: WebSocket) -> None:
+        """Messages of a window, as JSON."""
+        await window.accept()
+        await window.send_json(self._session.hello())
+        self._windows.add(window)
+        try:
+            while True:
+                message = json.loads(await window.receive_text())
+                if isinstance(message, dict):
+                    await self._session.act(message)
+        except (WebSocketDisconnect, json.JSONDecodeError):
+            pass
+        finally:
+            self._windows.discard(window)
+
+    async def _stream(self, viewer: WebSocket) -> None:
+        """All pieces of the recording, and then each as it comes; the viewer says nothing."""
+        await viewer.accept()
+        more, sent = asyncio.Event(), 0
+        self._viewers.add(more)
+        gone = asyncio.create_task(_until_gone(viewer))
+        gone.add_done_callback(lambda _: more.set())
+        try:
+            while not gone.done():
+                more.clear()
+                while sent < len(self._session.stream):
+                    await viewer.send_bytes(await asyncio.to_thread(self._session.stream.piece, sent))
+                    sent += 1
+                await more.wait()
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._viewers.discard(more)
+            gone.cancel()
+
+    async def _wake(self) -> None:
+        for more in self._viewers:
+            more.set()
+
+    async def _tell_all(self, message: dict[str, Any]) -> None:
+        """Tell every window; one that has gone is forgotten, and the others hear it all the same."""
+        text = json.dumps(message)
+        for window in list(self._windows):
+            try:
+                await window.send_text(text)
+            except (WebSocketDisconnect, RuntimeError):
+                self._windows.discard(window)
+
+
+async def _until_gone(socket: WebSocket) -> None:
+    try:
+        while True:
+            await socket.receive()
+    except (WebSocketDisconnect, RuntimeError):
+        return

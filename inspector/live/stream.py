@@ -1,0 +1,106 @@
+"""Every try as data for the viewer, on one timeline, ``try``: ``number * 6 + stage``, as `entities.STEP` has frames.
+
+What the viewer gets are pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection: no
+other port is open. All of them are kept in a file, for windows that are opened later.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import uuid
+
+import rerun as rr
+
+from inspector import entities
+from inspector.live.tries import Try
+from inspector.record.contents import Contents, Part
+from inspector.record.frame import log_frame
+from inspector.record.observation import Layout, Observation
+from inspector.record.subtree import Subtree
+from inspector.record.tabs import cascade, cost_volumes, hourglass, scene
+from inspector.record.tabs.blueprint import make_blueprint
+from inspector.record.tabs.cost_volumes import log_windows
+from inspector.record.tabs.registry import Tab
+
+TIMELINE = "try"
+APPLICATION_ID = "calib-inspect-live"
+TABS: tuple[Tab, ...] = (cost_volumes, cascade, scene, hourglass)
+"""Of the viewer beside the page, which has the overview itself; the one that answers a click in the picture first."""
+CONTENTS = Contents(frozenset({Part.OVERLAYS, Part.VOLUMES, Part.HOURGLASS, Part.SCENE}), dense=True)
+
+
+class TrySubtree(Subtree):
+    """Logs a frame at its try instead of its own number."""
+
+    number = 0
+
+    def set_frame(self, index: int, seconds: float) -> None:
+        """Set the timeline to the try, before its first stage."""
+        self.set_step(index, 0)
+
+    def set_step(self, index: int, stage: int) -> None:
+        """Set it to a stage of the try; 0 is before the first."""
+        self._stream.set_time(TIMELINE, sequence=self.number * entities.STEPS_PER_FRAME + stage)
+
+
+class TryStream:
+    """The recording of a live session, piece by piece."""
+
+    def __init__(self) -> None:
+        """Open it; nothing is in it before the first try."""
+        rr.set_strict_mode(True)
+        self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=uuid.uuid4().hex)
+        self._bytes = rr.binary_stream(self._stream)
+        self._stream.set_log_time_enabled(False)
+        self._rec = TrySubtree(self._stream)
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the stream
+        self._pieces: list[tuple[int, int]] = []
+        self._lock = threading.Lock()
+        self._tabs: list[Tab] = []
+
+    def log(self, made: Try, observation: Observation) -> None:
+        """Log a try on one frame, and keep it as a piece."""
+        if not self._tabs:
+            self._open(Layout.of(observation, CONTENTS))
+        self._rec.number = made.number
+        log_frame(self._rec, observation, CONTENTS)
+        for tab in self._tabs:
+            tab.log(self._rec, observation, CONTENTS)
+        self._keep()
+
+    def log_point(self, made: Try, observation: Observation, point: int) -> None:
+        """Move the search windows of a try to a point of the scan, by its row."""
+        self._rec.number = made.number
+        self._rec.set_frame(observation.frame.index, 0.0)
+        log_windows(self._rec, observation, CONTENTS, point)
+        self._keep()
+
+    def _open(self, layout: Layout) -> None:
+        self._tabs = [tab for tab in TABS if tab.wanted(layout)]
+        self._stream.send_recording_name("live")
+        for tab in self._tabs:
+            tab.log_once(self._rec, layout)
+        self._stream.send_blueprint(make_blueprint(layout, self._tabs, timeline=TIMELINE, following=True))
+
+    def _keep(self) -> None:
+        piece = self._bytes.read() or b""
+        with self._lock:
+            start = self._file.seek(0, 2)
+            self._file.write(piece)
+            self._pieces.append((start, len(piece)))
+
+    def __len__(self) -> int:
+        return len(self._pieces)
+
+    def piece(self, number: int) -> bytes:
+        """One of the pieces, in their order."""
+        with self._lock:
+            start, length = self._pieces[number]
+            self._file.seek(start)
+            return self._file.read(length)
+
+    def close(self) -> None:
+        """Forget everything."""
+        self._stream.disconnect()
+        self._file.close()

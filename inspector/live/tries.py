@@ -1,0 +1,97 @@
+"""What one try came to: the extrinsics it went through, and what may be said of the last."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from calibnet.geometry import pose_error
+from calibnet.geometry.types import Extrinsic
+from calibnet.trace import CascadeTrace, DriveEstimate
+from calibnet.verdict import Verdict
+from inspector.verdicts import explained
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """An extrinsic on the way, and what it is called: ``mine``, ``stage 3``, ``drive``."""
+
+    name: str
+    camera_from_lidar: Extrinsic = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Try:
+    """What was found from one pose.
+
+    Attributes:
+        number: 0 and up, its place on the timeline ``try``.
+        frame: index of the frame.
+        title: what ran.
+        steps: from the pose to the result.
+        verdict: on the result.
+        milliseconds: that it took.
+        trace: of the cascade, where it ran on one frame.
+        fit_px: error that the last stage expects of its matches, in pixels of its image; None of a drive.
+    """
+
+    number: int
+    frame: int
+    title: str
+    steps: tuple[Step, ...]
+    verdict: Verdict | None
+    milliseconds: float
+    trace: CascadeTrace | None = field(default=None, repr=False)
+    fit_px: float | None = None
+
+    @property
+    def found(self) -> Extrinsic:
+        """``camera_from_lidar`` that was arrived at, whether or not it is believed."""
+        return self.steps[-1].camera_from_lidar
+
+    @classmethod
+    def of_trace(cls, number: int, frame: int, trace: CascadeTrace, milliseconds: float) -> Try:
+        """A run of stages on one frame."""
+        steps = [Step("mine", trace.initial)]
+        steps += [Step(f"stage {stage.number}", stage.after) for stage in trace.stages]
+        ran = [stage.number for stage in trace.stages]
+        title = f"stage {ran[0]}" if len(ran) == 1 else f"stages {ran[0]} to {ran[-1]}" if ran else "no stage"
+        fit = trace.stages[-1].match_error_px if trace.stages else None
+        return cls(number, frame, title, tuple(steps), trace.verdict, milliseconds, trace, fit)
+
+    @classmethod
+    def of_drive(cls, number: int, frame: int, mine: Extrinsic, estimate: DriveEstimate, milliseconds: float) -> Try:
+        """All frames solved as one."""
+        steps = (Step("mine", mine), Step("drive", estimate.camera_from_lidar))
+        return cls(number, frame, f"drive of {estimate.frames} frames", steps, estimate.verdict, milliseconds)
+
+    def as_dict(self, reference: Extrinsic | None) -> dict[str, Any]:
+        """For the page; errors in degrees and centimetres where the reference is known."""
+        verdict = self.verdict
+        return {
+            "number": self.number,
+            "frame": self.frame,
+            "title": self.title,
+            "milliseconds": round(self.milliseconds),
+            "steps": [
+                {
+                    "name": step.name,
+                    "extrinsic": step.camera_from_lidar.ravel().tolist(),
+                    "error": figures(step.camera_from_lidar, reference),
+                    "moved": figures(step.camera_from_lidar, self.steps[max(0, position - 1)].camera_from_lidar),
+                }
+                for position, step in enumerate(self.steps)
+            ],
+            "verdict": None if verdict is None else {"word": verdict.word, "text": explained(verdict)},
+            "sigma": None
+            if verdict is None or verdict.covariance is None
+            else [verdict.sigma_rotation_deg, verdict.sigma_translation_cm],
+        }
+
+
+def figures(extrinsic: Extrinsic, other: Extrinsic | None) -> list[float] | None:
+    """Degrees and centimetres between two extrinsics; None where one is not known."""
+    if other is None:
+        return None
+    error = pose_error(extrinsic, other)
+    return [error.rotation_deg, error.translation_cm]

@@ -1,0 +1,110 @@
+"""Work beside the page: one job at a time, of those that somebody waits for only the newest, and the rest when idle."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Awaitable, Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from calibnet.errors import CalibnetError
+
+
+class StoppedError(Exception):
+    """The job was to end."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """Something to compute.
+
+    Attributes:
+        name: for people.
+        compute: runs beside the server; it may call its argument with (done, in all), which raises
+            `StoppedError` when the job is to end.
+        finish: runs in the server's thread with the result.
+    """
+
+    name: str
+    compute: Callable[[Callable[[int, int], None]], Any]
+    finish: Callable[[Any], Awaitable[None]]
+
+
+class Worker:
+    """Runs jobs in a thread of its own.
+
+    Attributes:
+        busy: name of the running job; empty when idle.
+        progress: how much of it is done, of how much; None where it does not say.
+    """
+
+    def __init__(
+        self, changed: Callable[[], Coroutine[Any, Any, None]], failed: Callable[[str], Awaitable[None]]
+    ) -> None:
+        """Say who is told.
+
+        Args:
+            changed: called when `busy` or `progress` has changed.
+            failed: called with one sentence when a job cannot be done.
+        """
+        self._changed, self._failed = changed, failed
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="live")
+        self._next: Job | None = None
+        self._later: list[Job] = []
+        self._task: asyncio.Task[None] | None = None
+        self._stop = threading.Event()
+        self.busy = ""
+        self.progress: tuple[int, int] | None = None
+
+    def ask(self, job: Job) -> None:
+        """Run a job as soon as the running one ends; what waited before is forgotten."""
+        self._next = job
+        self._wake()
+
+    def ask_later(self, job: Job) -> None:
+        """Run a job when nothing else waits; it is not forgotten."""
+        self._later.append(job)
+        self._wake()
+
+    def stop(self) -> None:
+        """End the running job where it says how far it is, and forget what waits."""
+        self._next = None
+        self._stop.set()
+
+    def _wake(self) -> None:
+        if self._task is None or self._task.done():
+            self._task = asyncio.get_running_loop().create_task(self._run())
+
+    def close(self) -> None:
+        """End for good."""
+        self._next, self._later = None, []
+        self._stop.set()
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
+    async def _run(self) -> None:
+        loop = asyncio.get_running_loop()
+        while self._next is not None or self._later:
+            job, self._next = self._next or self._later.pop(0), None
+            self.busy, self.progress = job.name, None
+            self._stop.clear()
+            await self._changed()
+
+            def tell(done: int, total: int) -> None:
+                if self._stop.is_set():
+                    raise StoppedError
+                self.progress = (done, total)
+                asyncio.run_coroutine_threadsafe(self._changed(), loop)
+
+            try:
+                await job.finish(await loop.run_in_executor(self._thread, job.compute, tell))
+            except StoppedError:
+                await self._failed(f"Stopped: {job.name}.")
+            except CalibnetError as error:
+                await self._failed(str(error))
+            except Exception as error:  # a fault of ours: the page goes on, and says it
+                await self._failed(f"A fault of calib-inspect ({type(error).__name__}: {error}). Please report it.")
+            finally:
+                self.busy, self.progress = "", None
+        await self._changed()
