@@ -129,19 +129,10 @@ def object_(split: str, root: Path | None, camera: int, keeping: Keeping, **aske
 @click.argument("directory", type=FOLDER)
 @folder_options
 @live_options
-def folder(
-    directory: Path,
-    dataset: str,
-    guess: Path | None,
-    camera: str | None,
-    camera_frame: str | None,
-    lidar_frame: str | None,
-    keeping: Keeping,
-    **asked: Any,
-) -> int:
+def folder(directory: Path, dataset: str, keeping: Keeping, **asked: Any) -> int:
     """On your own images and scans; without --range their calibration is the guess, and there is no reference."""
-    sequence = open_folder(directory, dataset, guess, camera, camera_frame, lidar_frame)
-    return serve_live(sequence, keeping, camera=camera, as_is=not disturbed(asked), **asked)
+    sequence = open_folder(directory, dataset, asked)
+    return serve_live(sequence, keeping, as_is=not disturbed(asked), **asked)
 
 
 @live.command()

@@ -121,6 +121,10 @@ class LiveSession:
             "progress": self._worker.progress,
         }
 
+    async def idle(self) -> None:
+        """Return when nothing runs or waits."""
+        await self._worker.idle()
+
     def close(self) -> None:
         """End the running job and forget the recording."""
         self._worker.close()
@@ -129,7 +133,8 @@ class LiveSession:
     # ---- the pose -----------------------------------------------------------------------------------------------
 
     async def _pose(self, message: dict[str, Any]) -> None:
-        pose = Pose(*(float(value) for value in message["pose"]))
+        roll, pitch, yaw, x, y, z = map(float, message["pose"])
+        pose = Pose(roll, pitch, yaw, x, y, z)
         if not pose.is_finite():
             raise ConfigError("Angles are within ±180° and offsets within ±100 m.")
         self.bench.move(pose)

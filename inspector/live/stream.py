@@ -102,5 +102,6 @@ class TryStream:
 
     def close(self) -> None:
         """Forget everything."""
+        self._bytes.read()  # Rerun would warn of data that nobody took
         self._stream.disconnect()
         self._file.close()

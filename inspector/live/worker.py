@@ -77,6 +77,11 @@ class Worker:
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._run())
 
+    async def idle(self) -> None:
+        """Return when nothing runs or waits."""
+        if self._task is not None:
+            await self._task
+
     def close(self) -> None:
         """End for good."""
         self._next, self._later = None, []

@@ -102,6 +102,13 @@ class FakeCascade:
         self.stages = [FakeStage(number) for number in stages]
         self.strides, self.radius, self.size = strides, radius, size
 
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        return tuple(stage.number for stage in self.stages)
+
+    def only(self, number: int) -> FakeCascade:
+        return FakeCascade((number,), self.strides, self.radius, self.size)
+
     def calibrate(self, frame: Frame, initial: NDArray[np.float64], detail: bool = True) -> CascadeTrace:
         """A trace whose every array has the shape and meaning of the contract."""
         camera = frame.camera.resized(*self.size)

@@ -16,7 +16,7 @@ let hello = null, state = null, scan = null, image = null, loaded = -1;
 let pose = [0, 0, 0, 0, 0, 0];
 let held = null; // the pose under the hand, until the server has it: its other messages must not move the sliders
 let tries = [], current = -1, step = 0, walking = 0, asked = null;
-const timing = { draw: 0, answer: 0 };
+const timing = { draws: 0, draw: 0, answer: 0 }; // milliseconds of the last draw and the last answer
 window.live = { timing, get pose() { return pose; }, get tries() { return tries; }, get shown() { return [current, step]; } };
 
 // ---- rigid transforms, 4x4 row by row -----------------------------------------------------------------------------
@@ -68,6 +68,7 @@ function redraw() {
     const began = performance.now();
     draw();
     timing.draw = performance.now() - began;
+    timing.draws += 1;
   });
 }
 

@@ -1,0 +1,74 @@
+"""A live session on frames without data sets or weights, and one way to talk to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibnet.geometry import MiscalibrationRange, miscalibration
+from calibnet.trace import DriveEstimate
+from inspector.live.accept import Target
+from inspector.live.bench import Bench
+from inspector.live.session import LiveSession
+from inspector.run.start import Start
+from tests.support.fakes import REFERENCE, FakeCascade, FakeSequence
+
+RANGE = MiscalibrationRange(5, 0.5)
+
+
+class FakeDrives(FakeCascade):
+    """Also solves drives: to a tenth of a degree."""
+
+    def calibrate_drive(
+        self, frames: Any, initial: Any, observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        for number in range(len(frames)):
+            if observer is not None:
+                observer(number, len(frames))
+        return DriveEstimate(miscalibration([0, 0, 0.1], [0, 0, 0]) @ REFERENCE, np.eye(6) * 1e-4, len(frames))
+
+
+Make = Callable[..., LiveSession]
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Iterator[Make]:
+    """A session: ``make(length=3, as_is=False, cascade=None)``."""
+    made: list[LiveSession] = []
+
+    def session(length: int = 3, as_is: bool = False, cascade: Any = None) -> LiveSession:
+        bench = Bench(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
+        target = Target(tmp_path / "out" / "calibration.corrected.yaml")
+        made.append(LiveSession(bench, cascade or FakeDrives(), target, RANGE))
+        return made[-1]
+
+    yield session
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def heard_after() -> Callable[..., list[dict[str, Any]]]:
+    """What a session tells after messages, once it is idle."""
+
+    def talk(session: LiveSession, *messages: dict[str, Any]) -> list[dict[str, Any]]:
+        heard: list[dict[str, Any]] = []
+
+        async def hear(message: dict[str, Any]) -> None:
+            heard.append(message)
+
+        async def say() -> None:
+            session.tell = hear
+            for message in messages:
+                await session.act(message)
+                await session.idle()
+
+        asyncio.run(say())
+        return heard
+
+    return talk

@@ -1,0 +1,217 @@
+"""The page in a real browser: drag, let go, see the answer; two windows; the viewer gets every try.
+
+Rerun's own viewer takes half a minute to start without a graphics card, so a stand-in notes what it is given.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from inspector.live.app import LiveApp
+from inspector.live.session import LiveSession
+from inspector.serving.server import PageServer
+from inspector.serving.viewer_files import VIEWER_FILES
+from tests.support.browser import chromium
+from tests.support.fakes import FakeCascade
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+STAND_IN = """
+window.given = [];
+function wasm_bindgen() { return Promise.resolve(); }
+wasm_bindgen.WebHandle = class {
+  constructor(options) { this.options = window.options = options; }
+  start() { return Promise.resolve(); }
+  open_channel() {}
+  send_rrd_to_channel(channel, bytes) { window.given.push(String.fromCharCode(...bytes.slice(0, 4))); }
+};
+"""
+Open = Callable[[LiveSession], str]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Iterator[Open]:
+    viewer = tmp_path / "viewer"
+    viewer.mkdir()
+    for name in VIEWER_FILES:
+        (viewer / name).write_text(STAND_IN if name == "re_viewer.js" else "")
+    servers: list[PageServer] = []
+
+    def address(session: LiveSession) -> str:
+        servers.append(PageServer(LiveApp(session, viewer).asgi).__enter__())
+        return servers[-1].address
+
+    yield address
+    for server in servers:
+        server.__exit__(None, None, None)
+
+
+def opened(browser: Browser, address: str) -> Page:
+    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    page.requested = []  # type: ignore[attr-defined]
+    page.on("request", lambda request: page.requested.append(request.url))  # type: ignore[attr-defined]
+    page.on("pageerror", lambda error: page.requested.append(f"fault: {error}"))  # type: ignore[attr-defined]
+    page.goto(address)
+    page.wait_for_function("document.getElementById('caption').textContent !== ''")
+    return page
+
+
+def drag(page: Page, axis: str, by: float, let_go: bool = True) -> None:
+    """Take a slider by its middle and move it by a share of its width."""
+    box = page.locator(f"#range-{axis}").bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + by * box["width"] / 2, y)
+    page.mouse.move(x + by * box["width"], y)
+    if let_go:
+        page.mouse.up()
+
+
+def answered(page: Page, count: int = 1) -> None:
+    page.wait_for_function(f"live.tries.length >= {count} && live.shown[1] === live.tries.at(-1).steps.length - 1")
+
+
+def test_drag_let_go_and_see_the_answer(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:
+    session = make()
+    page = opened(browser, serve(session))
+    before = page.locator("#caption").inner_text()
+    picture = page.screenshot(clip=clip(page))
+    drag(page, "yaw", 0.3, let_go=False)
+    page.wait_for_function(f"document.getElementById('caption').textContent !== {before!r}")
+    assert page.screenshot(clip=clip(page)) != picture, "the points follow before anybody lets go"
+    assert session.bench.tries == []
+    page.mouse.up()
+    answered(page)
+    assert page.locator("#word").inner_text() == "Accepted"
+    assert session.bench.pose.yaw == pytest.approx(float(page.locator("#number-yaw").input_value()), abs=1e-3)
+    # what the page draws is what was asked: its own arithmetic and ours say the same error
+    shown = [re.findall(r"[\d.]+", text)[-2:] for text in page.locator("#steps tr td:nth-child(2)").all_inner_texts()]
+    assert len(shown) == 4
+    made = session.bench.tries[0].as_dict(session.bench.reference)
+    expected = [[f"{step['error'][0]:.2f}", f"{step['error'][1]:.1f}"] for step in made["steps"]]
+    assert shown == expected
+    page.get_by_role("radio", name="Mine").click()
+    assert page.locator("#caption").inner_text() == f"mine: {expected[0][0]}°, {expected[0][1]} cm off"
+    page.get_by_role("radio", name="Reference").click()
+    assert page.locator("#caption").inner_text() == "reference"
+    assert not [url for url in page.requested if not url.startswith(("http://127.0.0.1", "http://localhost", "data:"))]  # type: ignore[attr-defined]
+
+
+def clip(page: Page) -> Any:
+    return page.locator("#canvas").bounding_box()
+
+
+def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:
+    session = make()
+    page = opened(browser, serve(session))
+    page.locator("#auto").uncheck()
+    page.locator("#caption").click()
+    for key in "qqafyh":
+        page.keyboard.press(key)
+    page.wait_for_function("!document.getElementById('undo').disabled")
+    assert tuple(session.bench.pose) == pytest.approx((0.25, 0, 0, -0.02, 0, 0))
+    page.locator("#number-z").fill("0.123")
+    page.keyboard.press("Tab")
+    page.wait_for_function("live.pose[5] === 0.123")
+    page.locator("#caption").click()
+    page.keyboard.press("Control+z")
+    page.wait_for_function("live.pose[5] === 0 && live.pose[0] === 0.25")
+    page.keyboard.press("Control+z")
+    page.wait_for_function("live.pose.every((value) => value === 0)")
+    page.keyboard.press("Control+Shift+z")
+    page.wait_for_function("live.pose[0] === 0.25")
+    page.get_by_role("button", name="To the reference").click()
+    page.wait_for_function("document.getElementById('caption').textContent === 'mine: 0.00°, 0.0 cm off'")
+    assert session.bench.tries == []
+    page.locator("#caption").click()
+    page.keyboard.press("Enter")
+    answered(page)
+
+
+def test_two_windows_show_the_same_and_one_may_close(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    session = make()
+    address = serve(session)
+    one, two = opened(browser, address), opened(browser, address)
+    drag(one, "roll", 0.2)
+    for page in (one, two):
+        answered(page)
+    assert two.locator("#number-roll").input_value() == one.locator("#number-roll").input_value()
+    one.close()
+    drag(two, "pitch", -0.2)
+    answered(two, 2)
+    three = opened(browser, address)  # a window that opens later has what went before
+    answered(three, 2)
+    for page in (two, three):
+        frame = next(frame for frame in page.frames if "viewer" in frame.url)
+        frame.wait_for_function("window.given.length === 2")
+        assert set(frame.evaluate("window.given")) == {"RRF2"}
+        assert frame.evaluate("window.options.url") == []
+
+
+def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:
+    session = make()
+    page = opened(browser, serve(session))
+    page.keyboard.press("Enter")
+    answered(page)
+    frame = next(frame for frame in page.frames if "viewer" in frame.url)
+    frame.wait_for_function("window.given.length === 1")
+    seen = session._observations[0].projected(session.bench.tries[0].found)
+    u, v = seen.pixels[int(np.argmin(seen.depth))].tolist()
+    box, (width, height) = clip(page), (400, 120)
+    page.mouse.click(box["x"] + (u + 0.5) / width * box["width"], box["y"] + (v + 0.5) / height * box["height"])
+    page.wait_for_function("document.getElementById('said').textContent.startsWith('Search windows moved')")
+    frame.wait_for_function("window.given.length === 2")
+    # the same from the viewer, whose selection names the overlay and the pixel
+    event = {
+        "type": "selection_change",
+        "items": [{"entity_path": "/overlay/stage_5", "position": [u + 0.5, v + 0.5, 0]}],
+    }
+    frame.evaluate("event => window.options.on_viewer_event(event)", event)
+    frame.wait_for_function("window.given.length === 3")
+
+
+def test_what_is_rejected_is_asked_about_before_it_is_written(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open, tmp_path: Path
+) -> None:
+    page = opened(browser, serve(make(cascade=FakeCascade(doubted=(4,)))))
+    page.keyboard.press("Enter")
+    answered(page)
+    assert page.locator("#word").inner_text() == "Rejected"
+    file = tmp_path / "out" / "calibration.corrected.yaml"
+    for choice in ("Leave it", "Write it all the same"):
+        page.get_by_role("button", name="Accept as calibration").click()
+        page.locator("#sure-text", has_text="Rejected").wait_for()
+        assert not file.exists()
+        page.get_by_role("button", name=choice).click()
+    page.locator("#said", has_text="Wrote").wait_for()
+    assert "rejected" in file.read_text()
+
+
+@pytest.mark.parametrize("color", ["intensity", "edge", "error"])
+def test_every_colouring_is_drawn_with_its_legend(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open, color: str
+) -> None:
+    page = opened(browser, serve(make(length=1)))
+    before, legend = page.screenshot(clip=clip(page)), page.locator("#legend").inner_text()
+    draws = page.evaluate("live.timing.draws")
+    page.locator("#color").select_option(color)
+    page.wait_for_function(f"live.timing.draws > {draws}")
+    assert page.locator("#legend").inner_text() != legend
+    assert page.screenshot(clip=clip(page)) != before

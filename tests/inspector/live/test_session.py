@@ -1,0 +1,182 @@
+"""What a page can ask for, and what it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibnet.datasets.folder import read_calibration_of
+from calibnet.errors import CalibrationError
+from inspector.live.session import LiveSession
+from tests.support.fakes import REFERENCE, FakeCascade, make_frame
+
+Make = Callable[..., LiveSession]
+HeardAfter = Callable[..., list[dict[str, Any]]]
+MOVE = {"do": "pose", "pose": [0.5, 1.0, -1.0, 0.1, 0.0, -0.1], "run": True}
+
+
+def told(heard: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    return [message for message in heard if message["is"] == kind]
+
+
+def test_a_release_is_answered_stage_by_stage(make: Make, heard_after: HeardAfter) -> None:
+    session = make()
+    (answer,) = told(heard_after(session, MOVE), "try")
+    assert [step["name"] for step in answer["steps"]] == ["mine", "stage 3", "stage 4", "stage 5"]
+    np.testing.assert_allclose(np.reshape(answer["steps"][0]["extrinsic"], (4, 4)), session.bench.extrinsic)
+    errors = [step["error"][0] for step in answer["steps"]]
+    assert errors == sorted(errors, reverse=True) and errors[-1] < 0.05 * errors[0]
+    assert answer["verdict"]["word"] == "accepted"
+    assert len(session.stream) == 1
+
+
+def test_without_run_the_pose_alone_moves(make: Make, heard_after: HeardAfter) -> None:
+    session = make()
+    heard = heard_after(session, {**MOVE, "run": False}, {"do": "undo"}, {"do": "redo"}, {"do": "guess"})
+    assert told(heard, "try") == []
+    poses = [state["pose"] for state in told(heard, "state")]
+    assert poses == [MOVE["pose"], [0.0] * 6, MOVE["pose"], [0.0] * 6]
+
+
+def test_one_stage_alone(make: Make, heard_after: HeardAfter) -> None:
+    (answer,) = told(heard_after(make(), {"do": "run", "stage": 4}), "try")
+    assert [step["name"] for step in answer["steps"]] == ["mine", "stage 4"]
+
+
+def test_the_drive_is_solved_and_tells_how_far_it_is(make: Make, heard_after: HeardAfter) -> None:
+    (answer,) = told(heard_after(make(), {"do": "drive"}), "try")
+    assert answer["title"] == "drive of 3 frames"
+    assert answer["steps"][-1]["error"] == pytest.approx([0.1, 0.05], abs=0.01)
+
+
+def test_a_taken_step_becomes_the_pose(make: Make, heard_after: HeardAfter) -> None:
+    session = make()
+    heard_after(session, MOVE, {"do": "take", "try": 0, "step": 3})
+    np.testing.assert_allclose(session.bench.extrinsic, session.bench.tries[0].found, atol=1e-12)
+    assert session.bench.can_undo
+
+
+def test_frames_go_round_and_the_worst_is_found(make: Make, heard_after: HeardAfter) -> None:
+    class Uneven(FakeCascade):
+        def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
+            trace = super().calibrate(frame, initial, detail)
+            return super().calibrate(frame, trace.arrived, detail) if frame.index != 5 else trace
+
+    session = make(cascade=Uneven())
+    heard_after(session, {"do": "frame", "position": -1})
+    assert session.bench.frame.index == 6
+    (answer,) = told(heard_after(session, {"do": "worst"}), "try")
+    assert session.bench.frame.index == 5 and answer["frame"] == 5
+
+
+def test_a_click_moves_the_windows_to_that_point(make: Make, heard_after: HeardAfter) -> None:
+    session = make()
+    heard_after(session, MOVE)
+    seen = session._observations[0].projected(session.bench.tries[0].found)
+    nearest = int(np.argmin(seen.depth))
+    pixel = seen.pixels[nearest].tolist()
+    heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": pixel})
+    distance = float(np.linalg.norm(make_frame(4).points[seen.index[nearest], :3]))
+    assert told(heard, "said")[0]["text"] == f"Search windows moved to a point {distance:.1f} m away."
+    assert len(session.stream) == 2
+    heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": [-500, -500]})
+    assert "No point of the scan lies there" in told(heard, "problem")[0]["text"]
+    heard = heard_after(session, {"do": "frame", "position": 1}, {"do": "look", "try": 0, "step": 3, "pixel": pixel})
+    assert "Only the newest try on this frame" in told(heard, "problem")[0]["text"]
+
+
+def test_what_is_accepted_is_written_as_a_calibration(make: Make, heard_after: HeardAfter, tmp_path: Path) -> None:
+    session = make()
+    heard = heard_after(session, MOVE, {"do": "accept", "try": 0, "step": 3})
+    file = tmp_path / "out" / "calibration.corrected.yaml"
+    assert told(heard, "said")[0]["text"] == f"Wrote {file}."
+    path, camera, written = read_calibration_of(file.parent)
+    assert path == file and camera.width == session.bench.frame.camera.width
+    np.testing.assert_allclose(written, session.bench.tries[0].found, atol=1e-12)
+    assert told(heard_after(session, {"do": "accept", "try": 0, "step": 3}), "said")[0]["text"].startswith("Replaced")
+
+
+@pytest.mark.parametrize(
+    ("cascade", "message", "words"),
+    [
+        (FakeCascade(doubted=(4,)), {"try": 0, "step": 3}, "Rejected: "),
+        (FakeCascade(unsure=(4,)), {"try": 0, "step": 3}, "Cannot tell: "),
+        (FakeCascade(), {"try": 0, "step": 2}, "Set by hand: nothing has judged it"),
+        (FakeCascade(), {}, "Set by hand: nothing has judged it"),
+    ],
+)
+def test_what_is_not_accepted_is_asked_about_first(
+    make: Make, heard_after: HeardAfter, tmp_path: Path, cascade: Any, message: dict[str, Any], words: str
+) -> None:
+    session = make(cascade=cascade)
+    (asked,) = told(heard_after(session, MOVE, {"do": "accept", **message}), "sure?")
+    assert asked["text"].startswith(words)
+    file = tmp_path / "out" / "calibration.corrected.yaml"
+    assert not file.exists()
+    heard_after(session, asked["again"])
+    assert words.rstrip(": ").lower() in file.read_text().lower()
+
+
+def test_another_file_is_not_replaced(make: Make, heard_after: HeardAfter, tmp_path: Path) -> None:
+    session = make()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "calibration.corrected.yaml").write_text("mine: 1\n")
+    heard = heard_after(session, MOVE, {"do": "accept", "try": 0, "step": 3})
+    assert "add --overwrite" in told(heard, "problem")[0]["text"]
+    assert (tmp_path / "out" / "calibration.corrected.yaml").read_text() == "mine: 1\n"
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ({"do": "fly"}, "'fly', which there is not"),
+        ({}, "None, which there is not"),
+        ({"do": "pose", "pose": [0, 0, 0]}, "cannot be read"),
+        ({"do": "pose", "pose": "abcdef"}, "cannot be read"),
+        ({"do": "pose", "pose": [float("nan")] * 6}, "within ±180°"),
+        ({"do": "take", "try": 7, "step": 0}, "cannot be read"),
+        ({"do": "look", "try": 0, "pixel": None}, "cannot be read"),
+        ({"do": "random", "range": "much"}, "not of the form"),
+        ({"do": "run", "stage": 9}, "stage"),
+    ],
+)
+def test_what_cannot_be_done_is_said(make: Make, heard_after: HeardAfter, message: Any, words: str) -> None:
+    class Strict(FakeCascade):
+        def only(self, number: int) -> FakeCascade:
+            if number not in self.numbers:
+                raise CalibrationError(f"There is no stage {number}.")
+            return super().only(number)
+
+    session = make(cascade=Strict())
+    (problem,) = told(heard_after(session, message), "problem")
+    assert words in problem["text"]
+
+
+def test_a_frame_that_cannot_be_calibrated_is_a_sentence_and_the_session_goes_on(
+    make: Make, heard_after: HeardAfter
+) -> None:
+    class Fails(FakeCascade):
+        fails = True
+
+        def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
+            if self.fails:
+                raise CalibrationError("Only 3 cells hold a point.")
+            return super().calibrate(frame, initial, detail)
+
+    cascade = Fails()
+    session = make(cascade=cascade)
+    assert told(heard_after(session, MOVE), "problem")[0]["text"] == "Only 3 cells hold a point."
+    cascade.fails = False
+    assert len(told(heard_after(session, {"do": "run"}), "try")) == 1
+
+
+def test_without_reference_there_are_no_errors(make: Make, heard_after: HeardAfter) -> None:
+    session = make(as_is=True)
+    heard = heard_after(session, MOVE, {"do": "reference"})
+    assert all(step["error"] is None for step in told(heard, "try")[0]["steps"])
+    assert told(heard, "problem")[0]["text"] == "No reference is known for these frames."
+    np.testing.assert_allclose(session.bench.guess, REFERENCE)

@@ -1,0 +1,93 @@
+"""One job at a time, and what waits."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from inspector.live.worker import Job, Worker
+
+
+def run(scenario: Callable[[Worker, list[str], list[str]], Any]) -> tuple[list[str], list[str]]:
+    done: list[str] = []
+    problems: list[str] = []
+
+    async def changed() -> None:
+        pass
+
+    async def failed(text: str) -> None:
+        problems.append(text)
+
+    async def all_of_it() -> None:
+        worker = Worker(changed, failed)
+        await scenario(worker, done, problems)
+        await worker.idle()
+        worker.close()
+
+    asyncio.run(all_of_it())
+    return done, problems
+
+
+def job(name: str, done: list[str], until: threading.Event | None = None) -> Job:
+    def compute(_: Callable[[int, int], None]) -> str:
+        if until is not None:
+            assert until.wait(20)
+        return name
+
+    async def finish(result: str) -> None:
+        done.append(result)
+
+    return Job(name, compute, finish)
+
+
+def test_of_those_that_wait_only_the_newest_runs_and_later_ones_all() -> None:
+    async def scenario(worker: Worker, done: list[str], _: list[str]) -> None:
+        go = threading.Event()
+        worker.ask(job("first", done, go))
+        await asyncio.sleep(0)
+        worker.ask_later(job("later 1", done))
+        worker.ask_later(job("later 2", done))
+        worker.ask(job("old", done))
+        worker.ask(job("new", done))
+        go.set()
+
+    assert run(scenario)[0] == ["first", "new", "later 1", "later 2"]
+
+
+def test_a_job_that_tells_how_far_it_is_can_be_stopped() -> None:
+    async def scenario(worker: Worker, done: list[str], _: list[str]) -> None:
+        started = threading.Event()
+
+        def compute(tell: Callable[[int, int], None]) -> None:
+            for number in range(10_000_000):
+                tell(number, 10_000_000)
+                started.set()
+
+        async def finish(_: object) -> None:
+            done.append("finished")
+
+        worker.ask(Job("long", compute, finish))
+        await asyncio.to_thread(started.wait, 20)
+        assert worker.busy == "long" and worker.progress is not None
+        worker.stop()
+
+    assert run(scenario) == ([], ["Stopped: long."])
+
+
+def test_a_fault_is_said_and_the_next_job_runs() -> None:
+    async def scenario(worker: Worker, done: list[str], _: list[str]) -> None:
+        def compute(_: Callable[[int, int], None]) -> None:
+            raise ZeroDivisionError("by zero")
+
+        async def finish(_: object) -> None:
+            done.append("finished")
+
+        worker.ask(Job("bad", compute, finish))
+        await worker.idle()
+        worker.ask(job("good", done))
+
+    done, problems = run(scenario)
+    assert done == ["good"]
+    assert problems == ["A fault of calib-inspect (ZeroDivisionError: by zero). Please report it."]
