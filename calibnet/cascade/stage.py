@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -199,7 +200,7 @@ def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
     """
     range_ = RANGES[number - 1]
     path = folder / manifest.file(range_)
-    if not path.is_file():
+    if not os.path.lexists(path):
         return None
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = load_network(path).to(device)

@@ -49,8 +49,9 @@ def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
     Raises:
         DatasetError: it stretches, or, as `ImplausibleError`, mirrors; the message names ``path`` and ``key``.
     """
-    deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if deviation > RIGID_TOLERANCE:
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not deviation <= RIGID_TOLERANCE:  # NaN is none either
         raise DatasetError(
             f"{path}: the rotation of {key} is not orthonormal (off by {deviation:.3g}); "
             "give a rotation matrix with at least four decimals."

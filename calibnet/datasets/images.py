@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 import cv2
@@ -29,6 +31,10 @@ MISSING, MISSING_ROWS = 128, 8
 _END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
 """First bytes of a PNG or JPEG file to the marker that ends a whole one."""
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+
+
+ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
+"""Column and row that each pass of an interlaced PNG starts at, and steps from one to the next."""
 
 
 class ImageError(ValueError):
@@ -88,8 +94,10 @@ def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np
         if image.mode not in DEPTHS:
             raise ImageError(f"has pixels of an unusual kind ({image.mode}); store 8 or 16 bits a channel")
         try:
+            if image.format == "PNG" and _ends_flat(image) and not _is_whole(data):
+                raise ImageError(truncated)  # Pillow leaves rows that are not there as zeros
             eight = np.array(image.convert("RGB"), np.uint8)
-        except MemoryError:
+        except (MemoryError, ImageError):
             raise
         except Exception as error:
             raise ImageError(truncated if "truncated" in str(error) else damaged) from None
@@ -98,11 +106,33 @@ def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np
     return _sixteen(data, damaged) if _is_deep(image, data) else eight
 
 
+def _ends_flat(image: Image.Image) -> bool:
+    """Whether the last row is of one value."""
+    last = np.asarray(image)[-1]
+    return bool(np.all(last == last[0]))
+
+
+def _is_whole(png: bytes) -> bool:
+    """Whether the deflated data of a PNG is as long as its header says."""
+    width, height, depth, kind, interlaced = struct.unpack(">IIBB2xB", png[16:29])
+    bits = depth * {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[kind]
+    passes = ADAM7 if interlaced else ((0, 0, 1, 1),)
+    sizes = [(-(-(width - x) // dx), -(-(height - y) // dy)) for x, y, dx, dy in passes]
+    promised = sum(rows * (1 + -(-columns * bits // 8)) for columns, rows in sizes if columns > 0 and rows > 0)
+    inflate, found, place = zlib.decompressobj(), 0, 8
+    while place + 8 <= len(png) and found < promised:
+        length = int.from_bytes(png[place : place + 4])
+        if png[place + 4 : place + 8] == b"IDAT":
+            found += len(inflate.decompress(png[place + 8 : place + 8 + length], promised))
+        place += 12 + length
+    return bool(found >= promised)
+
+
 def _is_deep(image: Image.Image, data: bytes) -> bool:
     """Whether a channel has 16 bits, of which Pillow keeps eight."""
     if image.format == "TIFF":
         return bool(max(getattr(image, "tag_v2", {}).get(BITS_PER_SAMPLE, (8,))) > 8)
-    return image.format == "PNG" and data[24] > 8
+    return bool(image.format == "PNG" and data[24] > 8)
 
 
 def _sixteen(data: bytes, damaged: str) -> NDArray[np.uint8]:

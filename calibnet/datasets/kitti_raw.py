@@ -5,6 +5,7 @@ Read here rather than by pykitti, as in `kitti_odometry`.
 
 from __future__ import annotations
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -66,7 +67,7 @@ class KittiRaw(PairedSequence):
 
 def _times(path: Path) -> list[float]:
     """Seconds of every frame since the first, exact to the microsecond; none for a drive that has no times."""
-    if not path.exists():
+    if not os.path.lexists(path):  # a link that leads nowhere is no drive without times
         return []
     times = read_times(path, lambda line: datetime.fromisoformat(line[:26]).replace(tzinfo=UTC).timestamp())
     return [round(time - times[0], 6) for time in times]

@@ -124,7 +124,10 @@ def load_network(path: Path) -> CalibrationNetwork:
         with torch.device("meta"):  # its size costs no memory there
             promised = CalibrationNetwork(config, range_).state_dict()
     except ConfigError as error:
-        raise WeightsError(f"{error} Use the version of calib-inspect that wrote it, or train it again.") from None
+        where = "" if str(path) in str(error) else f"{path}: "
+        raise WeightsError(
+            f"{where}{error} Use the version of calib-inspect that wrote it, or train it again."
+        ) from None
     stored = load_file(path)
     tensors = {name: tensor.float() for name, tensor in stored.items() if not tensor.is_complex()}
     if config.share_extractor:  # stored once

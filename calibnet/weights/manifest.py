@@ -7,6 +7,7 @@ is here and nowhere else, to be read and changed in any editor.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -149,7 +150,9 @@ def load_manifest(preset: str, folder: Path | None = None) -> Manifest:
     Raises:
         WeightsError: a manifest is malformed; the message names the file and the key.
     """
-    path = next((path for path in (manifest_path(preset, folder), manifest_path(preset)) if path.exists()), None)
+    path = next(
+        (path for path in (manifest_path(preset, folder), manifest_path(preset)) if os.path.lexists(path)), None
+    )
     if path is None:
         return Manifest(preset)
     text = read_text(path, "Manifest of weights", error=WeightsError)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from dataclasses import dataclass
 from importlib.metadata import version
 
@@ -108,4 +109,6 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point of the console script."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # they are for us; what a user has to know is a sentence of ours
     sys.exit(run(cli))

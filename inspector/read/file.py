@@ -48,6 +48,7 @@ class RecordingFile:
         require_file(path, "Recording", None, RecordingError, "give a recording that calib-inspect made")
         if kind_of_file(path) is not Kind.RECORDING:
             raise self._unreadable()
+        self._named = self._name_for_rerun()
         self._reader, entries = self._open()
         self._entry = self._ours(entries)
 
@@ -69,12 +70,23 @@ class RecordingFile:
                     f"{self.path} is damaged in the middle; copy it again or record it again."
                 ) from None
 
+    def _name_for_rerun(self) -> Path:
+        """The file; under another name where its own is no UTF-8, which Rerun takes for no name at all."""
+        try:
+            str(self.path).encode()
+        except UnicodeEncodeError:
+            self._link = tempfile.TemporaryDirectory(prefix="calib-inspect-")
+            link = Path(self._link.name) / "recording.rrd"
+            link.symlink_to(self.path.resolve())
+            return link
+        return self.path
+
     def _open(self) -> tuple[RrdReader, list[StoreEntry]]:
         """The file's reader and what the file holds; of a copy where the file ends within a chunk."""
         with understood(self.path), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             with contextlib.suppress(RuntimeError, ValueError):
-                opened = _listed(self.path)
+                opened = _listed(self._named)
                 self.cut = any("no footer" in str(warning.message) for warning in caught)
                 return opened
             with contextlib.suppress(RuntimeError, ValueError):
@@ -87,7 +99,7 @@ class RecordingFile:
         """Everything that precedes the cut, in a file that the reader accepts; of a foreign file, no such file."""
         self._copy = tempfile.TemporaryDirectory(prefix="calib-inspect-")
         copy = Path(self._copy.name) / "repaired.rrd"
-        command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self.path), "-o", str(copy)]
+        command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self._named), "-o", str(copy)]
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run(command, capture_output=True, check=False, timeout=REPAIR_S)
         return copy

@@ -89,7 +89,7 @@ class Outputs:
             claim = self._claimed(self.file)
             try:
                 sinks.append(rr.FileSink(claim.begin()))
-            except RuntimeError as error:
+            except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
                 raise ConfigError(f"{self.file} cannot be written: {error}.") from None
         if self.viewer:
             sinks += self._open_viewer()
