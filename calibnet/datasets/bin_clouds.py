@@ -74,7 +74,7 @@ def recognised(data: bytes) -> tuple[str, ...]:
     levels = _levels(values[:ENOUGH_VALUES])
     telling = {layout: _telling(levels, len(layout)) for layout in fitting}
     best = max(telling.values())
-    good = [layout for layout in fitting if telling[layout] >= NEARLY * best]
+    good = [layout for layout in fitting if telling[layout] >= best - (1 - NEARLY) * abs(best)]
     chosen = KITTI if KITTI in good else min(good, key=len)
     rivals = [layout for layout in fitting if telling[layout] > CLEARLY * best and len(layout) % len(chosen)]
     if (rivals and chosen is not KITTI) or not _plausible(values.reshape(-1, len(chosen))):

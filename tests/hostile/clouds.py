@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
+from pyarrow import feather, parquet
 
 from tests.hostile.inputs import Build, car
 from tests.hostile.rows import FINE, Row, instead_of
@@ -35,6 +39,16 @@ def line_changed(content: bytes, change: Callable[[bytes], bytes]) -> bytes:
     return b"\n".join(lines)
 
 
+def table(write: Callable[[Any, io.BytesIO], None]) -> bytes:
+    """A file made for tables."""
+    file = io.BytesIO()
+    names = ("x", "y", "z", "intensity")
+    write(pa.table(dict(zip(names, POINTS.T, strict=True))), file)
+    return file.getvalue()
+
+
+FEATHER, PARQUET = table(feather.write_feather), table(parquet.write_table)
+OF_TABLES = {".feather": FEATHER, ".parquet": PARQUET}
 FOREIGN = {
     ".pcd": {
         "a short line": line_changed(TEXT_PCD, lambda line: line.rsplit(b" ", 1)[0]),
@@ -136,6 +150,15 @@ GOOD = {
 
 def rows() -> Iterator[Row]:
     """Of scans of every format."""
+    for suffix, content in OF_TABLES.items():
+        yield Row(f"scan {suffix} that is good", scan(suffix, content), FINE, ("Saved",))
+        yield from instead_of(f"scan {suffix}", scan(suffix, content), f"car/clouds/0000{suffix}", "missing")
+        for what, damaged in {
+            "cut": content[: len(content) // 2],
+            "its end cut": content[:-9],
+            "its end damaged": content[:-30] + b"\xff" * 20 + content[-10:],
+        }.items():
+            yield Row(f"scan {suffix}: {what}", scan(suffix, damaged), words=(f"0000{suffix}",))
     yield from instead_of("scan .bin", car, "car/clouds/0000.bin", "missing")
     for suffix, content in ((".pcd", BINARY), (".ply", BINARY_PLY), (".npy", npy(POINTS))):
         place = f"car/clouds/0000{suffix}"
