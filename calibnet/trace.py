@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
-from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform, Vector6
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 
 MARGIN = 1.2
@@ -211,6 +211,29 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
+class DriveLook:
+    """What one frame of a drive says in the last look, which all frames take from the same extrinsic.
+
+    Attributes:
+        frame: its index.
+        position: its position in the drive.
+        offset: ``[6]``, ``(translation m, rotation rad)`` from there to where it believes the extrinsic to be.
+        information: ``[6, 6]`` of it as the network states it, or None.
+        match_error_px: what error it expects of its matches.
+        misfit: what their residuals cost, see `calibnet.judging.witnesses.misfit`.
+        bent_misfit: the same with whichever other lens explains them best.
+    """
+
+    frame: int
+    position: int
+    offset: Vector6 = field(repr=False)
+    information: Matrix6 | None = field(default=None, repr=False)
+    match_error_px: float = math.nan
+    misfit: float = math.nan
+    bent_misfit: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
 class DriveEstimate(Estimate):
     """What `calibnet.cascade.Cascade.calibrate_drive` returns.
 
@@ -221,9 +244,13 @@ class DriveEstimate(Estimate):
         verdict: whether the estimate is good; None from a method that does not say.
         networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
             frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
+        looks: what each frame says by itself, relative to ``looked_from``.
+        looked_from: ``camera_from_lidar`` that the last look started from; None from a method without looks.
     """
 
     history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
     skipped: tuple[BadFrame, ...] = ()
     networks: Estimate | None = field(repr=False, default=None)
     verdict: Verdict | None = None
+    looks: tuple[DriveLook, ...] = field(repr=False, default=())
+    looked_from: Extrinsic | None = field(repr=False, default=None)

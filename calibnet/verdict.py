@@ -14,6 +14,8 @@ Word = Literal["accepted", "rejected", "cannot tell"]
 ACCEPTED: Word = "accepted"
 REJECTED: Word = "rejected"
 CANNOT_TELL: Word = "cannot tell"
+FRAME_LIMITS, DRIVE_LIMITS = (1.0, 25.0), (0.3, 8.0)
+"""Degrees and centimetres beyond which the extrinsic of a frame, and of a drive, is wrong."""
 WORDS: tuple[Word, ...] = (ACCEPTED, REJECTED, CANNOT_TELL)
 
 CAUSES = (

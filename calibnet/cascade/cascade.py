@@ -18,7 +18,7 @@ from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.known import Held, Known
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
-from calibnet.judging.causes import match_error_of, misfit_of
+from calibnet.judging.causes import Search, match_error_of, misfit_of, reach_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.judge import judge
@@ -164,7 +164,7 @@ class Cascade:
             trace = replace(trace, verdict=verdict)
         return upright.undo(trace, initial)
 
-    def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
+    def explain(self, frame: Frame, initial: Extrinsic, lags: Search | None = None) -> Verdict:
         """The verdict on a frame with its causes: what, undone in the input, makes picture and scan fit.
 
         This runs stages some thirty times, for frames whose verdict in `calibrate` is not accepted.
@@ -172,6 +172,7 @@ class Cascade:
         Args:
             frame: image, scan and camera; its own extrinsic is not looked at.
             initial: ``camera_from_lidar`` to start from.
+            lags: of the scan, that are tried as well, see `calibnet.judging.lag.lags`.
         """
         upright = Upright.of(initial, self.stages[0].range)
         frame, start = prepared(frame, upright), upright.extrinsic(initial)
@@ -182,7 +183,13 @@ class Cascade:
         verdict = None if trace is None else trace.verdict
         if verdict is None or verdict.word != ACCEPTED:
             verdict = judge(
-                frame, start, trace, self.coefficients, match_error_of(self.stages[0]), misfit_of(self.calibrate)
+                frame,
+                start,
+                trace,
+                self.coefficients,
+                match_error_of(self.stages[0]),
+                misfit_of(self.calibrate),
+                None if lags is None else (lags, reach_of(self.calibrate)),
             )
         return upright.undo_verdict(verdict)
 
@@ -206,7 +213,9 @@ class Cascade:
         estimate = solve_drive(self.stages, frames, start, self.common, observer, held)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
             estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer, held)
-        verdict = judge_drive(estimate, start, self.stages[0].range, self.coefficients.doubt_of(self.stages[-1].range))
+        estimate = replace(estimate, covariance=self.coefficients.widening * estimate.covariance)
+        doubt = self.coefficients.drive_doubt_of(self.stages[-1].range)
+        verdict = judge_drive(estimate, start, self.stages[0].range, doubt)
         return upright.undo_drive(replace(estimate, verdict=verdict))
 
     def _run(

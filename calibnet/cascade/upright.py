@@ -19,7 +19,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
-from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
+from calibnet.trace import CascadeTrace, DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import Verdict
 
 AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
@@ -93,7 +93,7 @@ class Upright:
         """The verdict on an upright frame or drive, of the real camera."""
         if not self:
             return verdict
-        extrinsic = transform(self.rotation.T, np.zeros(3)) @ verdict.camera_from_lidar
+        extrinsic = self._real_extrinsic(verdict.camera_from_lidar)
         covariance = None if verdict.covariance is None else self._real_matrix(verdict.covariance)
         return replace(verdict, camera_from_lidar=extrinsic, covariance=covariance)
 
@@ -104,7 +104,16 @@ class Upright:
         history = tuple((frame, self._real(so_far)) for frame, so_far in estimate.history)
         networks = None if estimate.networks is None else self._real(estimate.networks)
         verdict = None if estimate.verdict is None else self.undo_verdict(estimate.verdict)
-        return replace(self._real(estimate), history=history, networks=networks, verdict=verdict)
+        looked_from = None if estimate.looked_from is None else self._real_extrinsic(estimate.looked_from)
+        looks = tuple(map(self._real_look, estimate.looks))
+        return replace(
+            self._real(estimate),
+            history=history,
+            networks=networks,
+            verdict=verdict,
+            looks=looks,
+            looked_from=looked_from,
+        )
 
     def _real_stage(self, stage: StageTrace) -> StageTrace:
         back = transform(self.rotation.T, np.zeros(3))
@@ -118,8 +127,15 @@ class Upright:
             last_before=None if stage.last_before is None else back @ stage.last_before,
         )
 
+    def _real_extrinsic(self, camera_from_lidar: Extrinsic) -> Extrinsic:
+        return transform(self.rotation.T, np.zeros(3)) @ camera_from_lidar
+
+    def _real_look(self, look: DriveLook) -> DriveLook:
+        information = None if look.information is None else self._real_matrix(look.information)
+        return replace(look, offset=np.kron(np.eye(2), self.rotation).T @ look.offset, information=information)
+
     def _real(self, estimate: AnyEstimate) -> AnyEstimate:
-        extrinsic = transform(self.rotation.T, np.zeros(3)) @ estimate.camera_from_lidar
+        extrinsic = self._real_extrinsic(estimate.camera_from_lidar)
         return replace(estimate, camera_from_lidar=extrinsic, covariance=self._real_matrix(estimate.covariance))
 
     def _real_matrix(self, of_pose: Matrix6) -> Matrix6:

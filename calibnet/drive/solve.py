@@ -15,8 +15,10 @@ from calibnet.drive.convergence import Convergence, Due
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.known import Held
+from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.trace import DriveEstimate, Estimate, StageTrace
+from calibnet.judging.witnesses import bent_misfit, misfit
+from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
 FRAMES_UNTIL_LAST_LOOK = 24
@@ -99,7 +101,10 @@ def solve_drive(
     def estimate(consensus: Consensus, *starts: Estimate) -> Estimate:
         return consensus.aligned(evidence, common, starts) if aligns else consensus.estimate()
 
-    def taken_in(position: int, frame: Frame, consensus: Consensus) -> None:
+    looks = list[DriveLook]()
+
+    def taken_in(position: int, frame: Frame, look: StageTrace, consensus: Consensus) -> None:
+        looks.append(said(frame, position, look))
         if aligns and to_align.reached(position):
             evidence.append(gather(frame, consensus.before))
         convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
@@ -116,6 +121,21 @@ def solve_drive(
         tuple(convergence.points),
         skipped=tuple(skipped),
         networks=of_networks if aligns else None,
+        looks=tuple(looks),
+        looked_from=extrinsic,
+    )
+
+
+def said(frame: Frame, position: int, look: StageTrace) -> DriveLook:
+    """What a look at a frame says."""
+    return DriveLook(
+        frame.index,
+        position,
+        pose_vector(look.correction),
+        look.information,
+        look.match_error_px,
+        misfit(look),
+        bent_misfit(look),
     )
 
 
@@ -124,7 +144,7 @@ def agree(
     read: Callable[[int], Frame],
     positions: list[int],
     extrinsic: Extrinsic,
-    taken_in: Callable[[int, Frame, Consensus], None] | None = None,
+    taken_in: Callable[[int, Frame, StageTrace, Consensus], None] | None = None,
     skipped: list[BadFrame] | None = None,
     held: Held | None = None,
     common: Matrix6 | None = None,
@@ -136,7 +156,8 @@ def agree(
         read: gives the frame at a position.
         positions: of the frames.
         extrinsic: under which it looks.
-        taken_in: called after each frame that could be calibrated, with its position and the consensus so far.
+        taken_in: called after each frame that could be calibrated, with its position, its look and the
+            consensus so far.
         skipped: takes in the frames that could not be read or calibrated.
         held: what is known of the extrinsic beforehand.
         common: what that is weighed against, see `Consensus`.
@@ -160,7 +181,7 @@ def agree(
             continue
         consensus.add(look.correction, look.information)
         if taken_in is not None:
-            taken_in(position, frame, consensus)
+            taken_in(position, frame, look, consensus)
     if failure is not None and not len(consensus):
         raise failure
     return consensus

@@ -20,10 +20,8 @@ from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import Calibrator
 from calibnet.trace import CascadeTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, FRAME_LIMITS, Verdict
 
-FRAME_LIMITS, DRIVE_LIMITS = (1.0, 25.0), (0.3, 8.0)
-"""Degrees and centimetres beyond which the extrinsic of a frame, and of a drive, is wrong."""
 PLAIN = Corruption("none", "", None, unaltered, middle=False)
 """Input as it should be."""
 

@@ -119,3 +119,14 @@ def scan_faults() -> Iterator[Corruption]:
     yield Corruption("intensity", "constant", None, faults.reflecting(lambda values: np.full_like(values, 0.5)), False)
     yield Corruption("intensity", "none", None, faults.reflecting(np.zeros_like))
     yield Corruption("intensity", "one glint", None, faults.reflecting(faults.glint), False)
+
+
+def two_mounts(second: bool) -> Iterator[Corruption]:
+    """A drive on two mounts: the LiDAR is turned and moved in its second half.
+
+    Args:
+        second: whether a frame is of that half; the others are as they were.
+    """
+    for degrees, metres in ((0.5, 0.0), (1.0, 0.1), (3.0, 0.3)):
+        alter = faults.remounted(degrees, metres) if second else faults.unaltered
+        yield Corruption("two-mounts", f"{degrees:g} deg, {100 * metres:g} cm", None, alter, degrees == 1.0)

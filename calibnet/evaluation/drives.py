@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
+from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
 from calibnet.methods.calibrator import DriveCalibrator
+from calibnet.verdict import REJECTED
 
 FEWEST_FRAMES = 2
 """One frame is no drive."""
@@ -26,10 +29,14 @@ class DriveMetrics:
         estimate: of the extrinsic solved from all frames, edges included where they were aligned.
         networks: of what the networks alone made of them; None where no edges were aligned after them, so that both
             would be the same.
+        coverage: how the stated covariances of those that are not rejected compare with their errors.
+        verdicts: how many have each verdict.
     """
 
     estimate: Metrics
     networks: Metrics | None
+    coverage: Coverage | None = None
+    verdicts: dict[str, int] = field(default_factory=dict)
 
 
 def evaluate_drives(
@@ -53,7 +60,7 @@ def evaluate_drives(
     Returns:
         None where no sequence is a drive.
     """
-    errors, of_networks, aligned = [], [], False
+    errors, of_networks, squares, words, aligned = [], [], [], Counter[str](), False
     for number, sequence in enumerate(sequences):
         if not shares_mount(sequence):
             continue
@@ -70,9 +77,16 @@ def evaluate_drives(
                 solved = calibrator.calibrate_drive(sequence, estimate, told)
                 estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
                 aligned = aligned or solved.networks is not None
+                if solved.verdict is not None:
+                    words[solved.verdict.word] += 1
+                    if solved.verdict.word != REJECTED:
+                        squares.append(squared_error(estimate, reference, solved.covariance))
             errors.append(pose_error(estimate, reference))
             of_networks.append(pose_error(networks, reference))
-    return DriveMetrics(Metrics.of(errors), Metrics.of(of_networks) if aligned else None) if errors else None
+    if not errors:
+        return None
+    networks_alone = Metrics.of(of_networks) if aligned else None
+    return DriveMetrics(Metrics.of(errors), networks_alone, Coverage.of(squares), dict(words))
 
 
 def shares_mount(sequence: Sequence) -> bool:

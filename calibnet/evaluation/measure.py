@@ -115,7 +115,13 @@ class _Measurement:
         )
         if solved is None:
             return evaluation
-        return replace(evaluation, drives=solved.estimate, drives_networks=solved.networks)
+        return replace(
+            evaluation,
+            drives=solved.estimate,
+            drives_networks=solved.networks,
+            drives_coverage=solved.coverage,
+            drives_verdicts=solved.verdicts,
+        )
 
     def with_audit(
         self, evaluation: Evaluation, cascade: Calibrator, beside: Callable[[], Iterable[Sequence]]

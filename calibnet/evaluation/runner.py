@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,11 +11,12 @@ import numpy as np
 
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
+from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
 from calibnet.methods.calibrator import Calibrator
-from calibnet.verdict import ACCEPTED, REJECTED, WORDS
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Run:
             be calibrated.
         applied: error of the result as it is applied: the initial one, where what was found is rejected.
         verdict: accepted, rejected or cannot tell; empty where there is none.
+        squared_error: of the result by its stated covariance, see `calibnet.evaluation.coverage`; not a number without.
     """
 
     sequence: str
@@ -39,6 +42,7 @@ class Run:
     stages: dict[int, PoseError]
     applied: PoseError
     verdict: str = ""
+    squared_error: float = math.nan
 
 
 Observer = Callable[[Run], None]
@@ -71,6 +75,8 @@ class Evaluation:
         runs: every single result.
         drives: errors of the drives' extrinsics, each solved from all its frames; None where none was measured.
         drives_networks: likewise of what the networks alone made of them, before edges were aligned.
+        drives_coverage: how their stated covariances compare with their errors; None where none is stated.
+        drives_verdicts: how many of them have each verdict.
         references: errors of other methods on the same single frames, by name: no correction, a classical refinement.
         audit: errors with altered frames, by name, see `calibnet.evaluation.audit`: of the results as applied.
         audit_arrived: the same before the verdict, after the last stage.
@@ -90,6 +96,8 @@ class Evaluation:
     runs: tuple[Run, ...] = field(repr=False)
     drives: Metrics | None = None
     drives_networks: Metrics | None = None
+    drives_coverage: Coverage | None = None
+    drives_verdicts: dict[str, int] = field(default_factory=dict)
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
     audit_arrived: dict[str, Metrics] = field(default_factory=dict)
@@ -106,6 +114,16 @@ class Evaluation:
         """Errors of the accepted runs; None where there are none."""
         errors = [run.applied for run in self.runs if run.verdict == ACCEPTED]
         return Metrics.of(errors) if errors else None
+
+    @property
+    def coverage(self) -> Coverage | None:
+        """How the stated covariances of runs that are not rejected compare with their errors."""
+        return Coverage.of(run.squared_error for run in self.runs if run.verdict in (ACCEPTED, CANNOT_TELL))
+
+    @property
+    def coverage_accepted(self) -> Coverage | None:
+        """The same of the accepted ones."""
+        return Coverage.of(run.squared_error for run in self.runs if run.verdict == ACCEPTED)
 
     @property
     def applied(self) -> Metrics:
@@ -135,6 +153,10 @@ class Evaluation:
                 {"number": stage.number, "range": str(stage.range), **stage.metrics.as_dict()} for stage in self.stages
             ],
             "sequence": None if self.drives is None else self.drives.as_dict(),
+            "coverage": None if self.coverage is None else self.coverage.as_dict(),
+            "coverage_accepted": None if self.coverage_accepted is None else self.coverage_accepted.as_dict(),
+            "coverage_sequence": None if self.drives_coverage is None else self.drives_coverage.as_dict(),
+            "verdicts_sequence": {word.replace(" ", "_"): count for word, count in self.drives_verdicts.items()},
             "sequence_networks": None if self.drives_networks is None else self.drives_networks.as_dict(),
             "references": {name: metrics.as_dict() for name, metrics in self.references.items()},
         }
@@ -182,17 +204,19 @@ def evaluate_frames(
             for repeat in range(repeats):
                 initial = draw_miscalibration(range_, seed, frame.index, repeat) @ reference
                 errors: dict[int, PoseError] = {}
-                applied, verdict = initial, ""
+                applied, verdict, square = initial, "", math.nan
                 try:
                     trace = calibrator.calibrate(frame, initial)
                     for stage in trace.stages:
                         ranges[stage.number] = stage.range
                         errors[stage.number] = pose_error(stage.after, reference)
                     applied, verdict = trace.corrected, trace.verdict.word if trace.verdict else ""
+                    stated = trace.verdict.covariance if trace.verdict else None
+                    square = squared_error(trace.arrived, reference, stated)
                 except CalibrationError as error:
                     failure = error
                 before, after = (pose_error(extrinsic, reference) for extrinsic in (initial, applied))
-                runs.append(Run(sequence.name, frame.index, repeat, before, errors, after, verdict))
+                runs.append(Run(sequence.name, frame.index, repeat, before, errors, after, verdict, square))
                 if observer is not None:
                     observer(runs[-1])
     if not runs:

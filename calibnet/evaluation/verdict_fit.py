@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,9 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Floats
 from calibnet.judging.covariance import Spread
 from calibnet.judging.doubt import Doubt
-from calibnet.judging.witnesses import Witnesses
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """Of the last stage, and of the first one."""
-NAMES = tuple(one.name for one in fields(Witnesses))
 RIDGE = 3.0
 """Times the squares of the coefficients of standardised witnesses: what is added to the negative log likelihood."""
 FALSE_ACCEPTS = 0.01
@@ -29,8 +28,8 @@ GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
 LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""
-FEWEST = 10
-"""Good and bad results, each, below which nothing can be fitted."""
+FEWEST, FEWEST_DRIVES = 10, 6
+"""Good and bad results, each, of frames and of drives, below which nothing can be fitted."""
 CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
 """Shares of accepted and wrong runs at which the operating curve is told."""
 
@@ -42,11 +41,12 @@ class FitFigures:
     Attributes:
         runs, plain: how many in all, and without a fault.
         sequences: how many.
-        good: plain runs that end within the limits of a frame.
+        good: plain runs that end within the limits.
         false_accept_rate: share of all runs that are accepted and wrong.
         acceptance_of_good: share of the good plain runs that are accepted.
         wrong_rejected: share of the wrong runs that are rejected.
-        spread: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected.
+        spread: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected;
+            of drives, of accepted ones.
         curve: acceptance of good plain runs at given shares of false accepts.
     """
 
@@ -61,8 +61,8 @@ class FitFigures:
     curve: list[dict[str, float]] = field(default_factory=list)
 
 
-def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spread, FitFigures]:
-    """Fit doubt and spread to runs.
+def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spread, FitFigures]:
+    """Fit doubt and spread to runs on single frames.
 
     Args:
         runs: of a known truth.
@@ -71,14 +71,48 @@ def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spre
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
+    doubt, figures, kept = fit_doubt(runs)
+    spread = fit_spread(kept, ranges)
+    return doubt, spread, replace(figures, spread=mean_square(kept, ranges, spread))
+
+
+def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Doubt, float, FitFigures]:
+    """Fit doubt to runs on drives, and the factor that makes their stated covariance as large as their errors.
+
+    Raises:
+        CalibrationError: too few of them end right, or wrong.
+    """
+    doubt, figures, kept = fit_doubt(runs, FEWEST_DRIVES)
+    accepted = [run for run in kept if doubt_of(run, doubt) < doubt.accepted_below]  # few others would widen them all
+    squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
+    widening = rounded(max(float(np.mean(squares)), 1.0)) if squares else 1.0
+    return doubt, widening, replace(figures, spread=float(np.mean(squares)) / widening if squares else float("nan"))
+
+
+def doubt_of(run: VerdictRun, doubt: Doubt) -> float:
+    """How likely a run is wrong, by its witnesses."""
+    assert run.witnesses is not None
+    return doubt(SimpleNamespace(**run.witnesses))
+
+
+def fit_doubt(runs: Sequence[VerdictRun], fewest: int = FEWEST) -> tuple[Doubt, FitFigures, list[VerdictRun]]:
+    """Fit doubt to runs, and say how it does on sequences that are left out.
+
+    Returns:
+        The doubt, its figures, and the plain runs that it does not reject.
+
+    Raises:
+        CalibrationError: too few of them end right, or wrong.
+    """
     asked = [run for run in runs if run.witnesses is not None and np.isfinite(list(run.witnesses.values())).all()]
     good = np.array([run.good for run in asked], bool)
-    if min(int(good.sum()), int((~good).sum())) < FEWEST:
+    if min(int(good.sum()), int((~good).sum())) < fewest:
         raise CalibrationError(
             f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
-            f"seem to fit; {FEWEST} of each at least are needed to tell them apart. Make more runs, or add other data."
+            f"seem to fit; {fewest} of each at least are needed to tell them apart. Make more runs, or add other data."
         )
-    values = np.array([[run.witnesses[name] for name in NAMES] for run in asked if run.witnesses is not None])
+    names = list(asked[0].witnesses or {})
+    values = np.array([[run.witnesses[name] for name in names] for run in asked if run.witnesses is not None])
     odds = left_out(values, ~good, [run.sequence for run in asked])
     plain = np.array([run.plain for run in asked], bool)
     accepted_below = threshold(odds, ~good, FALSE_ACCEPTS * len(runs))
@@ -86,12 +120,11 @@ def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spre
     intercept, weights = regression(values, ~good)
     doubt = Doubt(
         rounded(intercept),
-        {name: rounded(weight) for name, weight in zip(NAMES, weights, strict=True)},
+        {name: rounded(weight) for name, weight in zip(names, weights, strict=True)},
         rounded(probability(accepted_below)),
         rounded(probability(rejected_above)),
     )
     kept = [run for run, of in zip(asked, odds, strict=True) if run.plain and of < rejected_above]
-    spread = fit_spread(kept, ranges)
     accepted = odds < accepted_below
     wrong = [run for run in runs if not run.good]
     told_wrong = len(wrong) - int((odds[~good] <= rejected_above).sum())
@@ -103,7 +136,7 @@ def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spre
         false_accept_rate=float((accepted & ~good).sum() / len(runs)),
         acceptance_of_good=_acceptance(accepted & good & plain, runs),
         wrong_rejected=told_wrong / max(len(wrong), 1),
-        spread=mean_square(kept, ranges, spread),
+        spread=float("nan"),
         curve=[
             {
                 "false_accepts": share,
@@ -114,7 +147,7 @@ def fit_verdict(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spre
             for share in CURVE
         ],
     )
-    return doubt, spread, figures
+    return doubt, figures, kept
 
 
 def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:

@@ -16,7 +16,9 @@ from typing import Any
 
 from calibnet.datasets.frame import Sequence
 from calibnet.errors import ConfigError
+from calibnet.evaluation.verdict_drives import DriveStream
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
+from calibnet.judging.drive_witnesses import DriveWitnesses
 from calibnet.judging.witnesses import Witnesses
 from calibnet.runtime.reading import MEGABYTE, read_text
 from calibnet.runtime.writing import check_output
@@ -38,6 +40,7 @@ class Source:
         data: as `calibnet.training.data.open_data` takes them.
         synthetic: drives of the synthetic world besides.
         seed: of everything random.
+        drives: whether whole drives are run instead of single frames.
     """
 
     preset: str
@@ -46,6 +49,7 @@ class Source:
     data: tuple[str, ...]
     synthetic: int
     seed: int
+    drives: bool = False
 
     def sequences(self) -> list[Sequence]:
         """Open all data.
@@ -63,14 +67,15 @@ class Source:
             raise ConfigError("There is nothing to run on: give --data, or --synthetic above 0.")
         return found
 
-    def open(self) -> RunStream:
+    def open(self) -> RunStream | DriveStream:
         """The stream, its cascade loaded; one thread, as several processes share the cores."""
         import torch
 
         from calibnet.cascade import Cascade
 
         torch.set_num_threads(1)
-        return RunStream(Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
+        kind = DriveStream if self.drives else RunStream
+        return kind(Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
 
 
 class RunLog:
@@ -111,7 +116,8 @@ def whole(run: VerdictRun) -> VerdictRun:
     Raises:
         KeyError: it has others.
     """
-    if run.witnesses is not None and run.witnesses.keys() != {one.name for one in fields(Witnesses)}:
+    known = [{one.name for one in fields(kind)} for kind in (Witnesses, DriveWitnesses)]
+    if run.witnesses is not None and run.witnesses.keys() not in known:
         raise KeyError(f"run {run.number} was made with other witnesses")
     return run
 
@@ -166,7 +172,7 @@ def collect(
     return [made for number in range(runs) if (made := log.known.get(number)) is not None]
 
 
-_stream: RunStream | None = None
+_stream: RunStream | DriveStream | None = None
 
 
 def _open(source: Source) -> None:

@@ -19,15 +19,15 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
 from calibnet.datasets.selection import spread
 from calibnet.errors import CalibnetError
-from calibnet.evaluation.battery import FRAME_LIMITS, PLAIN
+from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions
-from calibnet.geometry import MiscalibrationRange, invert, pose_error, sample_miscalibration
+from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.doubt import Doubt
 from calibnet.judging.witnesses import witnesses
-from calibnet.verdict import ACCEPTED
+from calibnet.verdict import ACCEPTED, FRAME_LIMITS
 
 FRAMES = 8
 """Of a sequence, spread over it: neighbours of a drive say the same."""
@@ -39,17 +39,19 @@ PLAIN_SHARE = 0.5
 
 @dataclass(frozen=True)
 class VerdictRun:
-    """One calibration from a random guess.
+    """One calibration of a frame or of a drive from a random guess.
 
     Attributes:
         number: in the stream.
-        sequence, frame: what was calibrated.
+        sequence: what was calibrated.
+        frame: index of the frame, or number of the drive's frames.
         fault, strength: what was put into it, see `calibnet.evaluation.corruptions`.
         rotation_deg, translation_cm: how far off it ended.
+        good: whether that is within the limits.
         witnesses: by name; None where the verdict does not ask them, because picture and scan do not fit, for instance.
         offset: the result against the truth, ``(translation m, rotation rad)`` in the camera frame.
-        information: ``[6, 6]`` that the last stage states, None without one.
-        match_error_px: that it expects.
+        information: ``[6, 6]`` that the last stage, or the drive, states; None without one.
+        match_error_px: that the last stage expects; not a number for a drive.
     """
 
     number: int
@@ -59,15 +61,11 @@ class VerdictRun:
     strength: str
     rotation_deg: float
     translation_cm: float
+    good: bool
     witnesses: dict[str, float] | None
     offset: list[float]
     information: list[list[float]] | None
     match_error_px: float
-
-    @property
-    def good(self) -> bool:
-        """Whether the result is within the limits of a frame."""
-        return self.rotation_deg <= FRAME_LIMITS[0] and self.translation_cm <= FRAME_LIMITS[1]
 
     @property
     def plain(self) -> bool:
@@ -160,6 +158,7 @@ def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
         drawn.fault.strength,
         error.rotation_deg,
         error.translation_cm,
+        within(error, FRAME_LIMITS),
         asdict(witnesses(trace)) if asked else None,
         pose_vector(last.after @ invert(truth)).tolist(),
         None if last.information is None else last.information.tolist(),
@@ -167,9 +166,14 @@ def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
     )
 
 
+def within(error: PoseError, limits: tuple[float, float]) -> bool:
+    """Whether an error is within limits of degrees and centimetres."""
+    return error.rotation_deg <= limits[0] and error.translation_cm <= limits[1]
+
+
 def asking(cascade: Cascade) -> Cascade:
     """The cascade with a verdict that accepts whatever its witnesses would be asked for."""
     everything = Doubt(0.0, {}, accepted_below=1.0, rejected_above=1.0)
     finest = cascade.stages[-1].range
-    cascade.coefficients = Coefficients(everything, weights={finest: ""}, missing="")
+    cascade.coefficients = Coefficients(everything, drive=everything, weights={finest: ""}, missing="")
     return cascade

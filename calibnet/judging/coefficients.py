@@ -15,6 +15,7 @@ from calibnet.errors import WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.judging.covariance import Spread
 from calibnet.judging.doubt import Doubt
+from calibnet.judging.drive_witnesses import DriveWitnesses
 from calibnet.judging.witnesses import Witnesses
 from calibnet.runtime.reading import parse_toml, read_text
 from calibnet.runtime.writing import write_whole
@@ -32,8 +33,10 @@ class Coefficients:
     """Coefficients of the verdict.
 
     Attributes:
-        doubt: how witnesses are summed up; None where nothing was fitted.
-        spread: how far results lie from the truth.
+        doubt: how witnesses of a frame are summed up; None where nothing was fitted.
+        spread: how far results of frames lie from the truth.
+        drive: how witnesses of a drive are summed up; None where that was not fitted.
+        widening: by what a drive's stated covariance is multiplied, to be as large as its errors are.
         weights: fingerprints of the stages that were run, by range; the finest of them ends a run that can be judged.
         missing: a sentence that says why there are none; empty where there are.
         fitted: what they were fitted to, and what came of it.
@@ -41,6 +44,8 @@ class Coefficients:
 
     doubt: Doubt | None = None
     spread: Spread = field(default_factory=Spread)
+    drive: Doubt | None = None
+    widening: float = 1.0
     weights: Mapping[MiscalibrationRange, str] = field(default_factory=dict)
     missing: str = "The verdict has not been fitted to these networks."
     fitted: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -51,12 +56,18 @@ class Coefficients:
         Args:
             last: range of the stage that ended it.
         """
-        if self.doubt is None:
-            return self.missing
+        return self._fitted_to(last) or self.doubt or self.missing
+
+    def drive_doubt_of(self, last: MiscalibrationRange) -> Doubt | str:
+        """The same of a drive."""
+        return self._fitted_to(last) or self.drive or "To drives the verdict has not been fitted."
+
+    def _fitted_to(self, last: MiscalibrationRange) -> str:
+        """Why a run that a stage ended cannot be judged; empty where it can."""
         finest = min(self.weights, default=last)
-        if last != finest:
+        if self.doubt is not None and last != finest:
             return f"The verdict was fitted to runs that end with the stage of {finest.label}, not with {last.label}."
-        return self.doubt
+        return self.missing
 
     def write(self, path: Path) -> None:
         """Write them as TOML."""
@@ -67,6 +78,7 @@ class Coefficients:
             "weights": {str(range_): of for range_, of in self.weights.items()},
             "doubt": asdict(self.doubt),
             "spread": asdict(self.spread),
+            **({} if self.drive is None else {"drive": asdict(self.drive) | {"widening": self.widening}}),
             "fitted": dict(self.fitted),
         }
         write_whole(path, (HEAD + tomli_w.dumps(content)).encode())
@@ -108,10 +120,19 @@ def _read(path: Path) -> Coefficients:
     text = read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy)
     try:
         content = parse_toml(text)
-        doubt = Doubt(**content["doubt"])
+        doubt = _doubt(content["doubt"], Witnesses)
+        drive = content.get("drive", {})
+        widening = drive.pop("widening", 1.0)
+        of_drive = _doubt(drive, DriveWitnesses) if drive else None
         weights = {MiscalibrationRange.parse(range_): of for range_, of in content["weights"].items()}
-        if unknown := doubt.weights.keys() - {field.name for field in fields(Witnesses)}:
-            raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
-        return Coefficients(doubt, Spread(**content["spread"]), weights, "", content.get("fitted", {}))
+        spread, fitted = Spread(**content["spread"]), content.get("fitted", {})
+        return Coefficients(doubt, spread, of_drive, widening, weights, "", fitted)
     except (TypeError, KeyError, ValueError, AttributeError) as error:
         raise WeightsError(f"{path} holds no coefficients of a verdict ({error}); {remedy}.") from None
+
+
+def _doubt(content: dict[str, Any], witnesses: type[Witnesses | DriveWitnesses]) -> Doubt:
+    doubt = Doubt(**content)
+    if unknown := doubt.weights.keys() - {field.name for field in fields(witnesses)}:
+        raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
+    return doubt

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from calibnet.judging.witnesses import Witnesses
-
 LARGEST_ODDS = 50.0
 """Of which the logarithm is taken: beyond it, probabilities are 0 and 1 all the same."""
 
@@ -27,7 +25,11 @@ class Doubt:
     accepted_below: float
     rejected_above: float
 
-    def __call__(self, of: Witnesses) -> float:
-        """Probability that the result is wrong; not a number where a witness is missing."""
+    def __call__(self, of: object) -> float:
+        """Probability that the result is wrong; not a number where a witness is missing.
+
+        Args:
+            of: what has the witnesses as attributes: of a frame, or of a drive.
+        """
         odds = self.intercept + sum(weight * getattr(of, name) for name, weight in self.weights.items())
         return odds if math.isnan(odds) else 1 / (1 + math.exp(-min(max(odds, -LARGEST_ODDS), LARGEST_ODDS)))

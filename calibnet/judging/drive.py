@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 from calibnet.geometry import MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.doubt import Doubt
+from calibnet.judging.drive_witnesses import drive_witnesses
 from calibnet.trace import MARGIN, DriveEstimate
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verdict, Word, moved
 
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Standard deviations, over all axes, beyond which the frames agree on too little."""
+HALVES_CM = 15.0
+"""Between the halves of a drive, turns counted as `calibnet.judging.drive_witnesses` does, from which on it is told."""
 
 
 def judge_drive(
@@ -21,7 +26,7 @@ def judge_drive(
         estimate: of the drive.
         initial: ``camera_from_lidar`` that it started from.
         searched: the range that was to be searched around it.
-        doubt: as `calibnet.judging.coefficients.Coefficients.doubt_of` has it; without one nothing is accepted.
+        doubt: as `calibnet.judging.coefficients.Coefficients.drive_doubt_of` has it; without one nothing is accepted.
     """
     word, reason = _word(estimate, initial, searched, doubt)
     there = estimate.camera_from_lidar
@@ -50,4 +55,17 @@ def _word(
         )
     if isinstance(doubt, str):
         return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {doubt}"
-    return ACCEPTED, f"{used} frames agree."
+    witnesses = drive_witnesses(estimate, initial, searched)
+    if witnesses is None:
+        return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
+    wrong = doubt(witnesses)
+    if wrong < doubt.accepted_below:
+        return ACCEPTED, f"{used} frames agree."
+    if math.isnan(wrong):
+        return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
+    halves = math.exp(witnesses.halves)
+    disagreeing = f"; its halves are {halves:.0f} cm apart" if halves > HALVES_CM else ""
+    return REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, (
+        f"{used} frames agree, but not as those of drives that end right do (that it is more than "
+        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off is {wrong:.0%} likely){disagreeing}."
+    )

@@ -29,6 +29,7 @@ def judge(
     coefficients: Coefficients,
     match_error: Measure | None = None,
     misfit: Measure | None = None,
+    lag: tuple[Search, Measure] | None = None,
 ) -> Verdict:
     """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
 
@@ -38,6 +39,8 @@ def judge(
         trace: of the run; None where it could not be run because too few points fall into the picture.
         coefficients: that were fitted to the weights; without any nothing is accepted.
         match_error: where picture and scan do not fit, finds out why by `calibnet.judging.causes.PICTURE_AND_SCAN`.
+        lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
+            far a run goes.
         misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
@@ -81,7 +84,7 @@ def judge(
     gone = reach(trace.initial, last.after, trace.stages[0].range)
     if gone.share > MARGIN:
         word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
-        return verdict(word, f"The LiDAR {gone}.", why(LENSES, misfit))
+        return verdict(word, f"The LiDAR {gone}.", why(LENSES, misfit) or (why(*lag) if lag else ()))
 
     doubt = coefficients.doubt_of(last.range)
     if isinstance(doubt, str):

@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.causes import Search
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import ACCEPTED, Verdict
 
@@ -57,18 +58,33 @@ class DriveCalibrator(Calibrator, Protocol):
 class Explainer(Protocol):
     """A method that can also find out what is wrong with a frame, at many times the price of calibrating it."""
 
-    def explain(self, frame: Frame, initial: Extrinsic) -> Verdict:
+    def explain(self, frame: Frame, initial: Extrinsic, lags: Search | None = None) -> Verdict:
         """The verdict on a frame, with the causes of what does not fit.
 
         Args:
             frame: image, scan and camera; its own extrinsic must not be looked at.
             initial: ``camera_from_lidar`` to start from, 4x4.
+            lags: of the scan, that are to be tried as well, where the frames beside it are known.
         """
         ...
 
 
-def with_causes(calibrator: Calibrator, frame: Frame, initial: Extrinsic, verdict: Verdict) -> Verdict:
-    """The verdict on a frame with causes, where it is not accepted, names none yet, and the method can find them."""
+def with_causes(
+    calibrator: Calibrator,
+    frame: Frame,
+    initial: Extrinsic,
+    verdict: Verdict,
+    lags: Callable[[], Search | None] = lambda: None,
+) -> Verdict:
+    """The verdict on a frame with causes, where it is not accepted, names none yet, and the method can find them.
+
+    Args:
+        calibrator: that gave the verdict.
+        frame: image, scan and camera.
+        initial: ``camera_from_lidar`` that it started from.
+        verdict: without causes.
+        lags: of the scan, worked out only where causes are looked for.
+    """
     if verdict.word == ACCEPTED or verdict.causes or not isinstance(calibrator, Explainer):
         return verdict
-    return calibrator.explain(frame, initial)
+    return calibrator.explain(frame, initial, lags())

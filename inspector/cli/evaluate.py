@@ -56,6 +56,12 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Instead of all else: put some 70 faults into every frame, and see whether the verdict knows, and why.",
 )
+@click.option(
+    "--virtual",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Every sequence as N virtual rigs instead: narrower lenses, cameras turned, half of them with half the rings.",
+)
 @click.option("--drives/--no-drives", default=True, help="Also solve every drive from all its frames.  [default: yes]")
 @click.option("--classical/--no-classical", default=True, help="Also a refinement without training.  [default: yes]")
 @click.option(
@@ -82,6 +88,7 @@ def evaluate(
     weights: Path | None,
     audit: bool,
     battery: bool,
+    virtual: int | None,
     drives: bool,
     classical: bool,
     methods: tuple[str, ...],
@@ -100,6 +107,10 @@ def evaluate(
         for sequence in open_sequences(dataset, root, names, camera)
     ]
     prepare_json(json_file)
+    if virtual is not None:
+        from calibnet.evaluation.virtual import virtual_rigs
+
+        opened = virtual_rigs(opened, virtual, seed)
 
     from calibnet.cascade.cascade import Cascade
     from calibnet.datasets.discovery import find_sequences

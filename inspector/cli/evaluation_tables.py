@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from calibnet.verdict import ACCEPTED
@@ -43,6 +44,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
         console.print(audit_sentence(evaluation))
     if sum(evaluation.verdicts.values()):
         console.print(verdict_sentence(evaluation))
+    for line in coverage_sentences(evaluation):
+        console.print(line, soft_wrap=True)
     if evaluation.failed:
         console.print(
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",
@@ -65,6 +68,19 @@ def print_battery(battery: Battery, console: Console) -> None:
         f"{len(battery.runs)} runs. Accepted of the runs without fault that end within that: "
         f"{battery.acceptance_of_good:.0%}."
     )
+
+
+def coverage_sentences(evaluation: Evaluation) -> Iterator[str]:
+    """How stated covariances compare with errors, and what was said of drives."""
+    for of, coverage in (
+        ("frames that are not rejected", evaluation.coverage),
+        ("accepted frames", evaluation.coverage_accepted),
+        ("drives that are not rejected", evaluation.drives_coverage),
+    ):
+        if coverage is not None:
+            yield f"Stated covariances of {of}: {coverage}."
+    if evaluation.drives_verdicts:
+        yield f"Drives: {', '.join(f'{count} {word}' for word, count in evaluation.drives_verdicts.items())}."
 
 
 def audit_sentence(evaluation: Evaluation) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from inspector.cli.output import make_console, say
 
 if TYPE_CHECKING:
     from calibnet.evaluation.verdict_fit import FitFigures
+    from calibnet.evaluation.verdict_runs import VerdictRun
 
 
 @click.command("fit-verdict")
@@ -28,17 +29,24 @@ if TYPE_CHECKING:
     help="Frames whose own extrinsic is true and that were not trained on. Repeatable; many rigs are better.",
 )
 @click.option(
+    "--drive-data",
+    multiple=True,
+    metavar="DATASET:DIR[:SEQ]",
+    help="Drives besides those of --data. Repeatable. Good ones are needed: of six frames and more, on a known mount.",
+)
+@click.option(
     "--synthetic",
     type=click.IntRange(0),
     default=3,
     show_default=True,
     help="Drives of the synthetic world besides, each with sensors of its own.",
 )
-@click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Calibrations to fit to.")
+@click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Frames to calibrate and fit to.")
+@click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Drives to solve and fit to.")
 @click.option(
     "--minutes",
     type=click.FloatRange(0, min_open=True),
-    help="Stop there if --runs are not done by then; what was run is kept, and counts the next time.",
+    help="Stop there if --runs and --drives are not done by then; what was run is kept, and counts the next time.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
 @click.option(
@@ -49,8 +57,10 @@ def fit_verdict(
     weights: Path,
     preset: str,
     data: tuple[str, ...],
+    drive_data: tuple[str, ...],
     synthetic: int,
     runs: int,
+    drives: int,
     minutes: float | None,
     seed: int,
     stages: tuple[int, ...],
@@ -68,38 +78,61 @@ def fit_verdict(
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from calibnet.evaluation.verdict_fit import fit_verdict as fit
+    from calibnet.errors import CalibrationError
+    from calibnet.evaluation.verdict_fit import fit_drives, fit_frames
     from calibnet.evaluation.verdict_log import RunLog, Source, collect, runner
     from calibnet.geometry import RANGES
     from calibnet.judging.coefficients import Coefficients, coefficients_path
     from calibnet.weights.fingerprint import fingerprints
 
+    ranges = [RANGES[number - 1] for number in stages]
     source = Source(preset, weights, stages, data, synthetic, seed)
-    source.sequences()  # what is wrong with them is said before anything is started
-    marks = fingerprints(preset, weights, [RANGES[number - 1] for number in stages])
+    of_drive = replace(source, data=data + drive_data, drives=True)
+    of_drive.sequences()  # what is wrong with them is said before anything is started
+    marks = fingerprints(preset, weights, ranges)
     path = coefficients_path(preset, weights)
-    key = {"weights": {str(range_): mark for range_, mark in marks.items()}}
-    key |= {name: value for name, value in asdict(source).items() if name not in ("preset", "weights", "stages")}
-    log = RunLog(path.with_suffix(".jsonl"), key)
     until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
     processes = (os.cpu_count() or 1) if workers is None else workers
     console = make_console()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress, runner(source, processes) as run:
-        task = progress.add_task("calibrating", total=runs)
-        made = collect(
-            log,
-            runs,
-            run,
-            processes,
-            lambda: time.monotonic() < until,
-            lambda done: progress.update(task, completed=done),
-        )
-    doubt, spread, figures = fit(made, (RANGES[max(stages) - 1], RANGES[min(stages) - 1]))
-    fitted = {"data": [short(spec) for spec in data], "synthetic": synthetic, "seed": seed, **asdict(figures)}
-    Coefficients(doubt, spread, marks, "", fitted).write(path)
+
+    def made(source: Source, count: int, title: str) -> list[VerdictRun]:
+        key = {"weights": {str(range_): mark for range_, mark in marks.items()}}
+        key |= {name: value for name, value in asdict(source).items() if name not in ("preset", "weights", "stages")}
+        log = RunLog(path.with_suffix(".jsonl"), key)
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console, transient=True) as progress, runner(source, processes) as run:
+            task = progress.add_task(title, total=count)
+            return collect(
+                log,
+                count,
+                run,
+                processes,
+                lambda: time.monotonic() < until,
+                lambda done: progress.update(task, completed=done),
+            )
+
+    of_frames = made(source, runs, "frames")
+    doubt, spread, figures = fit_frames(of_frames, (min(ranges), max(ranges)))
+    of_drives = made(of_drive, drives, "drives") if drives else []
+    fitted = {
+        "data": [short(spec) for spec in of_drive.data],
+        "synthetic": synthetic,
+        "seed": seed,
+        "frames": asdict(figures),
+    }
+    coefficients = Coefficients(doubt, spread, weights=marks, missing="", fitted=fitted)
     for line in told(figures):
         console.print(line, soft_wrap=True)
+    try:
+        drive, widening, figures = fit_drives(of_drives)
+    except CalibrationError as error:
+        console.print(f"Drives will not be accepted. {error}", style="yellow", markup=False, soft_wrap=True)
+    else:
+        fitted = {**fitted, "drives": asdict(figures)}
+        coefficients = replace(coefficients, drive=drive, widening=widening, fitted=fitted)
+        for line in told(figures, "drives"):
+            console.print(line, soft_wrap=True)
+    coefficients.write(path)
     say(path)
 
 
@@ -109,12 +142,11 @@ def short(spec: str) -> str:
     return ":".join([dataset, Path(folder).name, *sequence])
 
 
-def told(figures: FitFigures) -> Iterator[str]:
+def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
     """The figures in sentences."""
-    yield (
-        f"{figures.runs} runs on {figures.sequences} sequences, {figures.plain} of them without a fault, of which "
-        f"{figures.good} end right. With each sequence left out of the fit in turn:"
-    )
+    yield f"{figures.runs} runs of {of} on {figures.sequences} sequences."
+    yield f"{figures.plain} of them have no fault, and {figures.good} of those end right."
+    yield "With each sequence left out of the fit in turn:"
     yield f"  accepted though wrong: {figures.false_accept_rate:.1%} of all runs"
     yield f"  accepted: {figures.acceptance_of_good:.0%} of the good runs without a fault"
     yield f"  rejected: {figures.wrong_rejected:.0%} of the wrong runs"

@@ -38,6 +38,7 @@ COMMANDS = {
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
     "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand and see what the cascade answers."),
     "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),
+    "watch": LazyCommand("inspector.cli.watch:watch", "Whether the mount moved during a drive."),
     "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
     "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),
     "export": LazyCommand("inspector.cli.export:export", "The extrinsic for KITTI, ROS 2 or OpenCV, or as JSON."),

@@ -11,21 +11,10 @@ import click
 
 from calibnet.errors import CalibnetError
 from inspector.cli.errors import VERDICT_CODES, ExitCode
-from inspector.cli.inspect import (
-    FOLDER_ONLY,
-    camera_option,
-    disturbed,
-    folder_options,
-    open_folder,
-    open_object,
-    open_odometry,
-    open_raw,
-    root_option,
-    split_option,
-)
-from inspector.cli.options import FOLDER
-from inspector.cli.output import JSON_FILE, prepare_json, say, write_json
-from inspector.cli.run import checked, choose_outputs, finish, prepare, recording_to, run_options
+from inspector.cli.inspect import disturbed
+from inspector.cli.output import prepare_json, say, write_json
+from inspector.cli.run import checked, choose_outputs, finish, prepare, recording_to
+from inspector.cli.sequences import over_sequences
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
@@ -46,57 +35,6 @@ def verify() -> None:
     is a verdict as well. Nothing is recorded or shown without --save, --report, --serve or --connect, and nothing is
     ever exported.
     """
-
-
-def verify_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command all options of a calibration run, and ``--json``."""
-    json_option = click.option(
-        "--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout."
-    )
-    return json_option(run_options(command))
-
-
-@verify.command()
-@click.argument("sequence")
-@root_option
-@camera_option
-@verify_options
-def seq(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
-    """Of a KITTI odometry sequence, for instance 04."""
-    return verify_sequence(lambda: open_odometry(sequence, root, camera), camera=camera, **asked)
-
-
-@verify.command()
-@click.argument("date")
-@click.argument("number", metavar="DRIVE")
-@root_option
-@camera_option
-@verify_options
-def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) -> int:
-    """Of a KITTI raw drive, for instance 2011_09_26 0005."""
-    return verify_sequence(lambda: open_raw(date, number, root, camera), camera=camera, **asked)
-
-
-@verify.command("object")
-@split_option
-@root_option
-@camera_option
-@verify_options
-def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
-    """Of the KITTI object detection frames, which are of one calibration only where they are of one day."""
-    return verify_sequence(lambda: open_object(split, root, camera), camera=camera, **asked)
-
-
-@verify.command()
-@click.argument("directory", type=FOLDER)
-@folder_options
-@verify_options
-def folder(directory: Path, dataset: str, **asked: Any) -> int:
-    """Of a folder with images/, clouds/ and calibration.yaml."""
-    of_folder = {**asked}
-    for name in FOLDER_ONLY:
-        del asked[name]
-    return verify_sequence(lambda: open_folder(directory, dataset, of_folder), **asked)
 
 
 def verify_sequence(
@@ -153,3 +91,6 @@ def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> Ex
     if not quiet:
         say(line(verdict), err=json_file == "-")
     return VERDICT_CODES[verdict.word]
+
+
+over_sequences(verify, verify_sequence)

@@ -9,6 +9,7 @@ from calibnet.datasets.frame import Frames
 from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.lag import lags
 from calibnet.judging.verify import Tolerance, named_cause, unfit, verify
 from calibnet.methods.calibrator import Explainer
 from calibnet.verdict import ACCEPTED, Cause, Verdict
@@ -41,7 +42,7 @@ def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, 
     verdicts: list[Verdict] = []
     for position in spread(len(frames), SUSPECTS):
         try:
-            verdicts.append(method.explain(frames[position], given))
+            verdicts.append(method.explain(frames[position], given, lags(frames, position)))
         except (CalibrationError, DatasetError) as error:
             verdicts.append(unfit(given, str(error), named_cause(error)))
     named = Counter(name for verdict in verdicts for name in {cause.name for cause in verdict.causes})

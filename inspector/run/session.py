@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from dataclasses import dataclass, replace
+from functools import partial
 
 from rich.console import Console
 from rich.progress import (
@@ -23,6 +24,7 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import DriveCalibrator, with_causes
 from calibnet.runtime.interruption import StopRequest
@@ -133,7 +135,8 @@ class Session:
             initial = self.start.initial(frame)
             trace = self.cascade.calibrate(frame, initial, detail=self.contents.inside)
             if trace.verdict is not None and summary.explained < MOST_EXPLAINED:
-                verdict = with_causes(self.cascade, frame, initial, trace.verdict)
+                beside = partial(lags, self.frames, list(self.positions).index(position))
+                verdict = with_causes(self.cascade, frame, initial, trace.verdict, beside)
                 summary.explained += verdict is not trace.verdict
                 trace = replace(trace, verdict=verdict)
         except (CalibrationError, DatasetError) as error:

@@ -12,7 +12,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
 from calibnet.datasets.synthetic.sequence import SyntheticSequence
 from calibnet.evaluation.faults.alteration import Alteration
-from calibnet.geometry import invert, transform_points
+from calibnet.geometry import invert, rotation_from_euler_xyz, transform, transform_points
 from calibnet.geometry.types import Transform
 
 BAND_DEG = 0.4
@@ -36,6 +36,17 @@ def thinned(share: int) -> Alteration:
     def alter(frame: Frame) -> Frame:
         elevation = np.degrees(np.arctan2(frame.points[:, 2], np.hypot(frame.points[:, 0], frame.points[:, 1])))
         return replace(frame, points=frame.points[elevation % (share * BAND_DEG) < BAND_DEG])
+
+    return alter
+
+
+def remounted(degrees: float, metres: float) -> Alteration:
+    """The LiDAR turned about its upward axis and moved ahead, and the truth with it."""
+    delta = transform(rotation_from_euler_xyz([0.0, 0.0, np.radians(degrees)]), np.array([metres, 0.0, 0.0]))
+
+    def alter(frame: Frame) -> Frame:
+        moved = with_positions(frame, transform_points(delta, frame.points[:, :3].astype(np.float64)))
+        return replace(moved, camera_from_lidar=frame.camera_from_lidar @ invert(delta))
 
     return alter
 

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from calibnet.errors import CalibrationError
-from calibnet.evaluation.verdict_fit import NAMES, fit_spread, fit_verdict, left_out, mean_square, regression, threshold
+from calibnet.evaluation.verdict_fit import (
+    fit_drives,
+    fit_frames,
+    fit_spread,
+    left_out,
+    mean_square,
+    regression,
+    threshold,
+)
 from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import RANGES
 from calibnet.judging.covariance import Spread
+from calibnet.judging.witnesses import Witnesses
 
+NAMES = tuple(one.name for one in fields(Witnesses))
 LAST = RANGES[4]
 BOTH = (LAST, RANGES[2])
 STATED = np.diag([4e3, 4e3, 1e3, 4e5, 4e5, 4e5]) + LAST.information
@@ -27,14 +39,14 @@ def runs(count: int, spread: Spread, seed: int = 0, sharpness: float = 3.0) -> l
         made.append(
             VerdictRun(
                 number, f"drive {number % 7}", number, "none" if number % 2 else "grey", "", 2.0 if wrong else 0.3, 9.0,
-                said, offset.tolist(), STATED.tolist(), error,
+                not wrong, said, offset.tolist(), STATED.tolist(), error,
             )
         )  # fmt: skip
     return made
 
 
 def test_the_witness_that_tells_is_found_and_the_others_are_not_believed() -> None:
-    doubt, _, figures = fit_verdict(runs(800, Spread()), BOTH)
+    doubt, _, figures = fit_frames(runs(800, Spread()), BOTH)
     assert doubt.weights["match_error"] == pytest.approx(3.0, abs=0.5)
     assert max(abs(doubt.weights[name]) for name in NAMES if name != "match_error") < 0.4
     assert -doubt.intercept / doubt.weights["match_error"] == pytest.approx(2.5, abs=0.15)
@@ -47,7 +59,7 @@ def test_the_witness_that_tells_is_found_and_the_others_are_not_believed() -> No
 
 
 def test_what_witnesses_do_not_tell_is_not_accepted() -> None:
-    doubt, _, figures = fit_verdict(runs(800, Spread(), sharpness=0.0), BOTH)
+    doubt, _, figures = fit_frames(runs(800, Spread(), sharpness=0.0), BOTH)
     assert figures.acceptance_of_good < 0.1 and doubt.accepted_below < 0.5
 
 
@@ -80,4 +92,14 @@ def test_the_spread_is_found_and_covers_the_errors(spread: Spread) -> None:
 def test_too_few_runs_of_a_kind_are_a_sentence() -> None:
     few = [run for run in runs(200, Spread()) if run.good][:40]
     with pytest.raises(CalibrationError, match="Of 40 runs 40 end right and 0 wrong"):
-        fit_verdict(few, BOTH)
+        fit_frames(few, BOTH)
+
+
+def test_a_drive_s_covariance_is_widened_to_its_errors() -> None:
+    made = [
+        replace(run, information=np.linalg.inv(Spread().covariance(STATED, *BOTH, run.match_error_px) / 4).tolist())
+        for run in runs(400, Spread())
+    ]
+    doubt, widening, figures = fit_drives(made)
+    assert widening == pytest.approx(4.0, rel=0.15) and figures.spread == pytest.approx(1.0, abs=1e-4)
+    assert doubt.weights["match_error"] > 1

@@ -52,8 +52,8 @@ def test_what_undoes_the_fault_is_the_cause(alter: faults.Alteration, names: tup
     [
         (faults.focal(1.05), "focal-length", "5 % shorter"),
         (faults.focal(0.9), "focal-length", "10 % longer"),
-        (faults.principal(60, 0), "principal-point", "farther left"),
-        (faults.principal(0, -60), "principal-point", "farther lower"),
+        (faults.principal(60, 0), "principal-point", "farther to the left"),
+        (faults.principal(0, -60), "principal-point", "farther down"),
     ],
 )
 def test_a_lens_is_named_with_its_direction(alter: faults.Alteration, name: str, said: str) -> None:

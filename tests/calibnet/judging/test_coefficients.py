@@ -19,6 +19,8 @@ from calibnet.weights.manifest import PACKAGE, Manifest, StageEntry, StageSettin
 MANIFEST = Manifest("mine", stages=(StageEntry(RANGES[3], "four"), StageEntry(RANGES[4], "five")))
 DOUBT = Doubt(-1.5, {"match_error": 2.0, "reach": 0.25}, 0.25, 0.75)
 
+DRIVE = Doubt(0.5, {"halves": 1.5}, 0.1, 0.9)
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -26,7 +28,8 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "five").write_bytes(b"of stage 5")
     MANIFEST.write(tmp_path / "mine.toml")
     marks = fingerprints("mine", tmp_path, [RANGES[3], RANGES[4]])
-    Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), marks, "", {"runs": 90}).write(coefficients_path("mine", tmp_path))
+    whole = Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), DRIVE, 1.25, marks, "", {"runs": 90})
+    whole.write(coefficients_path("mine", tmp_path))
     return tmp_path
 
 
@@ -34,6 +37,9 @@ def test_they_are_read_as_they_were_written(folder: Path) -> None:
     coefficients = load_coefficients(MANIFEST, folder)
     assert coefficients.doubt_of(RANGES[4]) == DOUBT and coefficients.missing == ""
     assert coefficients.spread == Spread(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
+    assert coefficients.drive_doubt_of(RANGES[4]) == DRIVE and coefficients.widening == 1.25
+    without = replace(coefficients, drive=None).drive_doubt_of(RANGES[4])
+    assert without == "To drives the verdict has not been fitted."
     other = coefficients.doubt_of(RANGES[3])
     assert isinstance(other, str) and "end with the stage of ±1°/0.1 m" in other
 

@@ -2,27 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.judging.doubt import Doubt
 from calibnet.judging.drive import judge_drive
-from calibnet.trace import DriveEstimate
+from calibnet.judging.drive_witnesses import apart, drive_witnesses
+from calibnet.trace import DriveEstimate, DriveLook
 from calibnet.verdict import BadFrame
 from tests.support.boxes import REFERENCE
 
-DOUBT = Doubt(0.0, {}, 0.6, 0.8)
+DOUBT = Doubt(-1.0, {"match_error": 2.0}, 0.6, 0.8)
+"""Accepts match errors of less than 2 px, and rejects from 3.3 px on."""
 
 
 def estimate(
-    yaw: float = 0.0, ahead: float = 0.0, degrees: float = 0.1, centimetres: float = 3.0, bad: int = 0
+    yaw: float = 0.0,
+    ahead: float = 0.0,
+    degrees: float = 0.1,
+    centimetres: float = 3.0,
+    bad: int = 0,
+    error: float = 1.5,
+    halves: float = 0.0,
 ) -> DriveEstimate:
     """Of ten frames: where it lies from the reference, and its standard deviation an axis."""
     sigma = [centimetres / 100] * 3 + [float(np.radians(degrees))] * 3
     skipped = tuple(BadFrame(frame, "It is cut short.") for frame in range(bad))
+    looks = tuple(
+        DriveLook(frame, frame, np.array([0, 0, halves / 100 * (frame > 4), 0, 0, 0]), None, error, 0.01, 0.009)
+        for frame in range(10)
+    )
     there = miscalibration([0, 0, yaw], [0, 0, ahead]) @ REFERENCE
-    return DriveEstimate(there, np.diag(np.square(sigma)), 10 - bad, skipped=skipped)
+    return DriveEstimate(there, np.diag(np.square(sigma)), 10 - bad, skipped=skipped, looks=looks, looked_from=there)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +48,9 @@ def estimate(
         (estimate(ahead=-0.7), "rejected", "It lies 0° and 70 cm from the start"),
         (estimate(degrees=0.2), "cannot tell", "leave it open to 0.35° and 5 cm"),  # 0.2 on each of three axes
         (estimate(centimetres=8.0), "cannot tell", "leave it open to 0.17° and 14 cm"),
+        (estimate(error=2.5), "cannot tell", "10 frames agree, but not as those of drives that end right do"),
+        (estimate(error=4.0), "rejected", "(that it is more than 0.3° or 8 cm off is 85% likely)."),
+        (estimate(error=2.5, halves=40), "cannot tell", "likely); its halves are 40 cm apart."),
         (estimate(bad=4), "accepted", "6 frames agree."),
         (estimate(bad=5), "rejected", "Only 5 of 10 frames could be used. It is cut short."),
     ],
@@ -51,3 +68,17 @@ def test_by_no_coefficients_no_drive_is_accepted() -> None:
     assert verdict.word == "cannot tell"
     assert verdict.reason == "10 frames agree, but how sure that is cannot be told. Nothing was fitted."
     assert judge_drive(estimate(yaw=6.1), REFERENCE, RANGES[2], "Nothing was fitted.").word == "rejected"
+
+
+def test_witnesses_of_a_drive() -> None:
+    found = drive_witnesses(estimate(yaw=2.5, halves=24), REFERENCE, RANGES[2])
+    assert found is not None
+    expected = {
+        "match_error": np.log(1.5), "misfit": np.log(0.01), "lens": np.log(0.9), "stated": np.log(3 * np.sqrt(3)),
+        "scatter": np.log(12), "halves": np.log(24), "aligned": np.log(1e-6), "reach": 0.5, "frames": -np.log(10),
+    }  # fmt: skip
+    assert vars(found) == pytest.approx(expected, abs=1e-6)
+    assert apart(np.zeros(6), np.array([0, 0, 0, 0, np.radians(0.3), 0])) == pytest.approx(8.0)
+    lone = replace(estimate(), looks=estimate().looks[:1])
+    assert drive_witnesses(lone, REFERENCE, RANGES[2]) is None
+    assert judge_drive(lone, REFERENCE, RANGES[2], DOUBT).word == "cannot tell"

@@ -108,4 +108,4 @@ def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_doubt_wh
     good = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), -0.02, np.log(0.3), 0.6, 0.3, 0.1)
     bad = Witnesses(1.6, 1.6, -3.5, -0.2, np.log(0.9), 1.1, 1.2, 1.0)
     assert doubt(good) < doubt.accepted_below < doubt(bad)
-    assert coefficients.fitted["false_accept_rate"] <= 0.01
+    assert coefficients.fitted["frames"]["false_accept_rate"] <= 0.01

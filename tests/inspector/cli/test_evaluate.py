@@ -48,7 +48,7 @@ class KnownCascade:
         ]
         return CascadeTrace(initial, tuple(stages))
 
-    def explain(self, frame: Frame, initial: Transform) -> Verdict:
+    def explain(self, frame: Frame, initial: Transform, lags: object = None) -> Verdict:
         """Rejects everything, and takes everything for a mirrored picture."""
         mirrored = Cause("mirrored", "The picture is mirrored.", "so a test wants it")
         return Verdict("rejected", "It does not fit.", self.calibrate(frame, initial).arrived, causes=(mirrored,))

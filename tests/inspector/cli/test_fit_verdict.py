@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import RANGES
 from calibnet.judging.coefficients import load_coefficients
 from calibnet.judging.covariance import Spread
+from calibnet.judging.drive_witnesses import DriveWitnesses
 from calibnet.weights.manifest import load_manifest
 from inspector.cli.errors import run
 from inspector.cli.main import cli
@@ -23,9 +25,17 @@ class Known:
 
     made = 0
 
+    def __init__(self, drives: bool) -> None:
+        self.drives, self.runs = drives, runs(300, Spread(), seed=1)
+
     def run(self, number: int) -> VerdictRun:
         Known.made += 1
-        return runs(number + 1, Spread(), seed=1)[number]
+        made = self.runs[number]
+        if not self.drives:
+            return made
+        assert made.witnesses is not None
+        said = {one.name: 0.0 for one in fields(DriveWitnesses)} | {"match_error": made.witnesses["match_error"]}
+        return replace(made, witnesses=said, match_error_px=float("nan"))
 
 
 @pytest.fixture
@@ -33,7 +43,7 @@ def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Files that stand for the stages' weights, and runs in no time."""
     for stage in load_manifest("compact").stages:
         (tmp_path / stage.file).write_bytes(stage.file.encode())
-    monkeypatch.setattr(verdict_log.Source, "open", lambda source: Known())
+    monkeypatch.setattr(verdict_log.Source, "open", lambda source: Known(source.drives))
     return tmp_path
 
 
@@ -42,13 +52,15 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
     Known.made = 0
     result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
     assert result.exit_code == 0 and result.stdout.strip() == str(weights / "compact-verdict.toml")
-    assert "300 runs on 7 sequences, 150 of them without a fault" in result.stderr
+    assert "300 runs of frames on 7 sequences.\n150 of them have no fault" in result.stderr
     coefficients = load_coefficients(load_manifest("compact", weights), weights)
     assert coefficients.missing == "" and coefficients.fitted["seed"] == 0
-    assert set(coefficients.weights) == set(RANGES[2:]) and coefficients.fitted["false_accept_rate"] == 0.01
+    assert set(coefficients.weights) == set(RANGES[2:]) and coefficients.fitted["frames"]["false_accept_rate"] == 0.01
+    assert coefficients.drive is not None and coefficients.drive.weights["match_error"] > 1
+    assert "80 runs of drives on 7 sequences." in result.stderr
     before = (weights / "compact-verdict.toml").read_bytes()
     assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
-    assert Known.made == 300 and (weights / "compact-verdict.toml").read_bytes() == before
+    assert Known.made == 300 + 80 and (weights / "compact-verdict.toml").read_bytes() == before
     (weights / load_manifest("compact").file(RANGES[4])).write_bytes(b"trained on")
     assert load_coefficients(load_manifest("compact", weights), weights).doubt is None
 

@@ -50,7 +50,7 @@ class Cascade(FakeCascade):
         history = ((0, Estimate(REFERENCE, COVARIANCE, len(frames))),)
         return DriveEstimate(REFERENCE, COVARIANCE, len(frames), history, verdict=self.verdict(len(frames)))
 
-    def explain(self, frame: Any, initial: Any) -> Verdict:
+    def explain(self, frame: Any, initial: Any, lags: Any = None) -> Verdict:
         return replace(self.verdict(1), causes=self.causes_of_frames)
 
     def verdict(self, frames: int) -> Verdict:

@@ -1,0 +1,203 @@
+"""Did the mount move during a drive? Where what single frames say changes, by how much, and how sure that is.
+
+What frames say (`calibnet.trace.DriveLook`) scatters, and neighbours err alike, as they see the same things. So noise
+is measured twice: from frame to frame, and over blocks, whose means scatter more than those of independent errors.
+Changes are found by the segmentation of least squared error with a price for each change (PELT, of the library
+ruptures), or by a slope where that explains more, and then tested by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import ruptures
+from scipy.stats import chi2
+
+from calibnet.geometry.types import Floats, Matrix6, Vector6
+from calibnet.trace import DriveLook
+
+WINDOW = 20
+"""Frames of the windowed estimate."""
+SHORTEST = 8
+"""Frames between two changes, and before the first and after the last: fewer are an outlier rather than a mount."""
+BLOCK = 10
+"""Frames of the blocks over which errors that neighbours share are measured."""
+USUAL_EXCESS, USUAL_BLOCKS = 4.0, 4
+"""How many times larger than of independent errors the variance of a long mean is taken to be, and how many blocks that
+counts for against what the drive itself says; a short drive says little."""
+FALSE_ALARM = 1e-3
+"""Probability, a drive, of a change where there is none, if errors were as they are modelled."""
+OUTLIER = 3.0
+"""Standard deviations from its neighbours beyond which a frame counts no more than at that distance."""
+SMALLEST_DEG, SMALLEST_CM = 0.15, 5.0
+"""What is less, in rotation and in translation, is no change of the mount."""
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """A move of the mount.
+
+    Attributes:
+        frame: index of the first frame after it; of a drift the first frame of all.
+        offset: ``[6]``, ``(translation m, rotation rad)`` by which the extrinsic changes, in the camera frame.
+        confidence: probability that there is a change, by its own significance among all places where it could be.
+        until: index of the last frame of a drift, None for a step.
+    """
+
+    frame: int
+    offset: Vector6
+    confidence: float
+    until: int | None = None
+
+    @property
+    def rotation_deg(self) -> float:
+        """By what angle."""
+        return float(np.degrees(np.linalg.norm(self.offset[3:])))
+
+    @property
+    def translation_cm(self) -> float:
+        """How far."""
+        return float(100 * np.linalg.norm(self.offset[:3]))
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is large enough to be one of the mount."""
+        return self.rotation_deg >= SMALLEST_DEG or self.translation_cm >= SMALLEST_CM
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """What the frames of a drive say over time.
+
+    Attributes:
+        frames: ``[N]`` their indices.
+        offsets: ``[N, 6]`` what each says, ``(translation m, rotation rad)`` from the extrinsic of all.
+        windowed: ``[N, 6]`` mean of the frames around each.
+        sigma: ``[N, 6]`` standard deviation of that mean.
+        changes: in their order.
+        smallest: ``[6]`` standard deviations of the difference of two windows of frames: what can be told.
+    """
+
+    frames: Floats
+    offsets: Floats
+    windowed: Floats
+    sigma: Floats
+    changes: tuple[Change, ...]
+    smallest: Floats
+
+
+def watch(looks: Sequence[DriveLook]) -> Watch:
+    """Find the changes of a drive.
+
+    Args:
+        looks: what its frames say, in their order, all relative to one extrinsic; `SHORTEST` twice at least.
+
+    Raises:
+        ValueError: there are fewer.
+    """
+    if len(looks) < 2 * SHORTEST:
+        raise ValueError(f"{len(looks)} frames are too few to tell a change; {2 * SHORTEST} are needed.")
+    frames = np.array([look.frame for look in looks])
+    said = tempered(np.array([look.offset for look in looks]))
+    covariance = scatter(said)
+    whitener = np.linalg.inv(np.linalg.cholesky(covariance))
+    white = (said - said.mean(axis=0)) @ whitener.T
+    excess = long_run_excess(white)
+    changes = _changes(frames, said, white / math.sqrt(excess), covariance * excess)
+    half, count = WINDOW // 2, len(said)
+    counts = np.array([min(count, at + half) - max(0, at - half) for at in range(count)])
+    deviation = np.sqrt(np.diag(covariance) * excess)
+    return Watch(
+        frames,
+        said,
+        windowed(said),
+        deviation / np.sqrt(counts)[:, None],
+        changes,
+        deviation * math.sqrt(2 / WINDOW),
+    )
+
+
+def windowed(said: Floats) -> Floats:
+    """Means ``[N, 6]`` of the frames around each; fewer at the ends."""
+    half = WINDOW // 2
+    return np.array([said[max(0, position - half) : position + half].mean(axis=0) for position in range(len(said))])
+
+
+def tempered(said: Floats) -> Floats:
+    """What frames say ``[N, 6]``, with those that are far from all around them brought nearer."""
+    half = WINDOW // 2
+    around = np.array([np.median(said[max(0, at - half) : at + half + 1], axis=0) for at in range(len(said))])
+    away = said - around
+    most = OUTLIER * np.maximum(1.4826 * np.median(np.abs(away), axis=0), 1e-9)
+    return np.asarray(around + np.clip(away, -most, most))
+
+
+def scatter(said: Floats) -> Matrix6:
+    """Covariance ``[6, 6]`` of a single frame, by differences from the frame before, which no step moves."""
+    steps = np.diff(said, axis=0)
+    most = OUTLIER * np.maximum(1.4826 * np.median(np.abs(steps), axis=0), 1e-9)
+    kept = np.clip(steps, -most, most)
+    ridge = np.diag(np.repeat([1e-4, np.radians(1e-3)], 3) ** 2)
+    return np.asarray(kept.T @ kept / (2 * len(kept)) + ridge)
+
+
+def long_run_excess(white: Floats) -> float:
+    """How many times larger the variance of a mean of many frames is than of as many independent ones, at least 1.
+
+    Args:
+        white: ``[N, 6]`` what frames say, in standard deviations from frame to frame.
+    """
+    blocks = len(white) // BLOCK
+    usual = USUAL_EXCESS * USUAL_BLOCKS
+    if blocks < 2:
+        return USUAL_EXCESS
+    means = white[: blocks * BLOCK].reshape(blocks, BLOCK, -1).mean(axis=1)
+    steps = np.diff(means, axis=0) ** 2
+    # the median of chi-square with one degree of freedom is 0.455; a few steps of the mount do not move the median
+    measured = BLOCK * np.median(steps, axis=0) / 2 / 0.455
+    return max(1.0, float((usual + len(steps) * measured.mean()) / (USUAL_BLOCKS + len(steps))))
+
+
+def _changes(frames: Floats, said: Floats, white: Floats, covariance: Matrix6) -> tuple[Change, ...]:
+    """Steps, or a drift, that are significant and matter.
+
+    Args:
+        frames: ``[N]`` indices.
+        said: ``[N, 6]``.
+        white: ``[N, 6]`` the same, with the variance of long means 1.
+        covariance: ``[6, 6]`` of a frame, as long means have it.
+    """
+    count = len(said)
+    level = math.log(count / FALSE_ALARM)
+    price = 6 + 2 * math.sqrt(6 * level) + 2 * level  # of chi-square with six degrees of freedom, at that level
+    ends = ruptures.KernelCPD(kernel="linear", min_size=SHORTEST).fit(white).predict(pen=price)
+    borders = [0, *ends]
+    stepped = sum(_squares(white[a:b]) for a, b in pairwise(borders)) + price * (len(ends) - 1)
+    time = np.linspace(-0.5, 0.5, count)
+    slope = time @ white / (time @ time)
+    sloped = _squares(white - time[:, None] * slope) + price
+    if sloped < min(stepped, _squares(white)):
+        found = time @ said / (time @ time)
+        certain = _confidence(found, covariance / (time @ time), 1)
+        drift = Change(int(frames[0]), found, certain, int(frames[-1]))
+        return (drift,) if drift.matters and certain > 1 - FALSE_ALARM else ()
+    changes = []
+    for before, at, after in zip(borders, borders[1:], borders[2:], strict=False):
+        moved = said[at:after].mean(axis=0) - said[before:at].mean(axis=0)
+        certain = _confidence(moved, covariance * (1 / (at - before) + 1 / (after - at)), count)
+        changes.append(Change(int(frames[at]), moved, certain))
+    return tuple(change for change in changes if change.matters and change.confidence > 1 - FALSE_ALARM)
+
+
+def _squares(white: Floats) -> float:
+    return float(((white - white.mean(axis=0)) ** 2).sum())
+
+
+def _confidence(moved: Vector6, covariance: Matrix6, places: int) -> float:
+    """That a move is none of chance, at any of so many places."""
+    square = float(moved @ np.linalg.solve(covariance, moved))
+    return max(0.0, 1.0 - places * float(chi2.sf(square, 6)))

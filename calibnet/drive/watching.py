@@ -1,0 +1,190 @@
+"""Watching a drive: what its frames say, also where the mount moves so far that no one extrinsic fits them all."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.drive.changes import SHORTEST, Watch, watch
+from calibnet.errors import CalibrationError, DatasetError
+from calibnet.geometry import RANGES
+from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import DriveCalibrator
+from calibnet.trace import DriveEstimate, DriveLook
+from calibnet.verdict import BadFrame
+
+FEWEST = 2 * SHORTEST
+"""Frames that a drive needs to be watched."""
+TRUSTED = 0.6
+"""Share of the finest stage's range up to which one look from the extrinsic of all frames says how far off one is."""
+BLIND_DEG, BLIND_CM = 1.0, 50.0
+"""A change that cannot be told: if two windows of frames differ by so much by chance (three standard deviations)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """A drive that was watched.
+
+    Attributes:
+        camera_from_lidar: that what frames say is relative to, 4x4; None where none could be found.
+        watch: what they say over time; None where nobody can tell.
+        reason: why nobody can tell; empty otherwise.
+        used: how many frames say something.
+        skipped: those that could not be read, or fit nothing.
+    """
+
+    camera_from_lidar: Extrinsic | None
+    watch: Watch | None
+    reason: str
+    used: int
+    skipped: tuple[BadFrame, ...] = ()
+
+
+class Part:
+    """Some frames of a drive, from one position to before another."""
+
+    def __init__(self, frames: Frames, start: int, stop: int) -> None:
+        self.frames, self.start, self.stop = frames, start, stop
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def __getitem__(self, position: int, /) -> Frame:
+        """Read one frame."""
+        return self.frames[self.start + position]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A part, and what its frames agree on."""
+
+    part: Part
+    estimate: DriveEstimate
+
+    @property
+    def origin(self) -> Extrinsic:
+        """That its looks are relative to."""
+        looked_from = self.estimate.looked_from
+        return self.estimate.camera_from_lidar if looked_from is None else looked_from
+
+    def relative_to(self, origin: Extrinsic) -> list[DriveLook]:
+        """What its frames say, relative to another extrinsic, at their positions in the whole drive."""
+        base = self.origin @ invert(origin)
+        return [
+            replace(
+                look,
+                position=self.part.start + look.position,
+                offset=pose_vector(pose_from_vector(look.offset) @ base),
+            )
+            for look in self.estimate.looks
+        ]
+
+
+def watch_drive(
+    calibrator: DriveCalibrator,
+    frames: Frames,
+    initial: Extrinsic,
+    observer: Callable[[int, int], None] | None = None,
+) -> Watched:
+    """Find out whether the mount moved during a drive.
+
+    The drive is solved as one. Parts on which that fails, and parts that turn out to be far from the rest, are solved
+    by themselves, so that also moves beyond the range of the last stage are measured.
+
+    Args:
+        calibrator: that solves drives and says what each frame says.
+        frames: in the order in which they were taken.
+        initial: ``camera_from_lidar`` to start from.
+        observer: as `calibnet.drive.solve.solve_drive` has it, of one part after the other.
+    """
+    if len(frames) < FEWEST:
+        return Watched(None, None, f"{len(frames)} frames are too few to tell a change; {FEWEST} are needed.", 0)
+    parts = solved_parts(calibrator, Part(frames, 0, len(frames)), initial, observer)
+    if not parts:
+        return Watched(None, None, "Picture and scan fit nowhere in the drive.", 0)
+    origin = max(parts, key=lambda part: part.estimate.frames).origin
+    looks = {look.position: look for part in parts for look in part.relative_to(origin)}
+    again = far_parts(calibrator, frames, looks, origin, observer)
+    looks |= {look.position: look for part in again for look in part.relative_to(origin)}
+    in_order = [looks[position] for position in sorted(looks)]
+    known = {look.frame for look in in_order}
+    missing = tuple(bad for part in parts for bad in part.estimate.skipped if bad.frame not in known)
+    if len(in_order) < max(FEWEST, (len(frames) + 1) // 2):
+        reason = f"Only {len(in_order)} of {len(frames)} frames fit or can be read."
+        return Watched(origin, None, reason, len(in_order), missing)
+    found = watch(in_order)
+    blind = 3 * found.smallest
+    turn, shift = float(np.degrees(np.linalg.norm(blind[3:]))), float(100 * np.linalg.norm(blind[:3]))
+    if not found.changes and (turn > BLIND_DEG or shift > BLIND_CM):
+        reason = f"Frames scatter so much that a move of {turn:.1f}° or {shift:.0f} cm could not be told."
+        return Watched(origin, found, reason, len(in_order), missing)
+    return Watched(origin, found, "", len(in_order), missing)
+
+
+def solved_parts(
+    calibrator: DriveCalibrator, part: Part, initial: Extrinsic, observer: Callable[[int, int], None] | None
+) -> list[Solved]:
+    """A drive as one, or its halves where half of its frames or more do not fit together, down to `SHORTEST` frames."""
+    try:
+        solved = Solved(part, calibrator.calibrate_drive(part, initial, observer))
+        if 2 * solved.estimate.frames > len(part) or len(part) < FEWEST:
+            return [solved]
+    except (CalibrationError, DatasetError):
+        if len(part) < FEWEST:
+            return []
+    middle = (part.start + part.stop) // 2
+    halves = (Part(part.frames, part.start, middle), Part(part.frames, middle, part.stop))
+    return [found for half in halves for found in solved_parts(calibrator, half, initial, observer)]
+
+
+def far_parts(
+    calibrator: DriveCalibrator,
+    frames: Frames,
+    looks: dict[int, DriveLook],
+    origin: Extrinsic,
+    observer: Callable[[int, int], None] | None,
+) -> list[Solved]:
+    """Parts between changes that lie far from the extrinsic of all, or do not fit there, solved by themselves.
+
+    Args:
+        calibrator: that solves them.
+        frames: of the drive.
+        looks: what they say so far, by position.
+        origin: that this is relative to.
+        observer: as `watch_drive` has it.
+    """
+    if len(looks) < FEWEST:
+        return []
+    places = {look.frame: position for position, look in looks.items()}
+    found = watch([looks[position] for position in sorted(looks)])
+    borders = {0, len(frames), *(places[change.frame] for change in found.changes if change.until is None)}
+    for lost in runs([position for position in range(len(frames)) if position not in looks]):
+        borders |= set(lost) if lost[1] - lost[0] >= SHORTEST else set()
+    solved = []
+    for start, stop in pairwise(sorted(borders)):
+        said = [looks[position].offset for position in range(start, stop) if position in looks]
+        middle = pose_from_vector(np.median(said, axis=0)) if said else np.eye(4)
+        near = RANGES[-1].contains(middle, TRUSTED) and 2 * len(said) >= stop - start
+        if near or stop - start < SHORTEST:
+            continue
+        part = Part(frames, start, stop)
+        with contextlib.suppress(CalibrationError, DatasetError):  # what fits nowhere stays skipped
+            solved.append(Solved(part, calibrator.calibrate_drive(part, middle @ origin, observer)))
+    return solved
+
+
+def runs(positions: list[int]) -> list[tuple[int, int]]:
+    """Unbroken runs of sorted positions, each from its first to before its end."""
+    found: list[tuple[int, int]] = []
+    for position in positions:
+        if found and found[-1][1] == position:
+            found[-1] = (found[-1][0], position + 1)
+        else:
+            found.append((position, position + 1))
+    return found

@@ -1,0 +1,73 @@
+"""Are stated covariances as large as the errors? By the squared error, and by how many lie within the 95 % region."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from calibnet.geometry.se3 import invert, pose_vector
+from calibnet.geometry.types import Extrinsic, Matrix6
+
+FREEDOM = 6
+WITHIN_95 = 12.592
+"""95 % quantile of chi-square with six degrees of freedom."""
+MEDIAN = 5.348
+"""Its median."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """How stated covariances compare with errors.
+
+    Attributes:
+        runs: how many state one.
+        squared: mean squared error by the covariance, a degree of freedom: 1 where it is right about itself, more
+            where errors are larger than stated.
+        squared_error: standard error of that.
+        median: median of the same, relative to that of chi-square: what single gross errors do not move.
+        within: share within the 95 % region.
+        within_error: standard error of that.
+    """
+
+    runs: int
+    squared: float
+    squared_error: float
+    median: float
+    within: float
+    within_error: float
+
+    @classmethod
+    def of(cls, squares: Iterable[float]) -> Coverage | None:
+        """Of squared errors by the covariance, see `squared_error`; None where no run states one."""
+        known = np.array([square for square in squares if np.isfinite(square)])
+        if not len(known):
+            return None
+        within = float((known < WITHIN_95).mean())
+        return cls(
+            len(known),
+            float(known.mean() / FREEDOM),
+            float(known.std(ddof=1) / FREEDOM / np.sqrt(len(known))) if len(known) > 1 else float("nan"),
+            float(np.median(known) / MEDIAN),
+            within,
+            float(np.sqrt(max(within * (1 - within), 0.05 * 0.95) / len(known))),
+        )
+
+    def __str__(self) -> str:
+        return (
+            f"squared error {self.squared:.2f} ± {self.squared_error:.2f} a degree of freedom (in the median "
+            f"{self.median:.2f}), {self.within:.0%} ± {self.within_error:.0%} within the 95 % region, {self.runs} runs"
+        )
+
+    def as_dict(self) -> dict[str, float | None]:
+        """The form that JSON files hold; what one run alone does not tell is null."""
+        return {name: value if np.isfinite(value) else None for name, value in asdict(self).items()}
+
+
+def squared_error(found: Extrinsic, truth: Extrinsic, covariance: Matrix6 | None) -> float:
+    """The squared error of an extrinsic by its covariance; not a number without one."""
+    if covariance is None:
+        return float("nan")
+    offset = pose_vector(found @ invert(truth))
+    return float(offset @ np.linalg.solve(covariance, offset))

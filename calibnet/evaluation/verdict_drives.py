@@ -1,0 +1,134 @@
+"""Drives to fit the verdict on drives to: plain ones, ones with one fault in all frames, and ones on two mounts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from functools import lru_cache
+
+import numpy as np
+
+from calibnet.cascade import Cascade
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Sequence as FrameSequence
+from calibnet.datasets.selection import spread
+from calibnet.errors import CalibnetError, DatasetError
+from calibnet.evaluation.battery import PLAIN
+from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
+from calibnet.evaluation.drives import shares_mount
+from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking, within
+from calibnet.geometry import invert, pose_error, sample_miscalibration
+from calibnet.geometry.se3 import pose_vector
+from calibnet.judging.drive_witnesses import drive_witnesses
+from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
+
+FRAMES = 6
+"""Of a drive, at most: more take longer, and say little more of what all of them get wrong."""
+
+
+class Faulty:
+    """A drive with a fault in its frames; what the fault needs that a frame lacks makes the frame unreadable."""
+
+    def __init__(
+        self, sequence: FrameSequence, positions: list[int], fault: Corruption | None, donors: list[Frame]
+    ) -> None:
+        self.sequence, self.positions, self.fault, self.donors = sequence, positions, fault, donors
+        self.read = lru_cache(len(positions))(self._read)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, number: int) -> Frame:
+        """The frame of this number, with the fault."""
+        return self.read(number)
+
+    def _read(self, number: int) -> Frame:
+        position = self.positions[number]
+        frame = self.sequence[position]
+        if self.fault is None:
+            return frame
+        for fault in self._faults(number):
+            if (fault.name, fault.strength) == (self.fault.name, self.fault.strength):
+                return fault.alter(frame)
+        raise DatasetError(f"Frame {position} of {self.sequence.name} cannot have the fault {self.fault.name}.")
+
+    def _faults(self, number: int) -> Iterable[Corruption]:
+        yield from corruptions(self.sequence, self.positions[number], self.donors)
+        yield from two_mounts(second=2 * number >= len(self.positions))
+
+
+class DriveStream:
+    """The runs on some drives with a cascade, by number, as `calibnet.evaluation.verdict_runs.RunStream` has frames."""
+
+    def __init__(self, cascade: Cascade, sequences: Iterable[FrameSequence], seed: int) -> None:
+        """A run is one of these sequences, every one as often as the others; those that are no drive are left out."""
+        self.cascade, self.seed = asking(cascade), seed
+        self.sequences = [sequence for sequence in sequences if shares_mount(sequence)]
+
+    def run(self, number: int) -> VerdictRun | None:
+        """The run of this number; None where it cannot be made."""
+        generator = np.random.default_rng([self.seed, number, 1])
+        if not self.sequences:
+            return None
+        which = int(generator.integers(len(self.sequences)))
+        sequence = self.sequences[which]
+        positions = spread(len(sequence), FRAMES)
+        fault = PLAIN if generator.random() < PLAIN_SHARE else self._fault(which, generator)
+        donor = self.sequences[(which + 1) % len(self.sequences)]
+        try:
+            drive = Faulty(sequence, positions, None if fault is PLAIN else fault, [donor[0]])
+            searched = self.cascade.stages[0].range
+            guess = sample_miscalibration(searched, generator) @ sequence[positions[0]].camera_from_lidar
+            return measured(self.cascade, drive, guess, number, sequence.name, fault)
+        except CalibnetError:
+            return None
+
+    def _fault(self, which: int, generator: np.random.Generator) -> Corruption:
+        """Any fault that a drive can have, each name as often as the others; the far start belongs to frames."""
+        sequence = self.sequences[which]
+        named: dict[str, list[Corruption]] = {}
+        for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
+            if fault.farther == 1:
+                named.setdefault(fault.name, []).append(fault)
+        strengths = named[str(generator.choice(list(named)))]
+        return strengths[int(generator.integers(len(strengths)))]
+
+
+def measured(
+    cascade: Cascade, drive: Faulty, guess: np.ndarray, number: int, sequence: str, fault: Corruption
+) -> VerdictRun | None:
+    """Solve a drive, and note what witnesses say of it; its error is that against its farthest frame.
+
+    Raises:
+        CalibrationError: no frame could be calibrated.
+    """
+    estimate = cascade.calibrate_drive(drive, guess)
+    there = estimate.camera_from_lidar
+    truths = {frame.camera_from_lidar.tobytes(): frame.camera_from_lidar for frame in readable(drive)}
+    errors = [pose_error(there, truth) for truth in truths.values()]
+    error = max(errors, key=lambda error: error.translation_cm / DRIVE_LIMITS[1] + error.rotation_deg / DRIVE_LIMITS[0])
+    found = drive_witnesses(estimate, guess, cascade.stages[0].range)
+    asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
+    return VerdictRun(
+        number,
+        sequence,
+        estimate.frames,
+        fault.name,
+        fault.strength,
+        error.rotation_deg,
+        error.translation_cm,
+        within(error, DRIVE_LIMITS),
+        asdict(found) if asked and found is not None else None,
+        pose_vector(there @ invert(next(iter(truths.values())))).tolist(),
+        np.linalg.inv(estimate.covariance).tolist(),
+        float("nan"),
+    )
+
+
+def readable(drive: Faulty) -> Iterable[Frame]:
+    """The frames that can be read."""
+    for number in range(len(drive)):
+        try:
+            yield drive[number]
+        except DatasetError:
+            continue

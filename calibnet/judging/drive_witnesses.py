@@ -1,0 +1,94 @@
+"""What tells right from wrong of a drive: what its frames say together, and whether they say the same."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibnet.geometry import MiscalibrationRange, invert, pose_error
+from calibnet.geometry.se3 import pose_from_vector
+from calibnet.geometry.types import Extrinsic, Vector6
+from calibnet.judging.witnesses import LEAST, reach
+from calibnet.trace import DriveEstimate, DriveLook
+
+DEGREES_A_CENTIMETRE = 0.3 / 8
+"""Degrees that count as much as a centimetre: as in what a drive may be off."""
+FEWEST = 2
+"""Frames that can agree."""
+
+
+@dataclass(frozen=True)
+class DriveWitnesses:
+    """Numbers that grow with what speaks against a drive's extrinsic; not a number where it does not tell.
+
+    Attributes:
+        match_error: logarithm of the median match error of the last look, in pixels.
+        misfit: logarithm of the frames' median misfit.
+        lens: median logarithm of the cost of frames' matches with another lens, relative to that with the pose alone.
+        stated: logarithm of the deviation of the translation, in centimetres, on which the frames agree.
+        scatter: logarithm of how far a frame is from what all say, in centimetres, in the median.
+        halves: logarithm of how far the first half of the drive is from the second.
+        aligned: logarithm of how far the alignment of edges went from what the networks say.
+        reach: how far it is from the start, in ranges searched.
+        frames: minus the logarithm of their number.
+    """
+
+    match_error: float
+    misfit: float
+    lens: float
+    stated: float
+    scatter: float
+    halves: float
+    aligned: float
+    reach: float
+    frames: float
+
+
+def drive_witnesses(
+    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange
+) -> DriveWitnesses | None:
+    """The witnesses of a drive; None where a method tells nothing of its frames, or there are too few of them.
+
+    Args:
+        estimate: of the drive.
+        initial: ``camera_from_lidar`` that it started from.
+        searched: the range that was searched around it.
+    """
+    looks = estimate.looks
+    if len(looks) < FEWEST:
+        return None
+    networks, middle = estimate.networks or estimate, len(looks) // 2
+    whole = agreed(looks)
+    lens = [math.log(max(min(look.bent_misfit, look.misfit), LEAST) / max(look.misfit, LEAST)) for look in looks]
+    return DriveWitnesses(
+        match_error=_log(np.median([look.match_error_px for look in looks])),
+        misfit=_log(np.median([look.misfit for look in looks])),
+        lens=float(np.median(lens)),
+        stated=_log(networks.translation_cm),
+        scatter=_log(np.median([apart(look.offset, whole) for look in looks])),
+        halves=_log(apart(agreed(looks[:middle]), agreed(looks[middle:]))),
+        aligned=_log(_distance(networks.camera_from_lidar, estimate.camera_from_lidar)),
+        reach=reach(initial, estimate.camera_from_lidar, searched).share,
+        frames=-math.log(len(looks)),
+    )
+
+
+def agreed(looks: tuple[DriveLook, ...]) -> Vector6:
+    """What frames say in the median, axis by axis."""
+    return np.asarray(np.median([look.offset for look in looks], axis=0), np.float64)
+
+
+def apart(one: Vector6, other: Vector6) -> float:
+    """How far two offsets are from each other, in centimetres; a turn counts as in what a drive may be off."""
+    return _distance(pose_from_vector(one), pose_from_vector(other))
+
+
+def _distance(one: Extrinsic, other: Extrinsic) -> float:
+    error = pose_error(one @ invert(other), np.eye(4))
+    return max(error.translation_cm, error.rotation_deg / DEGREES_A_CENTIMETRE)
+
+
+def _log(value: float | np.floating) -> float:
+    return math.log(max(float(value), LEAST))

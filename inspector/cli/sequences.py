@@ -1,0 +1,78 @@
+"""The subcommands ``seq|raw|object|folder`` of groups that say something of a sequence, such as `verify`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from inspector.cli.inspect import (
+    FOLDER_ONLY,
+    camera_option,
+    folder_options,
+    open_folder,
+    open_object,
+    open_odometry,
+    open_raw,
+    root_option,
+    split_option,
+)
+from inspector.cli.options import FOLDER
+from inspector.cli.output import JSON_FILE
+from inspector.cli.run import run_options
+
+
+def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
+    """Give a group its four subcommands, with all options of a calibration run and ``--json``.
+
+    Args:
+        group: that they belong to.
+        act: called with what opens the sequence, and the options; returns the exit code.
+    """
+
+    def options(command: Callable[..., Any]) -> Callable[..., Any]:
+        json_option = click.option(
+            "--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The result as JSON; - for stdout."
+        )
+        return json_option(run_options(command))
+
+    @group.command()
+    @click.argument("sequence")
+    @root_option
+    @camera_option
+    @options
+    def seq(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
+        """Of a KITTI odometry sequence, for instance 04."""
+        return act(lambda: open_odometry(sequence, root, camera), camera=camera, **asked)
+
+    @group.command()
+    @click.argument("date")
+    @click.argument("number", metavar="DRIVE")
+    @root_option
+    @camera_option
+    @options
+    def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) -> int:
+        """Of a KITTI raw drive, for instance 2011_09_26 0005."""
+        return act(lambda: open_raw(date, number, root, camera), camera=camera, **asked)
+
+    @group.command("object")
+    @split_option
+    @root_option
+    @camera_option
+    @options
+    def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
+        """Of the KITTI object detection frames, which are of one calibration only where they are of one day."""
+        return act(lambda: open_object(split, root, camera), camera=camera, **asked)
+
+    @group.command()
+    @click.argument("directory", type=FOLDER)
+    @folder_options
+    @options
+    def folder(directory: Path, dataset: str, **asked: Any) -> int:
+        """Of a folder with images/, clouds/ and calibration.yaml."""
+        of_folder = {**asked}
+        for name in FOLDER_ONLY:
+            del asked[name]
+        return act(lambda: open_folder(directory, dataset, of_folder), **asked)

@@ -1,0 +1,79 @@
+"""``calib-inspect watch seq|raw|object|folder``: whether the mount moved during a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from inspector.cli.errors import ExitCode
+from inspector.cli.inspect import disturbed
+from inspector.cli.output import prepare_json, say, write_json
+from inspector.cli.run import checked, choose_outputs, prepare, recording_to
+from inspector.cli.sequences import over_sequences
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+    from inspector.cli.viewing import Viewing
+
+
+@click.group()
+def watch() -> None:
+    """Say whether the mount moved during a drive.
+
+    Starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), lets every
+    frame say where the extrinsic is, and finds steps and slow drift. It needs 16 frames at least, in the order in
+    which they were taken.
+
+    One sentence a change, with its frame, size and confidence; exits with 0 for no change, 1 for changed, 4 for cannot
+    tell. With --save, --serve or --connect a recording shows the estimate over the drive, with its band.
+    """
+
+
+def watch_sequence(
+    opening: Callable[[], Sequence], *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
+) -> int:
+    """Watch a sequence; returns the exit code.
+
+    Args:
+        opening: opens the sequence.
+        json_file: where the result goes as JSON.
+        viewing: where the recording is shown and kept, if anywhere.
+        report: not made here.
+        **asked: fields of `RunOptions`.
+    """
+    if asked["per_frame"]:
+        raise click.UsageError("watch looks for moves of the mount; --per-frame moves it in every frame.")
+    if report is not None:
+        raise click.UsageError("watch makes no report; keep its recording with --save FILE.rrd.")
+    prepare_json(json_file)
+    from inspector.record.outputs import Outputs
+    from inspector.run.watching import CANNOT_TELL, CHANGED, as_json, sentences, watch_session, word
+
+    options = checked(opening(), {**asked, "as_is": not disturbed(asked), "drive": True})
+    record = bool(viewing.save or viewing.serve or viewing.connect)
+    outputs = choose_outputs(options, replace(viewing, headless=True), None) if record else Outputs()
+    with recording_to(outputs):
+        session = prepare(options, outputs, verify=True)
+        watched = watch_session(session)
+        lines = list(sentences(watched))
+        if record:
+            from inspector.record.watch import record_watch
+
+            title = f"{options.title}, watched"
+            record_watch(outputs.open(), title, session.description.recording_id + "-watch", watched.watch, lines)
+            outputs.complete()
+        write_json(json_file, as_json(watched))
+        for line in lines:
+            say(line, err=json_file == "-")
+        if outputs.page is not None:
+            say(f"Serving at {outputs.page} until Ctrl-C.", err=json_file == "-")
+            outputs.wait_while_serving()
+    codes = {CHANGED: ExitCode.CHECK_FAILED, CANNOT_TELL: ExitCode.CANNOT_TELL}
+    return codes.get(word(watched), ExitCode.OK)
+
+
+over_sequences(watch, watch_sequence)
