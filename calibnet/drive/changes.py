@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -19,9 +18,8 @@ from scipy.stats import chi2
 
 from calibnet.geometry.types import Floats, Matrix6, Vector6
 from calibnet.trace import DriveLook
+from calibnet.watch import WINDOW, Change, Watch
 
-WINDOW = 20
-"""Frames of the windowed estimate."""
 SHORTEST = 8
 """Frames between two changes, and before the first and after the last: fewer are an outlier rather than a mount."""
 BLOCK = 10
@@ -33,61 +31,6 @@ FALSE_ALARM = 1e-3
 """Probability, a drive, of a change where there is none, if errors were as they are modelled."""
 OUTLIER = 3.0
 """Standard deviations from its neighbours beyond which a frame counts no more than at that distance."""
-SMALLEST_DEG, SMALLEST_CM = 0.15, 5.0
-"""What is less, in rotation and in translation, is no change of the mount."""
-
-
-@dataclass(frozen=True, eq=False)
-class Change:
-    """A move of the mount.
-
-    Attributes:
-        frame: index of the first frame after it; of a drift the first frame of all.
-        offset: ``[6]``, ``(translation m, rotation rad)`` by which the extrinsic changes, in the camera frame.
-        confidence: probability that there is a change, by its own significance among all places where it could be.
-        until: index of the last frame of a drift, None for a step.
-    """
-
-    frame: int
-    offset: Vector6
-    confidence: float
-    until: int | None = None
-
-    @property
-    def rotation_deg(self) -> float:
-        """By what angle."""
-        return float(np.degrees(np.linalg.norm(self.offset[3:])))
-
-    @property
-    def translation_cm(self) -> float:
-        """How far."""
-        return float(100 * np.linalg.norm(self.offset[:3]))
-
-    @property
-    def matters(self) -> bool:
-        """Whether it is large enough to be one of the mount."""
-        return self.rotation_deg >= SMALLEST_DEG or self.translation_cm >= SMALLEST_CM
-
-
-@dataclass(frozen=True, eq=False)
-class Watch:
-    """What the frames of a drive say over time.
-
-    Attributes:
-        frames: ``[N]`` their indices.
-        offsets: ``[N, 6]`` what each says, ``(translation m, rotation rad)`` from the extrinsic of all.
-        windowed: ``[N, 6]`` mean of the frames around each.
-        sigma: ``[N, 6]`` standard deviation of that mean.
-        changes: in their order.
-        smallest: ``[6]`` standard deviations of the difference of two windows of frames: what can be told.
-    """
-
-    frames: Floats
-    offsets: Floats
-    windowed: Floats
-    sigma: Floats
-    changes: tuple[Change, ...]
-    smallest: Floats
 
 
 def watch(looks: Sequence[DriveLook]) -> Watch:

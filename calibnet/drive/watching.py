@@ -10,14 +10,14 @@ from itertools import pairwise
 import numpy as np
 
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.drive.changes import SHORTEST, Watch, watch
+from calibnet.drive.changes import SHORTEST, watch
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.trace import DriveEstimate, DriveLook
-from calibnet.verdict import BadFrame
+from calibnet.watch import Watched
 
 FEWEST = 2 * SHORTEST
 """Frames that a drive needs to be watched."""
@@ -25,25 +25,6 @@ TRUSTED = 0.6
 """Share of the finest stage's range up to which one look from the extrinsic of all frames says how far off one is."""
 BLIND_DEG, BLIND_CM = 1.0, 50.0
 """A change that cannot be told: if two windows of frames differ by so much by chance (three standard deviations)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """A drive that was watched.
-
-    Attributes:
-        camera_from_lidar: that what frames say is relative to, 4x4; None where none could be found.
-        watch: what they say over time; None where nobody can tell.
-        reason: why nobody can tell; empty otherwise.
-        used: how many frames say something.
-        skipped: those that could not be read, or fit nothing.
-    """
-
-    camera_from_lidar: Extrinsic | None
-    watch: Watch | None
-    reason: str
-    used: int
-    skipped: tuple[BadFrame, ...] = ()
 
 
 class Part:

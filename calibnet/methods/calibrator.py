@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.causes import Search
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import ACCEPTED, Verdict
+
+if TYPE_CHECKING:
+    from calibnet.judging.causes import Search  # loads OpenCV
 
 
 @runtime_checkable

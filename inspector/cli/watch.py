@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import DatasetError
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import disturbed
 from inspector.cli.output import prepare_json, say, write_json
@@ -16,8 +17,10 @@ from inspector.cli.run import checked, choose_outputs, prepare, recording_to
 from inspector.cli.sequences import over_sequences
 
 if TYPE_CHECKING:
-    from calibnet.datasets import Sequence
+    from calibnet.datasets import Frame, Sequence
+    from calibnet.watch import Watched
     from inspector.cli.viewing import Viewing
+    from inspector.run.session import Session
 
 
 @click.group()
@@ -51,7 +54,7 @@ def watch_sequence(
         raise click.UsageError("watch makes no report; keep its recording with --save FILE.rrd.")
     prepare_json(json_file)
     from inspector.record.outputs import Outputs
-    from inspector.run.watching import CANNOT_TELL, CHANGED, as_json, sentences, watch_session, word
+    from inspector.run.watching import CANNOT_TELL, CHANGED, as_json, sentences, word
 
     options = checked(opening(), {**asked, "as_is": not disturbed(asked), "drive": True})
     record = bool(viewing.save or viewing.serve or viewing.connect)
@@ -74,6 +77,36 @@ def watch_sequence(
             outputs.wait_while_serving()
     codes = {CHANGED: ExitCode.CHECK_FAILED, CANNOT_TELL: ExitCode.CANNOT_TELL}
     return codes.get(word(watched), ExitCode.OK)
+
+
+def watch_session(session: Session) -> Watched:
+    """Watch the drive of a session, from the extrinsic that it starts from.
+
+    Raises:
+        DatasetError: not a single frame can be read.
+    """
+    from calibnet.drive.watching import watch_drive
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.run.session import STOPPING, drive_observer, frame_progress
+
+    initial = session.start.initial(first_readable(session.frames))
+    with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
+        return watch_drive(session.cascade, session.frames, initial, drive_observer(progress, stop))
+
+
+def first_readable(frames: Sequence) -> Frame:
+    """The first frame that can be read.
+
+    Raises:
+        DatasetError: none can.
+    """
+    failure: DatasetError | None = None
+    for position in range(len(frames)):
+        try:
+            return frames[position]
+        except DatasetError as error:
+            failure = failure or error
+    raise failure or DatasetError("There are no frames to watch.")
 
 
 over_sequences(watch, watch_sequence)

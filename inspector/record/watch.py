@@ -8,7 +8,7 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from calibnet.drive.changes import WINDOW, Watch
+from calibnet.watch import WINDOW, Watch
 from inspector import colors, entities
 from inspector.record.stream import Stream
 from inspector.run.watching import AXES, in_units

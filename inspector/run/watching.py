@@ -1,4 +1,4 @@
-"""Watching the mount over a drive, from a session's start and frames; in words and as JSON."""
+"""What watching a drive told, in words and as JSON."""
 
 from __future__ import annotations
 
@@ -7,40 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from calibnet.drive.changes import WINDOW, Change, Watch
-from calibnet.drive.watching import Watched, watch_drive
-from calibnet.errors import DatasetError
 from calibnet.geometry.types import Floats
-from calibnet.runtime.interruption import StopRequest
-from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
+from calibnet.watch import WINDOW, Change, Watch, Watched
 
 NO_CHANGE, CHANGED, CANNOT_TELL = "no change", "changed", "cannot tell"
 AXES = ("x", "y", "z", "pitch", "yaw", "roll")
 """Of an offset: moves along the camera's axes (right, down, ahead), and turns about them."""
-
-
-def watch_session(session: Session) -> Watched:
-    """Watch the drive of a session, from the extrinsic that it starts from.
-
-    Raises:
-        DatasetError: not a single frame can be read.
-    """
-    frames = session.frames
-    with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
-        return watch_drive(
-            session.cascade, frames, session.start.initial(first_readable(session)), drive_observer(progress, stop)
-        )
-
-
-def first_readable(session: Session) -> Any:
-    """The first frame that can be read."""
-    failure: DatasetError | None = None
-    for position in range(len(session.frames)):
-        try:
-            return session.frames[position]
-        except DatasetError as error:
-            failure = failure or error
-    raise failure or DatasetError("There are no frames to watch.")
 
 
 def word(watched: Watched) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibnet.drive.changes import SHORTEST, WINDOW, Change, tempered, watch
+from calibnet.drive.changes import SHORTEST, tempered, watch
 from calibnet.geometry.types import Floats
 from calibnet.trace import DriveLook
+from calibnet.watch import WINDOW, Change
 
 SIGMA = np.array([0.04, 0.05, 0.10, *np.radians([0.15, 0.15, 0.2])])
 """Of a frame: metres and radians."""

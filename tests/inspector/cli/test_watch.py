@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibnet.drive import watching
 from calibnet.drive.changes import watch
-from calibnet.drive.watching import Watched
 from calibnet.verdict import BadFrame
+from calibnet.watch import Watched
 from inspector.cli.errors import run
 from inspector.cli.main import cli
-from inspector.run import watching
 from tests.calibnet.drive.test_changes import YAW, looks, moved, noise
 from tests.support.fakes import REFERENCE, FakeCascade
 from tests.support.folder import write_folder
