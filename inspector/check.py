@@ -14,7 +14,7 @@ from inspector.read.understood import RecordingError
 from inspector.verdicts import explained
 
 SUITE = "calib-inspect check"
-STATISTICS = {"median": "median", "p95": "95th percentile"}
+STATISTICS = {"median": "median", "p95": "95th percentile", "max": "largest", "drive": "the drive's"}
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Limit:
     Attributes:
         kind: ``"rotation"`` or ``"translation"``.
         largest: in degrees or centimetres.
-        statistic: over the frames, one of `STATISTICS`, that must not exceed it.
+        statistic: one of `STATISTICS`, that must not exceed it: over the frames, or of the drive's one extrinsic.
     """
 
     kind: str
@@ -71,10 +71,22 @@ def check_run(run: RecordedRun, limits: Sequence[Limit]) -> list[Outcome]:
             f"{run.path} has no reference extrinsic, so its errors are unknown; check it without limits, check a run "
             "on calibrated data, or give the folder command --range to take its calibration for the reference."
         )
+    return [Outcome(limit, _value(run, limit)) for limit in limits]
+
+
+def _value(run: RecordedRun, limit: Limit) -> float:
+    """What is held against a limit."""
+    if limit.statistic == "drive":
+        of_drive = run.drive_error
+        if of_drive is None:
+            raise RecordingError(f"{run.path} has no estimate from the whole drive; record it with --drive.")
+        return of_drive.rotation_deg if limit.kind == "rotation" else of_drive.translation_cm
     errors = [error for frame in run.frames if (error := frame.error(frame.corrected)) is not None]
+    if limit.statistic == "max":
+        return max(error.rotation_deg if limit.kind == "rotation" else error.translation_cm for error in errors)
     metrics = Metrics.of(errors)
     kinds: dict[str, Distribution] = {"rotation": metrics.rotation_deg, "translation": metrics.translation_cm}
-    return [Outcome(limit, float(getattr(kinds[limit.kind], limit.statistic))) for limit in limits]
+    return float(getattr(kinds[limit.kind], limit.statistic))
 
 
 def summary(run: RecordedRun, outcomes: Sequence[Outcome]) -> str:

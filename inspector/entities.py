@@ -60,6 +60,8 @@ LEGEND_POINTS = "legend/points"
 """What the colours of the overlays' points stand for."""
 LEGEND_DISPLACEMENT = "legend/displacement"
 """What the colours of displacements stand for."""
+LEGEND_DECIDED = "legend/decided"
+"""What the brightness of maps of how far cells have decided stands for."""
 LEGEND_CERTAINTY = "legend/certainty"
 """What the brightness of probabilities and confidences stands for."""
 

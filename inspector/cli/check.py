@@ -21,10 +21,10 @@ LIMIT = NumberRange(min=0.0)
 @click.option("--max-translation", type=LIMIT, metavar="CM", help="Largest translation error allowed, in centimetres.")
 @click.option(
     "--statistic",
-    type=click.Choice(["median", "p95"]),
+    type=click.Choice(["median", "p95", "max", "drive"]),
     default="median",
     show_default=True,
-    help="Over the frames: which of their errors must keep the limits.",
+    help="Which error must keep the limits: over the frames, or that of the drive's one extrinsic.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")
@@ -40,7 +40,7 @@ def check(
     """Hold a recorded run against its verdict and, where they are given, against limits on its errors.
 
     Exits with 1 when the verdict is rejected or a limit is exceeded, and with 4 when it cannot be told. The verdict is
-    that of the drive; of a run without --drive it is on the frames: rejected if half of them or more are, accepted if
+    that of the drive; of a run without one it is on the frames: rejected if half of them or more are, accepted if
     more than half are. Errors are those of the frames' corrected extrinsics against the reference.
     """
     from inspector.check import Limit, check_run, junit, summary

@@ -27,8 +27,8 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--from", "folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
 @click.option("--format", "form", type=click.Choice(FORMATS.names()), required=True, help="What to write.")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
-@click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default]")
-@click.option("--drive", is_flag=True, help="The extrinsic of the drive, of a run with --drive.")
+@click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default without a drive]")
+@click.option("--drive", is_flag=True, help="The extrinsic of the drive.  [default where it was solved]")
 @click.option("--force", is_flag=True, help="Write it although it is rejected.")
 @click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
 @overwrite_option
@@ -54,10 +54,11 @@ def export(
     lidar_frame: str,
     parent: str,
 ) -> int:
-    """Write the corrected extrinsic as KITTI calib.txt, ROS 2 static transform, OpenCV YAML or JSON.
+    """Write the corrected extrinsic as KITTI calib.txt, ROS 2 static transform, OpenCV YAML, JSON or calibration.yaml.
 
-    By default the median of all frames: the rotation and the translation with the smallest sum of
-    distances to those of the frames, which outliers hardly move. Every file says its convention.
+    By default that of the whole drive; of a run without one, the median of all frames: the rotation and the
+    translation with the smallest sum of distances to those of the frames, which outliers hardly move. Every file says
+    its convention.
 
     What is rejected is not written, and the exit code is 1, unless --force is given. What is rejected or cannot be told
     says so on stderr and in the file.
@@ -76,7 +77,7 @@ def export(
     from inspector.export.exported import FrameNames
 
     frames = FrameNames(camera_frame, lidar_frame, parent == "lidar")
-    exported = replace(chosen(recording, folder, frame, drive), frames=frames)
+    exported = replace(chosen(recording, folder, frame, drive, median), frames=frames)
     if not may_be_written(exported, force):
         return ExitCode.CHECK_FAILED
     text = export_as(form, exported)
@@ -101,7 +102,7 @@ def may_be_written(exported: Exported, force: bool) -> bool:
     return written
 
 
-def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool) -> Exported:
+def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool, median: bool) -> Exported:
     """The extrinsic that the options name."""
     from inspector.export.exported import exported_drive, exported_folder, exported_frame, exported_median
 
@@ -109,6 +110,8 @@ def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive
         return exported_folder(folder)
     assert recording is not None
     run = open_run(recording)
-    if drive:
+    if frame is not None:
+        return exported_frame(run, frame)
+    if drive or (run.drive is not None and not median):
         return exported_drive(run)
-    return exported_median(run) if frame is None else exported_frame(run, frame)
+    return exported_median(run)

@@ -100,8 +100,9 @@ def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) ->
 def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
     """Calibrate the frames of the KITTI object detection benchmark.
 
-    --root is the folder that holds `training`.
+    --root is the folder that holds `training`. Its frames are of several mounts, so they are no drive.
     """
+    asked["drive"] = asked["drive"] or False
     return calibrate(open_object(split, root, camera), camera=camera, **asked)
 
 

@@ -54,11 +54,12 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
     click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
     click.option(
-        "--drive",
-        is_flag=True,
-        help="After the frames, solve the extrinsic of the whole drive from all of them, and record how it converges.",
+        "--drive/--no-drive",
+        default=None,
+        help="After the frames, solve the one extrinsic of the whole drive from all of them: the best there is.  "
+        "[default: with several frames on one mount]",
     ),
-    click.option("--sequence-estimate", "drive", is_flag=True, hidden=True),  # its former name
+    click.option("--sequence-estimate/--no-sequence-estimate", "drive", default=None, hidden=True),  # its former name
     click.option(
         "--on-bad-frame",
         type=click.Choice(["skip", "stop"]),
@@ -158,7 +159,8 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
         cascade=cascade,
         skipped=cascade.skipped,
         start=options.start,
-        drive=options.drive,
+        drive=options.solves_drive,
+        drive_asked=bool(options.drive),
         stop_on_bad_frame=options.on_bad_frame == "stop",
         outputs=outputs,
         description=RunDescription(options.title, options.identity(stages), provenance),

@@ -63,7 +63,7 @@ def verify_sequence(
             raise
         return conclude(unfit(UNKNOWN, str(error), causes), json_file)
     options = checked(sequence, {**asked, "as_is": not disturbed(asked)})
-    options = replace(options, drive=options.drive or len(options.positions) > 1)
+    options = replace(options, drive=options.drive or len(options.positions) > 1)  # nothing else can verify several
     return verify_run(options, json_file, viewing, report)
 
 

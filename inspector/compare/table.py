@@ -59,7 +59,11 @@ def _errors(comparison: Comparison) -> list[str]:
         [f"**{run.name}**", *_figures(run.corrected, None if run is first else first.corrected)]
         for run in comparison.runs
     ]
+    drives = [(run.name, run.run.drive_error) for run in comparison.runs if run.run.drive_error is not None]
+    as_one = [[name, f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"] for name, error in drives if error]
+    table = ["### Whole drive as one", "", *markdown(["", "rotation", "translation"], as_one), ""] if as_one else []
     return [
+        *table,
         f"### Errors over {count} frame{'' if count == 1 else 's'}",
         "",
         *markdown(["", *(name for name, _, _ in COLUMNS)], rows),

@@ -122,6 +122,12 @@ class RecordedRun:
     _file: RecordingFile = field(repr=False)
 
     @property
+    def drive_error(self) -> PoseError | None:
+        """Of the drive's extrinsic; None where none was solved, or without a reference."""
+        reference = self.frames[0].reference
+        return None if self.drive is None or reference is None else pose_error(self.drive, reference)
+
+    @property
     def one_mount(self) -> bool:
         """Whether the references of all frames are the same; true where there is none to tell."""
         references = [frame.reference for frame in self.frames if frame.reference is not None]

@@ -126,6 +126,11 @@ class Recording:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
         log_drive(self._rec, estimate, reference, self._seconds, given, remarks)
 
+    def log_no_drive(self, why: Sequence[str]) -> None:
+        """Say, where its answer would stand, why the drive is not solved."""
+        text = "\n\n".join(["# Not solved", *why])
+        self._rec.log_for_all(entities.DRIVE_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+
     def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
         """Log what the drive's extrinsic makes of one of its frames."""
         observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)

@@ -168,6 +168,8 @@ class Figures:
                 for (number, range_), state in zip(run.stages, self.states[1:], strict=True)
             ],
             "change": _distributions(self.change),
+            "drive_extrinsic": None if run.drive is None else run.drive.tolist(),
+            "drive_extrinsic_error": None if run.drive_error is None else asdict(run.drive_error),
             "median_extrinsic": None if self.median is None else self.median.tolist(),
             "median_extrinsic_error": None if self.median_error is None else asdict(self.median_error),
             "examples": {name: run.frames[position].index for name, position in self.examples().items()},

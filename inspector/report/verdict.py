@@ -8,6 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from calibnet.evaluation.metrics import Distribution, Metrics
+from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Word
 from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures, State
@@ -68,6 +70,8 @@ def headline(figures: Figures) -> str:
     """The result in one sentence."""
     run = figures.run
     name = run.settings.get("sequence", run.title)
+    if run.drive is not None and len(run.frames) > 1:
+        return _drive_headline(figures, run.drive)
     if figures.has_reference:
         return (
             f"Corrected {count(len(run.frames))} of {name} from {pair(figures.initial.metrics)} to "
@@ -77,6 +81,22 @@ def headline(figures: Figures) -> str:
     if len(run.frames) == 1:
         return f"{result}, judged from a single frame."
     return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected.metrics)}."
+
+
+def _drive_headline(figures: Figures, drive: Extrinsic) -> str:
+    """The drive's one extrinsic first, beside it the frames one by one."""
+    run, error = figures.run, figures.run.drive_error
+    frames, name = count(len(run.frames)), run.settings.get("sequence", run.title)
+    if error is None:
+        change = pose_error(drive, run.frames[0].initial)
+        return f"Solved from {frames} as one, the calibration of {name} changed by {briefly(change)}."
+    one_by_one = f"one by one {pair(figures.corrected.metrics)} in the median"
+    return f"Corrected {name} from {pair(figures.initial.metrics)} to {briefly(error)}, {frames} as one; {one_by_one}."
+
+
+def briefly(error: PoseError) -> str:
+    """Both figures of one extrinsic, briefly."""
+    return f"{ROTATION.brief(error.rotation_deg)}\u00a0/\u00a0{TRANSLATION.brief(error.translation_cm)}"
 
 
 def verdict(run: RecordedRun) -> list[Finding]:

@@ -36,7 +36,8 @@ class RunOptions:
         miscalibration: this one, instead of drawing any.
         per_frame: draw one for every frame, not one for the run.
         seed: of everything random.
-        drive: after the frames, also solve the drive's extrinsic from all of them.
+        drive: after the frames, also solve the drive's extrinsic from all of them; None for doing so with several
+            frames on one mount.
         on_bad_frame: ``"skip"`` a frame that cannot be used, or ``"stop"`` there.
         fix: axes of the start that are known exactly, names of `calibnet.geometry.known.AXES`; None as an empty one.
         prior_translation: standard deviation, in metres, to which the camera's place is known beforehand.
@@ -60,7 +61,7 @@ class RunOptions:
     miscalibration: Transform | None = field(default=None, repr=False)
     per_frame: bool = False
     seed: int = 0
-    drive: bool = False
+    drive: bool | None = None
     on_bad_frame: str = "skip"
     fix: tuple[str, ...] | None = None
     prior_translation: float | None = None
@@ -83,7 +84,7 @@ class RunOptions:
                 "--per-frame draws from --range; --miscalibrate is the same for all frames.",
             ),
             (
-                self.drive and self.per_frame,
+                bool(self.drive) and self.per_frame,
                 "--drive needs one mount for all frames; --per-frame moves it in each.",
             ),
             (
@@ -112,6 +113,11 @@ class RunOptions:
             DatasetError: there are none.
         """
         return select_frames(self.sequence, self.frames)
+
+    @property
+    def solves_drive(self) -> bool:
+        """Whether the drive's extrinsic is solved after the frames."""
+        return (len(self.positions) > 1 and not self.per_frame) if self.drive is None else self.drive
 
     @property
     def start(self) -> Start:
@@ -155,5 +161,5 @@ class RunOptions:
             "detail": str(self.detail or Detail.FULL),
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),
-            "sequence_estimate": self.drive,
+            "sequence_estimate": self.solves_drive,
         }

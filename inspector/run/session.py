@@ -8,6 +8,7 @@ from collections.abc import Sequence as Positions
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -58,7 +59,8 @@ class Session:
         description: what the recording says about itself.
         contents: what is logged of each frame.
         console: where progress is shown.
-        drive: after the frames, also solve the drive's extrinsic from all of them.
+        drive: after the frames, also solve the drive's extrinsic from all of them, if they are on one mount.
+        drive_asked: the user wants it, so that a drive which cannot be solved is an error.
         stop_on_bad_frame: end at the first frame that cannot be used, instead of going on with the next.
         verify: also judge the calibration that the run starts from, by the only frame or by the drive.
     """
@@ -73,6 +75,7 @@ class Session:
     contents: Contents
     console: Console
     drive: bool = False
+    drive_asked: bool = False
     stop_on_bad_frame: bool = False
     verify: bool = False
 
@@ -93,6 +96,7 @@ class Session:
         """
         summary = Summary()
         recording: Recording | None = None
+        one_mount = True
         try:
             with StopRequest(STOPPING) as stop, frame_progress(self.console) as progress:
                 for position in progress.track(self.positions, description=self.sequence.name):
@@ -106,6 +110,7 @@ class Session:
                         layout = Layout.of(observation, self.contents, self.drive)
                         recording = Recording(self.outputs.open(), self.description, layout)
                         initial, reference = observation.trace.initial, observation.reference
+                    one_mount &= bool(np.allclose(observation.trace.initial, initial, atol=1e-9))
                     self.outputs.check_space()
                     recording.log(observation)
                     summary.add(observation)
@@ -113,8 +118,12 @@ class Session:
                 summary.check_enough()
                 if recording is not None:
                     recording.log_skipped(summary.skipped)
+                    summary.frames_done()
                     if self.drive and not summary.interrupted:
-                        self._record_drive(recording, summary, initial, reference, progress, stop)
+                        if one_mount:
+                            self._record_drive(recording, summary, initial, reference, progress, stop)
+                        else:
+                            self._no_drive(recording, summary, "The frames are of several mounts")
                     if summary.given_verdict is not None:
                         recording.log_given(summary.given_verdict)
         except KeyboardInterrupt:
@@ -165,7 +174,10 @@ class Session:
             estimate = self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop))
         except CalibrationError as error:
             if not self.verify:
-                raise
+                if self.drive_asked:
+                    raise
+                self._no_drive(recording, summary, str(error).removesuffix("."))
+                return
             summary.given_verdict = unfit(initial, str(error), suspected(self.cascade, self.frames, initial))
             return
         if self.verify and estimate.verdict is not None:
@@ -174,6 +186,11 @@ class Session:
         self._record_drive_overlays(recording, estimate, stop)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict
+
+    def _no_drive(self, recording: Recording, summary: Summary, why: str) -> None:
+        """Say why the drive is not solved, here and in the recording."""
+        summary.drive = f"{why}: the whole drive is not solved as one."
+        recording.log_no_drive([summary.drive, *summary.of_frames()])
 
     def _record_drive_overlays(self, recording: Recording, estimate: DriveEstimate, stop: StopRequest) -> None:
         """Show the drive's extrinsic on every frame that has a result of its own."""

@@ -25,6 +25,8 @@ class Summary:
         unread: how many of these could not be read.
         explained: frames whose causes were looked for.
         interrupted: whether the run was ended before its last frame.
+        started: when the first frame was begun, in seconds of the clock.
+        ended: when the last one was done; None while it is not.
         drive: what all frames together came to, in words.
         drive_verdict: whether that is good.
         given_verdict: whether the calibration that the run started from is good, where it was to be verified.
@@ -40,6 +42,7 @@ class Summary:
     drive_verdict: Verdict | None = field(default=None, repr=False)
     given_verdict: Verdict | None = field(default=None, repr=False)
     started: float = field(default_factory=time.monotonic)
+    ended: float | None = None
     _numbers: list[int] = field(default_factory=list, repr=False)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
@@ -63,6 +66,10 @@ class Summary:
         for stage in trace.stages:
             self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
 
+    def frames_done(self) -> None:
+        """Note that the frames one by one are done: what follows is not counted to their speed."""
+        self.ended = time.monotonic()
+
     def check_enough(self) -> None:
         """See that fewer than half of the frames were left out.
 
@@ -80,7 +87,7 @@ class Summary:
         """Sentences for the end of a run."""
         if self.frames == 0:
             return ["No frame was recorded."]
-        seconds = time.monotonic() - self.started
+        seconds = (self.ended or time.monotonic()) - self.started
         lines = [f"{_frames(self.frames)} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
         lines += self.of_frames()
         if self.skipped:

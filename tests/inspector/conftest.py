@@ -42,12 +42,14 @@ def record() -> Callable[..., None]:
         provenance: dict[str, Any] | None = None,
         stop_on_bad_frame: bool = False,
         drive: bool = False,
+        drive_asked: bool = False,
+        cascade_type: Any = fakes_module.FakeCascade,
         **cascade: Any,
     ) -> Any:
         session = Session(
             sequence=sequence or fakes_module.FakeSequence(length),
             positions=range(length),
-            cascade=fakes_module.FakeCascade(**cascade),
+            cascade=cascade_type(**cascade),
             skipped=fakes_module.FakeCascade.skipped,
             start=Start(MiscalibrationRange(5, 0.5), seed, per_frame=per_frame, as_is=as_is),
             outputs=Outputs(file),
@@ -56,6 +58,7 @@ def record() -> Callable[..., None]:
             console=Console(quiet=True),
             stop_on_bad_frame=stop_on_bad_frame,
             drive=drive,
+            drive_asked=drive_asked,
         )
         try:
             return session.run()

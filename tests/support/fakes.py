@@ -6,8 +6,9 @@ tests and pictures show what a working cascade would.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,7 @@ from calibnet.geometry import (
     transform,
 )
 from calibnet.geometry.projection import nearest_per_cell
-from calibnet.trace import CascadeTrace, ScaleTrace, StageDetail, StageTrace
+from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, ScaleTrace, StageDetail, StageTrace
 from calibnet.verdict import Cause
 from tests.support.judged import judged
 
@@ -125,6 +126,19 @@ class FakeCascade:
         trace = CascadeTrace(initial, tuple(stages), {"features": 3.0}, match_error_limit_px=MATCH_ERROR_LIMIT)
         rejected = frame.index in self.doubted
         return judged(trace, rejected, self.causes if rejected else (), frame.index in self.unsure)
+
+    def calibrate_drive(
+        self, frames: Any, initial: NDArray[np.float64], observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        """A tenth of a degree of yaw off the first frame's extrinsic."""
+        for number in range(len(frames)):
+            if observer is not None:
+                observer(number, len(frames))
+        found = miscalibration([0, 0, 0.1], [0, 0, 0]) @ frames[0].camera_from_lidar
+        history = tuple(
+            (frames[position].index, Estimate(found, 1e-4 * np.eye(6), 1 + position)) for position in range(len(frames))
+        )
+        return DriveEstimate(found, 1e-4 * np.eye(6), len(frames), history)
 
     def _detail(self, frame: Frame, camera: PinholeCamera, before: NDArray[np.float64], seed: int) -> StageDetail:
         projection = project(frame.points, before, camera)

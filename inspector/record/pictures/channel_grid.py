@@ -33,24 +33,26 @@ def liveliest_channels(activations: NDArray[np.floating]) -> NDArray[np.intp]:
     return np.sort(varying if varying.size else liveliest[:1])
 
 
-def channel_grid(activations: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:
-    """Lay out the liveliest of ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each.
+def channel_grid(
+    activations: NDArray[np.floating], low: float, high: float, numbers: NDArray[np.integer]
+) -> NDArray[np.uint8]:
+    """Lay out ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each.
 
     Args:
         activations: maps of any size.
         low: value of the darkest colour.
         high: value of the brightest.
+        numbers: ``[C]``, of the channels.
 
     Returns:
         ``[H, W]`` uint8 entries of `PALETTE`.
     """
-    channels = liveliest_channels(activations)
     scale = max(1, TILE_WIDTH // activations.shape[2])
-    tiles = levels(activations[channels], low, high).repeat(scale, axis=1).repeat(scale, axis=2)
+    tiles = levels(activations, low, high).repeat(scale, axis=1).repeat(scale, axis=2)
     _, height, width = tiles.shape
     rows = -(-len(tiles) // COLUMNS)
     grid = np.full((rows * (height + HEADER), COLUMNS * (width + 2) - 2), GAP, dtype=np.uint8)
-    for position, (channel, tile) in enumerate(zip(channels, tiles, strict=True)):
+    for position, (channel, tile) in enumerate(zip(numbers.tolist(), tiles, strict=True)):
         top, left = (position // COLUMNS) * (height + HEADER), (position % COLUMNS) * (width + 2)
         grid[top : top + HEADER, left : left + width][_number(channel, width)] = TEXT
         grid[top + HEADER : top + HEADER + height, left : left + width] = tile

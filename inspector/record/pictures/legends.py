@@ -43,6 +43,17 @@ def log_map_legends(rec: Subtree) -> None:
     _log_bar(rec, entities.LEGEND_CERTAINTY, bar, CERTAINTY_BAR_HEIGHT)
 
 
+def log_decided_legend(rec: Subtree) -> None:
+    """What the brightness of maps of how far cells have decided stands for, at `entities.LEGEND_DECIDED`."""
+    strip = colors.map_colors(np.linspace(0.0, 1.0, BAR_WIDTH), 0.0, 1.0)
+    labels = {
+        0.0: "undecided: all displacements alike",
+        0.5: "after the hourglass cells should be brighter",
+    }
+    bar = Bar(strip, labels | {1.0: "decided: one displacement has all probability"})
+    _log_bar(rec, entities.LEGEND_DECIDED, bar, POINT_BAR_HEIGHT)
+
+
 def log_names(rec: Subtree, path: str, names: Mapping[str, colors.Rgb]) -> None:
     """Names in a row, each after a dot in its colour."""
     picture = names_png(list(names.items()), NAMES_HEIGHT)

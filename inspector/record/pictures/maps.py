@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from calibnet.trace import ScaleTrace
 from inspector import colors
 
+TEMPERATURE = 14.0
+"""By which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
+
 
 def flow_image(
     displacement: NDArray[np.floating] | NDArray[np.integer], reach: float, seen: NDArray[np.bool_]
@@ -30,6 +33,25 @@ def certainty_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr
     picture = colors.certainty_colors(values)
     picture[~seen] = colors.EMPTY
     return rr.Image(picture)
+
+
+def decidedness(probability: NDArray[np.floating]) -> NDArray[np.float32]:
+    """``[h, w]`` float32, how far ``[Dy, Dx, h, w]`` probabilities have decided: 0 all alike, 1 a single displacement.
+
+    It is what is missing of the largest entropy, as a share of that.
+    """
+    p = np.clip(probability.astype(np.float32), 1e-12, 1.0).reshape(-1, *probability.shape[2:])
+    entropy = -(p * np.log(p)).sum(axis=0)
+    decided: NDArray[np.float32] = np.clip(1.0 - entropy / np.log(len(p)), 0.0, 1.0).astype(np.float32)
+    return decided
+
+
+def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:
+    """``[Dy, Dx, h, w]``: what the matching scores alone, before aggregation, would make of every displacement."""
+    scores = TEMPERATURE * scale.volume.astype(np.float32)
+    weights = np.exp(scores - scores.max(axis=(0, 1)))
+    probability: NDArray[np.float32] = weights / weights.sum(axis=(0, 1))
+    return probability
 
 
 def subcell_match(scale: ScaleTrace) -> NDArray[np.float32]:

@@ -177,7 +177,7 @@ class AskedError(BaseException):
 
 
 @pytest.mark.parametrize("option", ["--drive", "--sequence-estimate"])
-def test_a_drive_is_solved_under_the_new_name_and_the_former(
+def test_a_drive_is_solved_by_default_and_under_the_new_name_and_the_former(
     invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch, option: str
 ) -> None:
     from inspector.run.session import Session
@@ -186,10 +186,17 @@ def test_a_drive_is_solved_under_the_new_name_and_the_former(
         raise AskedError(session.drive)
 
     monkeypatch.setattr(Session, "run", run)
-    for given, drive in (((option,), True), ((), False)):
+    one = ("--frames", "0")
+    for given, drive in (
+        ((option,), True),
+        ((), True),
+        (one, False),
+        ((option, *one), True),
+        ((f"--no{option[1:]}",), False),
+    ):
         with pytest.raises(AskedError) as asked:
             invoke("folder", str(own_folder), "--save", "own.rrd", *given)
-        assert asked.value.args == (drive,)
+        assert asked.value.args == (drive,), given
     code, _, err = invoke("folder", str(own_folder), option, "--range", "5/0.5", "--per-frame")
     assert code == 2 and "--drive needs one mount" in err
 

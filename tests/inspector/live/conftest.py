@@ -7,30 +7,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from calibnet.geometry import MiscalibrationRange, miscalibration
-from calibnet.trace import DriveEstimate
+from calibnet.geometry import MiscalibrationRange
 from inspector.live.accept import Target
 from inspector.live.bench import Bench
 from inspector.live.session import LiveSession
 from inspector.run.start import Start
-from tests.support.fakes import REFERENCE, FakeCascade, FakeSequence
+from tests.support.fakes import FakeCascade, FakeSequence
 
 RANGE = MiscalibrationRange(5, 0.5)
-
-
-class FakeDrives(FakeCascade):
-    """Also solves drives: to a tenth of a degree."""
-
-    def calibrate_drive(
-        self, frames: Any, initial: Any, observer: Callable[[int, int], None] | None = None
-    ) -> DriveEstimate:
-        for number in range(len(frames)):
-            if observer is not None:
-                observer(number, len(frames))
-        return DriveEstimate(miscalibration([0, 0, 0.1], [0, 0, 0]) @ REFERENCE, np.eye(6) * 1e-4, len(frames))
 
 
 Make = Callable[..., LiveSession]
@@ -44,7 +30,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
     def session(length: int = 3, as_is: bool = False, cascade: Any = None) -> LiveSession:
         bench = Bench(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
         target = Target(tmp_path / "out" / "calibration.corrected.yaml")
-        made.append(LiveSession(bench, cascade or FakeDrives(), target, RANGE))
+        made.append(LiveSession(bench, cascade or FakeCascade(), target, RANGE))
         return made[-1]
 
     yield session

@@ -13,7 +13,7 @@ from calibnet.trace import ScaleTrace
 from inspector import colors
 from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.lettering import bar_png, font, letter_width, names_png, text_png
-from inspector.record.pictures.maps import subcell_match
+from inspector.record.pictures.maps import TEMPERATURE, decidedness, matching_probability, subcell_match
 
 
 def test_words_have_their_own_ground_and_fit() -> None:
@@ -65,6 +65,24 @@ def test_the_most_probable_displacement_has_fractions_of_a_cell() -> None:
     best = np.array([[[0, 0], [2, -1]]])
     scale = ScaleTrace(8, probability, probability, best, probability[0], probability[0], np.ones((1, 2), bool))
     np.testing.assert_allclose(subcell_match(scale)[0], [[0.25, 0.0], [2.0, -0.5]], atol=1e-3)
+
+
+def test_cells_are_decided_where_one_displacement_has_all_probability() -> None:
+    sure, half, none = np.zeros((3, 4), np.float16), np.zeros((3, 4), np.float16), np.full((3, 4), 1 / 12, np.float16)
+    sure[1, 2], half[0, :2] = 1.0, 0.5
+    found = decidedness(np.stack([sure, half, none], axis=-1)[:, :, None])
+    np.testing.assert_allclose(found, [[1.0, 1 - np.log(2) / np.log(12), 0.0]], atol=2e-3)
+
+
+def test_before_aggregation_the_scores_are_weighed_as_the_network_does() -> None:
+    from calibnet.network import cost_volume
+
+    assert TEMPERATURE == cost_volume.TEMPERATURE
+    volume = np.zeros((1, 3, 1, 1), np.float16)
+    volume[0, 1] = 0.5
+    scale = ScaleTrace(8, volume, volume, np.zeros((1, 1, 2), np.int64), volume[0], volume[0], np.ones((1, 1), bool))
+    found = matching_probability(scale)[0, :, 0, 0]
+    np.testing.assert_allclose(found, np.exp([0.0, 7.0, 0.0]) / (2 + np.exp(7.0)), rtol=1e-3)
 
 
 def decoded(png: bytes) -> NDArray[np.uint8]:

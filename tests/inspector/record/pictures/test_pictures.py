@@ -14,7 +14,16 @@ from calibnet.geometry import PinholeCamera, project
 from inspector.colors import EMPTY, depth_colors, flow_colors
 from inspector.record.contents import Coloring
 from inspector.record.observation import Observation
-from inspector.record.pictures.channel_grid import GAP, HEADER, HIGHEST, LOWEST, channel_grid, palette_png, slice_grid
+from inspector.record.pictures.channel_grid import (
+    GAP,
+    HEADER,
+    HIGHEST,
+    LOWEST,
+    channel_grid,
+    liveliest_channels,
+    palette_png,
+    slice_grid,
+)
 from inspector.record.pictures.matches import StartingPoints, chosen_match
 from inspector.record.pictures.overlay import Thinning, make_overlay
 from inspector.record.pictures.painting import depth_edges, make_painter
@@ -59,7 +68,9 @@ def test_overlay_keeps_the_nearest_point_of_each_cell_and_draws_it_last(fakes: M
 def test_channel_grid_numbers_the_liveliest_and_keeps_the_colour_scale_it_is_given() -> None:
     maps = np.zeros((20, 3, 64), dtype=np.float16)
     maps[7, 0, 0], maps[12, 2, 4] = 9.0, 4.5
-    grid = channel_grid(maps, 0.0, 9.0)
+    channels = liveliest_channels(maps)
+    assert channels.tolist() == [7, 12]
+    grid = channel_grid(maps[channels], 0.0, 9.0, channels)
     assert grid.shape == (3 + HEADER, 4 * 66 - 2)
     assert grid[HEADER, 0] == HIGHEST  # channel 7 comes first
     assert grid[HEADER + 2, 66 + 4] == (LOWEST + HIGHEST) // 2  # half as bright as 9

@@ -1,0 +1,149 @@
+"""A drive's answer: recorded over every frame, and first in everything that is said of the run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calibnet.errors import CalibrationError
+from calibnet.geometry import pose_error
+from inspector import entities
+from inspector.check import Limit, check_run
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from inspector.compare.comparison import Comparison
+from inspector.compare.table import comparison_table
+from inspector.read.run import RecordedRun, read_run
+from inspector.read.understood import RecordingError
+from inspector.report.metrics import Figures
+from inspector.report.verdict import headline
+from tests.support.fakes import FakeCascade
+
+Read = Callable[..., list[tuple[Any, Any]]]
+
+
+@pytest.fixture(scope="module")
+def file(record: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three frames whose drive ends a tenth of a degree off."""
+    file = tmp_path_factory.mktemp("drive") / "drive.rrd"
+    record(file, detail="overview", strides=(32,), drive=True)
+    return file
+
+
+@pytest.fixture
+def recorded(file: Path) -> RecordedRun:
+    return read_run(file)
+
+
+def text_of(file: Path) -> str:
+    from rerun.chunk import RrdReader
+
+    *_, last = RrdReader(file).store().stream().filter(content=f"/{entities.DRIVE_TEXT}")
+    text: str = last.to_record_batch()["TextDocument:text"].to_pylist()[0][0]
+    return text
+
+
+def test_every_frame_has_its_points_under_the_drives_extrinsic(file: Path, read: Read) -> None:
+    shown = read(file, entities.OVERLAY_DRIVE, "Points2D:positions")
+    assert [frame for frame, _ in shown] == [0, 1, 2]
+    captions = [row.as_py()[0] for _, row in read(file, entities.caption(entities.OVERLAY_DRIVE), "text")]
+    assert captions == ["whole drive as one: 0.10°, 0.0 cm off"] * 3
+
+
+def test_the_answer_has_the_matrix_and_the_frames_beside_it(file: Path, recorded: RecordedRun) -> None:
+    text = text_of(file)
+    assert "**Off the reference by 0.10° / 0.0 cm**, solved from 3 frames." in text
+    assert "Error, median over frames: " in text and "Worst: frame " in text
+    assert recorded.drive is not None
+    assert " ".join(f"{value:9.5f}" for value in recorded.drive[0]) in text
+
+
+def test_report_and_metrics_begin_with_it(recorded: RecordedRun) -> None:
+    figures = Figures.of(recorded)
+    plain = headline(figures).replace("\u00a0", " ")
+    assert plain.startswith("Corrected fake/00 from ") and "to 0.10° / 0.05 cm, 3 frames as one; one by one" in plain
+    content = figures.as_dict()
+    assert content["drive_extrinsic_error"]["rotation_deg"] == pytest.approx(0.1, abs=1e-6)
+    np.testing.assert_array_equal(content["drive_extrinsic"], recorded.drive)
+
+
+def test_export_takes_it_unless_something_else_is_named(
+    file: Path, recorded: RecordedRun, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = {}
+    for choice in ((), ("--drive",), ("--median",), ("--frame", "1")):
+        assert run(cli, ["export", str(file), "--format", "json", *choice]) == 0
+        found[choice] = np.array(json.loads(capsys.readouterr().out)["camera_from_lidar"])
+    np.testing.assert_array_equal(found[()], recorded.drive)
+    np.testing.assert_array_equal(found[("--drive",)], recorded.drive)
+    np.testing.assert_array_equal(found[("--frame", "1")], recorded.frames[1].corrected)
+    assert pose_error(found[("--median",)], found[()]).rotation_deg > 1e-3
+
+
+def test_check_holds_it_or_the_worst_frame_against_limits(recorded: RecordedRun, full_recording: Path) -> None:
+    (of_drive,) = check_run(recorded, [Limit("rotation", 0.2, "drive")])
+    assert of_drive.value == pytest.approx(0.1, abs=1e-6)
+    assert of_drive.sentence == "the drive's rotation error 0.1° (allowed 0.2°)"
+    errors = [error.translation_cm for frame in recorded.frames if (error := frame.error(frame.corrected)) is not None]
+    (largest,) = check_run(recorded, [Limit("translation", 0.0, "max")])
+    assert largest.value == max(errors) and not largest.passed
+    with pytest.raises(RecordingError, match="no estimate from the whole drive"):
+        check_run(read_run(full_recording), [Limit("rotation", 1.0, "drive")])
+
+
+def test_a_comparison_has_both_drives(recorded: RecordedRun) -> None:
+    table = comparison_table(Comparison.of([recorded, recorded], ["A", "B"]))
+    assert "### Whole drive as one" in table
+    assert "| A | 0.10° | 0.0 cm |" in table and "| B | 0.10° | 0.0 cm |" in table
+
+
+def test_frames_of_several_mounts_are_no_drive(record: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / "mounts.rrd"
+    summary = record(file, detail="overview", strides=(32,), drive=True, per_frame=True)
+    assert summary.drive == "The frames are of several mounts: the whole drive is not solved as one."
+    assert summary.drive in summary.lines() and summary.drive in text_of(file)
+    assert read_run(file).drive is None
+
+
+def test_a_drive_that_cannot_be_solved_loses_nothing_unless_it_was_asked_for(
+    record: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> None:
+        raise CalibrationError("No frame could be calibrated.")
+
+    monkeypatch.setattr(FakeCascade, "calibrate_drive", fail)
+    summary = record(tmp_path / "a.rrd", detail="overview", strides=(32,), drive=True)
+    assert summary.drive.startswith("No frame could be calibrated: ")
+    assert len(read_run(tmp_path / "a.rrd").frames) == 3
+    with pytest.raises(CalibrationError, match="No frame could be calibrated"):
+        record(tmp_path / "b.rrd", detail="overview", strides=(32,), drive=True, drive_asked=True)
+
+
+def test_speed_is_that_of_the_frames_alone(record: Callable[..., Any], tmp_path: Path) -> None:
+    summary = record(tmp_path / "a.rrd", detail="overview", strides=(32,), drive=True)
+    assert summary.ended is not None
+    took = summary.ended - summary.started
+    assert summary.lines()[0] == f"3 frames in {took:.1f} s, {3 / took:.1f} frames/s."
+
+
+def test_frames_that_became_worse_are_counted(record: Callable[..., Any], tmp_path: Path) -> None:
+    class Worse(FakeCascade):
+        def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
+            trace = super().calibrate(frame, initial, detail)
+            if frame.index != 1:
+                return trace
+            away = np.eye(4)
+            away[0, 3] = 3.0
+            moved = replace(trace.stages[-1], after=away @ trace.initial)
+            return replace(trace, stages=(*trace.stages[:-1], moved))
+
+    summary = record(tmp_path / "w.rrd", cascade_type=Worse, detail="overview", strides=(32,))
+    told = summary.of_frames()
+    assert told[1].startswith("Worst: frame 1, ")
+    assert told[2] == "1 of 3 frames worse than before, in angle or place: 1."
