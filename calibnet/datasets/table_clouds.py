@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-import io
 import struct
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 
-from calibnet.datasets.cloud_table import MOST_POINTS, CloudError, Columns
+from calibnet.datasets.cloud_table import LONGEST_ROW, MOST_POINTS, CloudError, Columns
+from calibnet.runtime.reading import MEGABYTE
 
-LAS_HEADER, LAS_HEADER_1_4 = 227, 375
-"""Bytes of the header of LAS 1.2 and of 1.4."""
-MOST_RECORDS = 1000
-"""Records of other things, such as coordinate systems, in a LAS file."""
+LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
+"""Bytes of the header of LAS 1.2 and of 1.4, and of a point's position and intensity."""
+COMPRESSED = 128
+"""Formats of points from here on are compressed: LAZ."""
+LONGEST_SECONDS, MEGABYTES_BESIDE = 8, 2048
+"""For unpacking a scan, and what the process needs besides its points."""
+UNPACK = """
+import io, resource, sys
+most = int(sys.argv[1])
+import laspy
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
+sys.stdout.buffer.write(laspy.read(io.BytesIO(sys.stdin.buffer.read())).points.array.tobytes())
+"""
 
 
 def read_feather(data: bytes) -> Columns:
@@ -35,46 +46,52 @@ def read_parquet(data: bytes) -> Columns:
 
 
 def read_las(data: bytes) -> Columns:
-    """x, y, z and intensity of a LAS or LAZ file.
+    """x, y, z and intensity of a LAS file; a compressed one is unpacked apart, see `unpacked`.
 
     Raises:
         CloudError: it is damaged, or holds too many points.
     """
-    _check_las(data)
-    import laspy
-
-    try:
-        with laspy.open(io.BytesIO(data)) as reader:
-            _check(reader.header.point_count)
-            las = reader.read()
-            columns = {axis: np.asarray(getattr(las, axis), np.float64) for axis in "xyz"}
-            return columns | {"intensity": np.asarray(las.intensity)}
-    except (CloudError, MemoryError):
-        raise
-    except BaseException as error:  # laspy and its decompressor fail in many ways, a panic of Rust among them
-        if isinstance(error, KeyboardInterrupt | SystemExit):
-            raise
-        raise CloudError(f"it is truncated, damaged or no LAS file ({error})") from None
-
-
-def _check_las(data: bytes) -> None:
-    """Hold the header's counts against the file before laspy follows them, however many they are."""
     if len(data) < LAS_HEADER or data[:4] != b"LASF":
         raise CloudError("it is truncated or no LAS file")
-    size, points_at, records = struct.unpack_from("<HII", data, 94)
-    minor, kind, length, legacy = data[25], data[104], *struct.unpack_from("<HI", data, 105)
-    count, more_at, more = legacy, 0, 0
-    if minor >= 4:
-        if len(data) < LAS_HEADER_1_4:
-            raise CloudError("it is truncated")
-        more_at, more, count = struct.unpack_from("<QIQ", data, 235)
-    if max(records, more) > MOST_RECORDS or not LAS_HEADER <= size <= points_at <= len(data):
+    start, kind = struct.unpack_from("<I", data, 96)[0], data[104]
+    length, count = struct.unpack_from("<HI", data, 105)
+    if data[25] >= 4 and len(data) >= LAS_HEADER_1_4:
+        (count,) = struct.unpack_from("<Q", data, 247)
+    scales, offsets = (np.frombuffer(data, "<f8", 3, at) for at in (131, 155))
+    if count > MOST_POINTS:
+        raise CloudError(f"its header promises {count:,} points, and {MOST_POINTS:,} are the most that are read")
+    if not LAS_POINT <= length <= LONGEST_ROW or not LAS_HEADER <= start <= len(data):
         raise CloudError("its header is damaged")
-    if size + records * 54 > points_at or (more and not points_at <= more_at <= len(data)):
-        raise CloudError("its header is damaged")
-    _check(count)
-    if kind < 128 and points_at + count * length > len(data):  # beyond, it is compressed
+    points = unpacked(data, count * length) if kind >= COMPRESSED else data[start : start + count * length]
+    if len(points) < count * length:
         raise CloudError(f"it is truncated, its header promises {count:,} points")
+    layout = np.dtype({"names": ["xyz", "i"], "formats": [("<i4", 3), "<u2"], "offsets": [0, 12], "itemsize": length})
+    table = np.frombuffer(points, layout, count)
+    with np.errstate(over="ignore", invalid="ignore"):
+        positions = table["xyz"] * scales + offsets
+    return {"x": positions[:, 0], "y": positions[:, 1], "z": positions[:, 2], "intensity": table["i"]}
+
+
+def unpacked(data: bytes, most: int) -> bytes:
+    """The points of a LAZ file, as an uncompressed one has them.
+
+    A process of its own does it: what unpacks them aborts the process on damaged files, or never comes back.
+
+    Args:
+        data: of the whole file.
+        most: bytes that its header promises.
+
+    Raises:
+        CloudError: it is damaged.
+    """
+    command = [sys.executable, "-c", UNPACK, str(most + MEGABYTES_BESIDE * MEGABYTE)]
+    try:
+        done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=LONGEST_SECONDS)
+    except subprocess.TimeoutExpired:
+        raise CloudError(f"it cannot be unpacked within {LONGEST_SECONDS} seconds, so it seems to be damaged") from None
+    if done.returncode:
+        raise CloudError("it is truncated or damaged")
+    return done.stdout
 
 
 def _columns(read: Any, data: bytes) -> Columns:
@@ -83,17 +100,14 @@ def _columns(read: Any, data: bytes) -> Columns:
 
     try:
         table = read(pa.BufferReader(data))
+        table.validate(full=True)
     except (pa.ArrowException, OSError, ValueError) as error:
         raise CloudError(f"it is truncated, damaged or no such file ({error})") from None
-    _check(table.num_rows)
+    if table.num_rows > MOST_POINTS:
+        raise CloudError(f"it holds {table.num_rows:,} points, and {MOST_POINTS:,} are the most that are read")
     columns: Columns = {}
     for name in table.column_names:
         kind = table.schema.field(name).type
         if pa.types.is_floating(kind) or pa.types.is_integer(kind):
             columns.setdefault(name.lower(), table.column(name).to_numpy(zero_copy_only=False))
     return columns
-
-
-def _check(points: int) -> None:
-    if points > MOST_POINTS:
-        raise CloudError(f"it holds {points:,} points, and {MOST_POINTS:,} are the most that are read")
