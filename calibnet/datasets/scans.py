@@ -59,7 +59,7 @@ def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.f
         raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame or copy the scan again.")
     try:
         if ending(path, SCAN_SUFFIXES) in BIN_SUFFIXES:
-            return _points(read_bin(data, columns))
+            return points_of(read_bin(data, columns))
         return _READERS[path.suffix.lower()](data)
     except CloudError as error:
         raise DatasetError(f"Scan {path} cannot be read: {error}; copy it again or write it anew.") from None
@@ -136,11 +136,15 @@ def ending(path: Path, suffixes: Sequence[str]) -> str:
 
 def _table(read: Callable[[bytes], Columns]) -> Callable[[bytes], NDArray[np.float32]]:
     """A reader of columns as a reader of points."""
-    return lambda data: _points(read(data))
+    return lambda data: points_of(read(data))
 
 
-def _points(columns: Columns) -> NDArray[np.float32]:
-    """``[N, 4]`` of columns by name."""
+def points_of(columns: Columns) -> NDArray[np.float32]:
+    """``[N, 4]`` of columns by name; intensity 0 where there is none.
+
+    Raises:
+        CloudError: a coordinate is missing.
+    """
     if missing := [axis for axis in "xyz" if axis not in columns]:
         raise CloudError(f"it has no column {', '.join(missing)}, only {', '.join(columns) or 'none'}")
     intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)

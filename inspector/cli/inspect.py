@@ -54,6 +54,47 @@ FOLDER_OPTIONS = (
 )
 
 
+BAG_OPTIONS = (
+    click.argument("files", type=click.Path(path_type=Path), nargs=-1, required=True),
+    click.option("--image", metavar="TOPIC", help="Of the images.  [default: the only one]"),
+    click.option("--points", metavar="TOPIC", help="Of the point clouds.  [default: the only one]"),
+    click.option("--info", metavar="TOPIC", help="Of the CameraInfo.  [default: the one beside the images]"),
+    FOLDER_OPTIONS[0],
+    *FOLDER_OPTIONS[2:4],
+    click.option(
+        "--every",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="S",
+        help="A frame in so many seconds, at a standstill where there is one.  [default: about 40 frames]",
+    ),
+    click.option(
+        "--accumulate",
+        type=click.IntRange(1, 100),
+        default=1,
+        metavar="N",
+        help="Put N scans together at a standstill, for scanners that do not repeat their pattern (Livox).",
+    ),
+    click.option(
+        "--max-time-difference",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="MS",
+        help="Milliseconds that an image and its scan may be apart.  [default: 50]",
+    ),
+)
+BAG_ONLY = (
+    *("image", "points", "info", "guess", "camera_frame", "lidar_frame"),
+    *("every", "accumulate", "max_time_difference"),
+)
+"""Those of them that are fields of `calibnet.datasets.bag.BagOptions`."""
+
+
+def bag_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command what says how a bag is read; it passes them on to `open_bag`."""
+    for option in reversed(BAG_OPTIONS):
+        command = option(command)
+    return command
+
+
 FOLDER_ONLY = ("guess", "camera_frame", "lidar_frame", "max_time_difference")
 """Those of them that are no fields of `RunOptions`."""
 
@@ -121,6 +162,19 @@ def folder(directory: Path, dataset: str, **asked: Any) -> int:
 
 
 @click.command()
+@bag_options
+@run_options
+def bag(files: tuple[Path, ...], **asked: Any) -> int:
+    """Calibrate a ROS 1 or ROS 2 bag, or an MCAP file.
+
+    FILES is a .bag, .db3 or .mcap file, the folder of a ROS 2 bag, or several .bag files of one drive. Topics are found
+    where there is one of a kind; the lens comes from CameraInfo, and the first guess from /tf_static. Without --range
+    and --miscalibrate that guess is what is to be corrected; with them it is the reference.
+    """
+    return calibrate(open_bag(files, asked), as_is=not disturbed(asked), **asked)
+
+
+@click.command()
 @click.option("--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Frames to drive.")
 @run_options
 def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> int:
@@ -155,6 +209,21 @@ def open_folder(directory: Path, dataset: str, asked: dict[str, Any]) -> Sequenc
         "max_time_difference": asked.pop("max_time_difference"),
     }
     return open_sequence(dataset, directory, **{name: value for name, value in options.items() if value is not None})
+
+
+def open_bag(files: tuple[Path, ...], asked: dict[str, Any]) -> Sequence:
+    """A bag.
+
+    Args:
+        files: of the bag.
+        asked: all options of the command; `BAG_ONLY` are taken out.
+    """
+    from calibnet.datasets.bag import Bag, BagOptions
+    from calibnet.datasets.calibration_files import FrameChoice
+
+    options = {name: asked.pop(name) for name in BAG_ONLY}
+    frames = FrameChoice(options.pop("camera_frame"), options.pop("lidar_frame"))
+    return Bag(files, BagOptions(frames=frames, **options))
 
 
 def open_odometry(sequence: str, root: Path | None, camera: int) -> Sequence:

@@ -1,4 +1,4 @@
-"""The subcommands ``seq|raw|object|folder`` of groups that say something of a sequence, such as `verify`."""
+"""The subcommands ``seq|raw|object|folder|bag`` of groups that say something of a sequence, such as `verify`."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from typing import Any
 import click
 
 from inspector.cli.inspect import (
+    BAG_ONLY,
     FOLDER_ONLY,
+    bag_options,
     camera_option,
     folder_options,
+    open_bag,
     open_folder,
     open_object,
     open_odometry,
@@ -25,7 +28,7 @@ from inspector.cli.run import run_options
 
 
 def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
-    """Give a group its four subcommands, with all options of a calibration run and ``--json``.
+    """Give a group its subcommands, with all options of a calibration run and ``--json``.
 
     Args:
         group: that they belong to.
@@ -76,3 +79,11 @@ def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
         for name in FOLDER_ONLY:
             del asked[name]
         return act(lambda: open_folder(directory, dataset, of_folder), **asked)
+
+    @group.command()
+    @bag_options
+    @options
+    def bag(files: tuple[Path, ...], **asked: Any) -> int:
+        """Of a ROS 1 or ROS 2 bag, or an MCAP file: of its /tf_static, or of --guess."""
+        of_bag = {name: asked.pop(name) for name in BAG_ONLY}
+        return act(lambda: open_bag(files, of_bag), **asked)

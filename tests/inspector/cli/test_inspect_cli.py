@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from tests.support.bags import write_bag
 from tests.support.folder import write_folder
 
 Invoke = Callable[..., tuple[int, str, str]]
@@ -213,3 +214,25 @@ def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke
     assert "Kilobytes a frame: " in out
     assert "3D scene" in out
     assert "hourglass" not in out
+
+
+def test_a_bag_is_calibrated_from_its_transforms(invoke: Invoke, tmp_path: Path, fakes: ModuleType) -> None:
+    path = write_bag(tmp_path / "drive", "mcap", [fakes.make_frame(number, points=3000) for number in range(2)])
+    code, out, err = invoke("bag", str(path), "--save", "bag.rrd", "--every", "0.5")
+    assert code == 0, err
+    assert "no reference" in out
+    assert "/cam/image_raw/compressed (2) and /points (4): 2 frames, 2 of them at a standstill" in err
+    code, out, err = invoke("bag", str(path), "--save", "again.rrd", "--range", "5/0.5", "--frames", "0")
+    assert code == 0 and "no reference" not in out
+    code, _, err = invoke("bag", str(path), "--headless", "--points", "/lidar")
+    assert code == 3 and "there are: /points (4 PointCloud2)" in err
+
+
+def test_a_folder_takes_its_guess_from_another_file(invoke: Invoke, own_folder: Path, tmp_path: Path) -> None:
+    guess = tmp_path / "guess.yaml"
+    guess.write_text("camera_from_lidar: {translation: [0, 0, 0], quaternion_xyzw: [0.5, -0.5, 0.5, 0.5]}\n")
+    code, _, err = invoke("folder", str(own_folder), "--save", "own.rrd", "--guess", str(guess), "--fix", "x,y,z")
+    assert code == 0, err
+    assert "x, y, z fixed" in err
+    code, _, err = invoke("folder", str(own_folder), "--headless", "--fix", "x,q")
+    assert code == 2 and "'q' is no axis" in err

@@ -1,0 +1,232 @@
+"""A bag as frames: topics found, images and scans paired by their stamps, camera and first guess of the bag itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.bag.messages import (
+    IMAGES,
+    POINTS,
+    TRANSFORMS,
+    camera_info_of,
+    columns_of,
+    links_of,
+    picture_of,
+)
+from calibnet.datasets.bag.moments import STILL_M, change, periods, stillest
+from calibnet.datasets.bag.recording import BagRecording, Stamped
+from calibnet.datasets.bag.topics import found_topic, info_of
+from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
+from calibnet.datasets.calibration_files.frames import camera_from_lidar
+from calibnet.datasets.cloud_table import CloudError
+from calibnet.datasets.frame import Frame, Original
+from calibnet.datasets.images import ImageError
+from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
+from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
+from calibnet.datasets.scans import clean_points, full_scale_of, points_of
+from calibnet.datasets.selection import spread
+from calibnet.errors import DatasetError
+from calibnet.geometry.rectification import central, said_of
+from calibnet.geometry.types import Extrinsic
+
+
+@dataclass(frozen=True)
+class BagOptions:
+    """How a bag is read.
+
+    Attributes:
+        image: topic of the images; None to find it, as for the other two.
+        points: topic of the point clouds.
+        info: topic of the camera's calibration.
+        guess: file with the extrinsic to start from, and with the camera where the bag has none.
+        frames: names of the coordinate frames; by default those that the messages are in.
+        every: seconds from one frame to the next; None for about 40 frames.
+        accumulate: scans put together at a standstill, for scanners that do not repeat their pattern.
+        max_time_difference: milliseconds that an image and its scan may be apart.
+    """
+
+    image: str | None = None
+    points: str | None = None
+    info: str | None = None
+    guess: Path | None = None
+    frames: FrameChoice = BY_NAME
+    every: float | None = None
+    accumulate: int = 1
+    max_time_difference: float | None = None
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An image and its scans, by the times at which they were recorded."""
+
+    image: Stamped
+    scans: tuple[Stamped, ...]
+
+
+class Bag:
+    """Frames of one camera and one LiDAR in a bag; a `calibnet.datasets.frame.Sequence`."""
+
+    def __init__(self, paths: Sequence[Path], options: BagOptions = BagOptions()) -> None:
+        """Open a bag.
+
+        Args:
+            paths: a ``.bag``, ``.db3`` or ``.mcap`` file, a ROS 2 bag's folder, or several files of ROS 1.
+            options: how it is read.
+
+        Raises:
+            DatasetError: it cannot be read, a topic is missing or one of several, nothing pairs, or camera or guess
+                are not known.
+        """
+        self._bag, self._options = BagRecording(paths), options
+        self.image = found_topic(self._bag, options.image, IMAGES, "image", "images")
+        self.points = found_topic(self._bag, options.points, POINTS, "points", "point clouds")
+        images, scans = self._bag.times(self.image), self._bag.times(self.points)
+        first_image = next(self._bag.messages(self.image, most=1)).content
+        first_scan = next(self._bag.messages(self.points, most=1)).content
+        guess = None if options.guess is None else read_calibration(options.guess, Wanted(frames=options.frames))
+        info = info_of(self._bag, options.info, self.image)
+        camera = None if guess is None else guess.camera
+        if info is not None:
+            message = next(self._bag.messages(info, most=1)).content
+            camera = ros.read(camera_info_of(message), Path(f"{self._bag}, {info}")).camera
+        if camera is None:
+            raise DatasetError(
+                f"Bag {self._bag} holds no CameraInfo of {self.image}; give the camera's calibration with --guess "
+                "FILE, or its topic with --info."
+            )
+        self._rectification = central(camera)
+        frames = FrameChoice(
+            options.frames.camera or str(first_image.header.frame_id).lstrip("/"),
+            options.frames.lidar or str(first_scan.header.frame_id).lstrip("/"),
+        )
+        extrinsic = None if guess is None else guess.camera_from_lidar
+        self.camera_from_lidar = self._of_transforms(frames) if extrinsic is None else extrinsic
+        remarks = [*of_lens(camera), *of_camera(self._rectification.pinhole), *of_extrinsic(self.camera_from_lidar)]
+        refuse(remarks, f"Calibration of {self.image} in {self._bag}")
+        self.name = f"bag/{Path(self._bag.paths[0]).stem}"
+        self.rig = f"{self.image}, {self.points}"
+        self._full_scale = full_scale_of(self._intensities(scans))
+        self.moments, notes = self._moments(images, scans)
+        self.notes = (*notes, *said_of(self._rectification))
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.moments)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames in order."""
+        return (self[position] for position in range(len(self)))
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read one frame.
+
+        Raises:
+            DatasetError: a message of it is damaged, or holds what cannot be right.
+            IndexError: there is no such position.
+        """
+        moment, camera = self.moments[position], self._rectification.camera
+        where = f"{self._bag}, {self.image} at {moment.image.seconds:.3f} s"
+        try:
+            taken = picture_of(self._bag.message(self.image, moment.image.recorded).content)
+        except ImageError as error:
+            raise DatasetError(f"The image of {where} {error}.") from None
+        if taken.shape[:2] != (camera.height, camera.width):
+            raise DatasetError(
+                f"The image of {where} is {taken.shape[1]}x{taken.shape[0]} and its CameraInfo is for "
+                f"{camera.width}x{camera.height}; give the topic of the images as they are calibrated."
+            )
+        points = np.concatenate([self._scan(scan) for scan in moment.scans])
+        original = None if camera.is_pinhole else Original(taken, camera)
+        remarks = refuse([bit_depth(taken)], f"Image of {where}") + refuse(of_scan(points), f"Scan of {where}")
+        return Frame(
+            index=position,
+            timestamp=moment.image.seconds - self.moments[0].image.seconds,
+            image=taken if original is None else self._rectification(taken),
+            points=points,
+            camera=self._rectification.pinhole,
+            camera_from_lidar=self.camera_from_lidar,
+            source=where,
+            remarks=remarks,
+            original=original,
+        )
+
+    def _scan(self, at: Stamped) -> NDArray[np.float32]:
+        """Clean points ``[N, 4]`` of one message."""
+        return clean_points(self._raw(at), Path(f"{self._bag}, {self.points}"), self._full_scale)
+
+    def _raw(self, at: Stamped) -> NDArray[np.float32]:
+        try:
+            return points_of(columns_of(self._bag.message(self.points, at.recorded).content))
+        except CloudError as error:
+            raise DatasetError(f"The scan of {self._bag}, {self.points} at {at.seconds:.3f} s: {error}.") from None
+
+    def _intensities(self, scans: list[Stamped]) -> NDArray[np.float32]:
+        return np.concatenate([self._raw(scans[position])[:, 3] for position in spread(len(scans), 4)])
+
+    def _of_transforms(self, frames: FrameChoice) -> Extrinsic:
+        links = [
+            link
+            for topic in self._bag.of_type(TRANSFORMS)
+            if topic.name.endswith("tf_static")
+            for message in self._bag.messages(topic.name)
+            for link in links_of(message.content)
+        ]
+        if not links:
+            raise DatasetError(
+                f"Bag {self._bag} has no /tf_static, which would say where the LiDAR is; give a first guess with "
+                "--guess FILE."
+            )
+        return camera_from_lidar(links, frames, f"{self._bag}, /tf_static")
+
+    def _moments(self, images: list[Stamped], scans: list[Stamped]) -> tuple[list[Moment], tuple[str, ...]]:
+        """The frames: of each period the stillest scan, with the image nearest to it."""
+        most = self._options.max_time_difference or MAX_TIME_DIFFERENCE_MS
+        images = sorted(images, key=lambda one: one.seconds)
+        scans = sorted(scans, key=lambda one: one.seconds)
+        taken = np.array([one.seconds for one in images])
+        swept = np.array([one.seconds for one in scans])
+        nearest = np.abs(swept[:, None] - taken[_around(taken, swept)])
+        image_of = _around(taken, swept)[np.arange(len(scans)), nearest.argmin(axis=1)]
+        apart = 1000 * nearest.min(axis=1)
+        paired = np.flatnonzero(apart <= most)
+        if not len(paired):
+            raise DatasetError(
+                f"No scan of {self.points} has an image of {self.image} within {most:g} ms, the nearest is "
+                f"{apart.min():.0f} ms off; check the clocks, or give a larger --max-time-difference."
+            )
+
+        def moved(position: int) -> float:
+            other = position + 1 if position + 1 < len(scans) else position - 1
+            return change(self._raw(scans[position]), self._raw(scans[other])) if other >= 0 else np.inf
+
+        moments, still = [], 0
+        for period in periods(swept[paired], self._options.every):
+            position, motion = stillest(paired[period].tolist(), moved)
+            still += motion <= STILL_M
+            together = self._options.accumulate if motion <= STILL_M else 1
+            start = max(0, min(position - together // 2, len(scans) - together))
+            chosen = scans[start : start + together] if together > 1 else scans[position : position + 1]
+            moments.append(Moment(images[image_of[position]], tuple(chosen)))
+        farthest = max(abs(one.image.seconds - _middle(one.scans)) for one in moments) if moments else 0.0
+        notes = [
+            f"{self.image} ({len(images)}) and {self.points} ({len(scans)}): {len(moments)} frames, {still} of them at "
+            f"a standstill, image and scan up to {1000 * farthest:.0f} ms apart."
+        ]
+        if 1000 * farthest > WORTH_A_WARNING_MS and still < len(moments):
+            notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm: record while standing, if you can.")
+        return moments, tuple(notes)
+
+
+def _around(taken: NDArray[np.float64], swept: NDArray[np.float64]) -> NDArray[np.int64]:
+    """``[N, 2]``: for each scan the images before and after it."""
+    after = np.clip(np.searchsorted(taken, swept), 0, len(taken) - 1)
+    return np.stack([np.maximum(after - 1, 0), after], axis=1)
+
+
+def _middle(scans: Sequence[Stamped]) -> float:
+    return float(np.mean([one.seconds for one in scans]))

@@ -1,0 +1,149 @@
+"""Messages of ROS as pictures, points, cameras and transforms."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.calibration_files.frames import Link
+from calibnet.datasets.cloud_table import MOST_POINTS, CloudError, Columns
+from calibnet.datasets.images import ImageError, decode_image, eight_bits
+from calibnet.geometry import transform
+from calibnet.geometry.types import Rotation
+
+IMAGES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
+POINTS = ("sensor_msgs/msg/PointCloud2",)
+INFOS = ("sensor_msgs/msg/CameraInfo",)
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+
+CHANNELS: dict[str, tuple[type[np.generic], int, int | None]] = {
+    "rgb8": (np.uint8, 3, None),
+    "bgr8": (np.uint8, 3, cv2.COLOR_BGR2RGB),
+    "8UC3": (np.uint8, 3, cv2.COLOR_BGR2RGB),
+    "rgba8": (np.uint8, 4, cv2.COLOR_RGBA2RGB),
+    "bgra8": (np.uint8, 4, cv2.COLOR_BGRA2RGB),
+    "mono8": (np.uint8, 1, cv2.COLOR_GRAY2RGB),
+    "8UC1": (np.uint8, 1, cv2.COLOR_GRAY2RGB),
+    "mono16": (np.uint16, 1, cv2.COLOR_GRAY2RGB),
+    "16UC1": (np.uint16, 1, cv2.COLOR_GRAY2RGB),
+    "rgb16": (np.uint16, 3, None),
+    "bgr16": (np.uint16, 3, cv2.COLOR_BGR2RGB),
+    # OpenCV names Bayer patterns by their second row and column, ROS by their first
+    "bayer_rggb8": (np.uint8, 1, cv2.COLOR_BayerBG2RGB),
+    "bayer_bggr8": (np.uint8, 1, cv2.COLOR_BayerRG2RGB),
+    "bayer_gbrg8": (np.uint8, 1, cv2.COLOR_BayerGR2RGB),
+    "bayer_grbg8": (np.uint8, 1, cv2.COLOR_BayerGB2RGB),
+    "bayer_rggb16": (np.uint16, 1, cv2.COLOR_BayerBG2RGB),
+    "bayer_bggr16": (np.uint16, 1, cv2.COLOR_BayerRG2RGB),
+    "bayer_gbrg16": (np.uint16, 1, cv2.COLOR_BayerGR2RGB),
+    "bayer_grbg16": (np.uint16, 1, cv2.COLOR_BayerGB2RGB),
+    "yuv422": (np.uint8, 2, cv2.COLOR_YUV2RGB_UYVY),
+    "uyvy": (np.uint8, 2, cv2.COLOR_YUV2RGB_UYVY),
+    "yuv422_yuy2": (np.uint8, 2, cv2.COLOR_YUV2RGB_YUY2),
+    "yuyv": (np.uint8, 2, cv2.COLOR_YUV2RGB_YUY2),
+}
+"""Encodings of raw images: type and number of a pixel's values, and how OpenCV makes RGB of them."""
+POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""Of the fields of a PointCloud2."""
+
+
+def stamp_of(data: bytes, is_ros2: bool) -> float:
+    """Seconds of the header that images and points begin with, without reading the rest; 0 where it has none."""
+    at = 4  # after CDR's own header, or the sequence number of ROS 1
+    if len(data) < at + 8:
+        return 0.0
+    little = not is_ros2 or data[1] & 1
+    seconds, nanoseconds = struct.unpack_from("<II" if little else ">II", data, at)
+    return float(seconds + 1e-9 * nanoseconds)
+
+
+def picture_of(message: Any) -> NDArray[np.uint8]:
+    """``[H, W, 3]`` RGB of an image, compressed or raw.
+
+    Raises:
+        ImageError: it is damaged, or of an encoding that is not known here.
+    """
+    if not hasattr(message, "encoding"):
+        return decode_image(bytes(message.data))
+    encoding = str(message.encoding)
+    known = CHANNELS.get(encoding) or CHANNELS.get(encoding.lower())
+    if known is None:
+        raise ImageError(f"has the encoding {encoding!r}, which is not known here; record it compressed, or as rgb8")
+    kind, channels, code = known
+    dtype = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    row = int(message.width) * channels * dtype.itemsize
+    if message.step < row or len(message.data) < message.step * message.height or not row:
+        raise ImageError("has fewer bytes than its size promises")
+    rows = np.asarray(message.data, np.uint8)[: message.step * message.height].reshape(message.height, message.step)
+    pixels = np.ascontiguousarray(rows[:, :row]).view(dtype).reshape(message.height, message.width, channels)
+    if dtype.itemsize == 2:
+        pixels = eight_bits(pixels.astype(np.uint16))
+    rgb = pixels if code is None else cv2.cvtColor(pixels if channels > 1 else pixels[..., 0], code)
+    return np.ascontiguousarray(rgb, np.uint8)
+
+
+def columns_of(message: Any) -> Columns:
+    """Columns ``[N]`` of a PointCloud2 of any layout, by name in lower case.
+
+    Raises:
+        CloudError: it promises more than it holds.
+    """
+    order = ">" if message.is_bigendian else "<"
+    count, step, width = int(message.width) * int(message.height), int(message.point_step), int(message.width)
+    if count > MOST_POINTS or not 0 < step <= 4096:
+        raise CloudError(f"it promises {count:,} points of {step} bytes")
+    data = np.asarray(message.data, np.uint8)
+    if message.height > 1 and message.row_step > width * step:  # rows with something behind them
+        if len(data) < message.row_step * message.height:
+            raise CloudError(f"it is truncated, it promises {count:,} points")
+        data = data[: message.row_step * message.height].reshape(message.height, message.row_step)
+        data = np.ascontiguousarray(data[:, : width * step]).reshape(-1)
+    if len(data) < count * step:
+        raise CloudError(f"it is truncated, it promises {count:,} points")
+    fields: dict[str, tuple[str, int]] = {}
+    for field in message.fields:
+        kind = POINT_TYPES.get(int(field.datatype))
+        if kind is not None and int(field.count) <= 1 and int(field.offset) + np.dtype(kind).itemsize <= step:
+            fields.setdefault(str(field.name).lower(), (order + kind, int(field.offset)))
+    rows = data[: count * step].reshape(count, step)
+    return {
+        name: np.ascontiguousarray(rows[:, offset : offset + np.dtype(kind).itemsize]).view(kind)[:, 0]
+        for name, (kind, offset) in fields.items()
+    }
+
+
+def camera_info_of(message: Any) -> dict[str, Any]:
+    """A CameraInfo as `calibnet.datasets.calibration_files.ros` reads one."""
+    roi = message.roi
+    lower = hasattr(message, "k")
+    return {
+        "width": int(message.width),
+        "height": int(message.height),
+        "distortion_model": str(message.distortion_model),
+        "D": np.asarray(message.d if lower else message.D, np.float64).tolist(),
+        "K": np.asarray(message.k if lower else message.K, np.float64).tolist(),
+        "binning_x": int(message.binning_x),
+        "binning_y": int(message.binning_y),
+        "roi": {"x_offset": int(roi.x_offset), "y_offset": int(roi.y_offset)},
+    }
+
+
+def links_of(message: Any) -> Iterator[Link]:
+    """The transforms of a message of ``/tf_static``."""
+    for one in message.transforms:
+        moved, turned = one.transform.translation, one.transform.rotation
+        rotation = _rotation(np.array([turned.x, turned.y, turned.z, turned.w], np.float64))
+        parent, child = str(one.header.frame_id).lstrip("/"), str(one.child_frame_id).lstrip("/")
+        yield Link(parent, child, transform(rotation, [moved.x, moved.y, moved.z]))
+
+
+def _rotation(xyzw: NDArray[np.float64]) -> Rotation:
+    from scipy.spatial.transform import Rotation as ScipyRotation
+
+    length = float(np.linalg.norm(xyzw))
+    return np.asarray(ScipyRotation.from_quat(xyzw).as_matrix(), np.float64) if length > 1e-6 else np.eye(3)

@@ -1,0 +1,62 @@
+"""Which moments of a drive are calibrated: spread over it, at standstill where there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry.types import Floats
+
+MOMENTS = 40
+"""Of a bag, by default: more frames of one drive tell little more."""
+SHORTEST_S = 1.0
+"""From one to the next."""
+TRIED = 3
+"""Moments of each period that are looked at for the stillest."""
+CELL_DEG = 2.0
+STILL_M = 0.03
+"""Median change of range from one scan to the next up to which everything stands still."""
+
+
+def change(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """Metres by which ranges change from one scan ``[N, 4]`` to another, the median over directions."""
+    ranges = [_ranges(points) for points in (one, other)]
+    both = np.isfinite(ranges[0]) & np.isfinite(ranges[1])
+    return float(np.median(np.abs(ranges[0] - ranges[1])[both])) if both.any() else np.inf
+
+
+def periods(seconds: Floats, every: float | None) -> list[NDArray[np.int64]]:
+    """Positions of times, in order, by period; about `MOMENTS` periods by default.
+
+    Args:
+        seconds: ``[N]``, rising.
+        every: length of a period in seconds.
+    """
+    length = every if every is not None else max(SHORTEST_S, float(np.ptp(seconds)) / MOMENTS)
+    number = np.floor((seconds - seconds[0]) / max(length, 1e-3)).astype(np.int64)
+    return [np.flatnonzero(number == one) for one in np.unique(number)]
+
+
+def stillest(candidates: Sequence[int], moved: Callable[[int], float]) -> tuple[int, float]:
+    """The candidate at which least changes, of `TRIED` spread over them, and how much that is."""
+    some = np.unique(np.linspace(0, len(candidates) - 1, min(TRIED, len(candidates))).astype(int))
+    found = {int(candidates[place]): moved(int(candidates[place])) for place in some}
+    best = min(found, key=lambda position: (found[position], position))
+    return best, found[best]
+
+
+def _ranges(points: NDArray[np.float32]) -> Floats:
+    """The median range in each cell of directions; NaN where there is no point."""
+    x, y, z = points[:, :3].astype(np.float64).T
+    distance = np.sqrt(x * x + y * y + z * z)
+    column = ((np.degrees(np.arctan2(y, x)) + 180) / CELL_DEG).astype(int)
+    row = ((np.degrees(np.arctan2(z, np.hypot(x, y))) + 90) / CELL_DEG).astype(int)
+    width = int(360 / CELL_DEG) + 1
+    cell = row * width + column
+    order = np.lexsort((distance, cell))
+    cells, starts, counts = np.unique(cell[order], return_index=True, return_counts=True)
+    ranges = np.full(width * (int(180 / CELL_DEG) + 1), np.nan)
+    ranges[cells] = distance[order][starts + counts // 2]
+    return ranges

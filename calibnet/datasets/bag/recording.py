@@ -1,0 +1,133 @@
+"""An open bag: its topics, and messages by topic and time; every failure is one sentence."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from calibnet.datasets.bag.messages import stamp_of
+from calibnet.errors import DatasetError
+
+
+class Topic(NamedTuple):
+    """A topic, the type of its messages, and how many there are."""
+
+    name: str
+    type: str
+    messages: int
+
+
+class Stamped(NamedTuple):
+    """When a message was recorded, in nanoseconds, and what time its own header says, in seconds."""
+
+    recorded: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message as it was deserialized, and its time."""
+
+    content: Any
+    seconds: float
+
+
+class BagRecording:
+    """One bag, or the several files of one."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        """Open it.
+
+        Raises:
+            DatasetError: it is missing, damaged, or of a kind that is not known here.
+        """
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+
+        self.paths = list(paths)
+        for path in self.paths:
+            if not path.exists():
+                raise DatasetError(
+                    f"Bag {path} does not exist; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder."
+                )
+        old = any(path.suffix == ".bag" for path in self.paths)
+        with self.failures():
+            self._reader = AnyReader(
+                self.paths, default_typestore=get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+            )
+            self._reader.open()
+        weakref.finalize(self, _close, self._reader)
+
+    @property
+    def topics(self) -> list[Topic]:
+        """All topics, sorted by name."""
+        return sorted(Topic(name, info.msgtype or "", info.msgcount) for name, info in self._reader.topics.items())
+
+    def of_type(self, types: Sequence[str]) -> list[Topic]:
+        """The topics of one of some types that hold messages."""
+        return [topic for topic in self.topics if topic.type in types and topic.messages]
+
+    def times(self, topic: str) -> list[Stamped]:
+        """When the messages of a topic were recorded, and the times that their headers say."""
+        with self.failures():
+            return [
+                Stamped(recorded, stamp_of(data, self._reader.is2) or recorded * 1e-9)
+                for _, recorded, data in self._reader.messages(self._connections(topic))
+            ]
+
+    def messages(self, topic: str, start: int | None = None, most: int | None = None) -> Iterator[Message]:
+        """Messages of a topic from a time on.
+
+        Args:
+            topic: its name.
+            start: nanoseconds, of `Stamped.recorded`; None for the first.
+            most: how many.
+        """
+        with self.failures():
+            found = self._reader.messages(self._connections(topic), start=start)
+            for number, (connection, recorded, data) in enumerate(found):
+                if number == most:
+                    return
+                content = self._reader.deserialize(data, connection.msgtype)
+                yield Message(content, stamp_of(data, self._reader.is2) or recorded * 1e-9)
+
+    def message(self, topic: str, at: int) -> Message:
+        """The message of a topic that was recorded at a time.
+
+        Raises:
+            DatasetError: there is none, or it is damaged.
+        """
+        for message in self.messages(topic, at, 1):
+            return message
+        raise DatasetError(f"Bag {self} holds no message of {topic} at {at}; it is damaged.")
+
+    @contextmanager
+    def failures(self) -> Iterator[None]:
+        """Say in one sentence what a reader of bags, or one of the libraries below it, cannot read."""
+        try:
+            yield
+        except (DatasetError, MemoryError, GeneratorExit):
+            raise
+        except Exception as error:  # bags are read by many hands, which fail in as many ways
+            why = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+            raise DatasetError(
+                f"Bag {self} cannot be read ({why}); reindex it (`rosbag reindex`, `ros2 bag reindex`, `mcap "
+                "recover`), or copy it again."
+            ) from None
+
+    def __str__(self) -> str:
+        """Its first file."""
+        return str(self.paths[0])
+
+    def _connections(self, topic: str) -> list[Any]:
+        return [one for one in self._reader.connections if one.topic == topic]
+
+
+def _close(reader: Any) -> None:
+    """Close a reader that is still open."""
+    if getattr(reader, "stack", None) is not None:
+        reader.close()
