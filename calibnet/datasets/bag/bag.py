@@ -129,6 +129,7 @@ class Bag:
             DatasetError: a message of it is damaged, or holds what cannot be right.
             IndexError: there is no such position.
         """
+        position = range(len(self))[position]
         moment, camera = self.moments[position], self._rectification.camera
         where = f"{self._bag}, {self.image} at {moment.image.seconds:.3f} s"
         try:
