@@ -26,6 +26,8 @@ FALSE_ACCEPTS = 0.01
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
+OF_DRIVES = ("match_error", "lens", "stated", "aligned")
+"""Witnesses of a drive that are fitted: there are few drives, and on those left out all nine do worse than these."""
 LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""
 FEWEST, FEWEST_DRIVES = 10, 6
@@ -82,7 +84,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Doubt, float, FitFigures]:
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    doubt, figures, kept = fit_doubt(runs, FEWEST_DRIVES)
+    doubt, figures, kept = fit_doubt(runs, FEWEST_DRIVES, OF_DRIVES)
     accepted = [run for run in kept if doubt_of(run, doubt) < doubt.accepted_below]  # few others would widen them all
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
     widening = rounded(max(float(np.mean(squares)), 1.0)) if squares else 1.0
@@ -95,8 +97,15 @@ def doubt_of(run: VerdictRun, doubt: Doubt) -> float:
     return doubt(SimpleNamespace(**run.witnesses))
 
 
-def fit_doubt(runs: Sequence[VerdictRun], fewest: int = FEWEST) -> tuple[Doubt, FitFigures, list[VerdictRun]]:
+def fit_doubt(
+    runs: Sequence[VerdictRun], fewest: int = FEWEST, names: Sequence[str] = ()
+) -> tuple[Doubt, FitFigures, list[VerdictRun]]:
     """Fit doubt to runs, and say how it does on sequences that are left out.
+
+    Args:
+        runs: of a known truth.
+        fewest: that have to end right, and wrong.
+        names: of the witnesses to fit; all by default.
 
     Returns:
         The doubt, its figures, and the plain runs that it does not reject.
@@ -111,7 +120,7 @@ def fit_doubt(runs: Sequence[VerdictRun], fewest: int = FEWEST) -> tuple[Doubt, 
             f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
             f"seem to fit; {fewest} of each at least are needed to tell them apart. Make more runs, or add other data."
         )
-    names = list(asked[0].witnesses or {})
+    names = names or list(asked[0].witnesses or {})
     values = np.array([[run.witnesses[name] for name in names] for run in asked if run.witnesses is not None])
     odds = left_out(values, ~good, [run.sequence for run in asked])
     plain = np.array([run.plain for run in asked], bool)

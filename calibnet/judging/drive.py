@@ -65,7 +65,7 @@ def _word(
         return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
     halves = math.exp(witnesses.halves)
     disagreeing = f"; its halves are {halves:.0f} cm apart" if halves > HALVES_CM else ""
-    return REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, (
+    return CANNOT_TELL, (  # not rejected: many of those that are off are off by little more
         f"{used} frames agree, but not as those of drives that end right do (that it is more than "
         f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off is {wrong:.0%} likely){disagreeing}."
     )

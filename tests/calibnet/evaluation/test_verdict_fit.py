@@ -9,6 +9,7 @@ import pytest
 
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.verdict_fit import (
+    OF_DRIVES,
     fit_drives,
     fit_frames,
     fit_spread,
@@ -97,9 +98,13 @@ def test_too_few_runs_of_a_kind_are_a_sentence() -> None:
 
 def test_a_drive_s_covariance_is_widened_to_its_errors() -> None:
     made = [
-        replace(run, information=np.linalg.inv(Spread().covariance(STATED, *BOTH, run.match_error_px) / 4).tolist())
+        replace(
+            run,
+            information=np.linalg.inv(Spread().covariance(STATED, *BOTH, run.match_error_px) / 4).tolist(),
+            witnesses={**(run.witnesses or {}), "aligned": 0.0},
+        )
         for run in runs(400, Spread())
     ]
     doubt, widening, figures = fit_drives(made)
     assert widening == pytest.approx(4.0, rel=0.15) and figures.spread == pytest.approx(1.0, abs=1e-4)
-    assert doubt.weights["match_error"] > 1
+    assert doubt.weights["match_error"] > 1 and set(doubt.weights) == set(OF_DRIVES)
