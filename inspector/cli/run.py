@@ -28,7 +28,7 @@ from inspector.cli.options import (
     STAGES,
 )
 from inspector.cli.output import make_console, say
-from inspector.cli.viewing import saved_lines, viewing_options
+from inspector.cli.viewing import next_lines, saved_lines, viewing_options
 from inspector.run.options import DEFAULT_RANGE, OptionsError, RunOptions
 
 if TYPE_CHECKING:
@@ -42,7 +42,11 @@ if TYPE_CHECKING:
     from inspector.run.summary import Summary
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (
-    click.option("--frames", type=FRAMES, default=":", help="Positions to run, for instance 0:100:5.  [default: all]"),
+    click.option(
+        "--frames",
+        type=FRAMES,
+        help="Positions to run, for instance 0:100:5, or : for all.  [default: all; of more than 200, 200 of them]",
+    ),
     click.option(
         "--range",
         type=RANGE,
@@ -82,7 +86,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--detail",
         type=DETAIL,
         help="full: some 6 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
-        "custom: what --log names.  [default: full]",
+        "custom: what --log names.  [default: full, from 200 frames on overview]",
     ),
     click.option(
         "--log",
@@ -202,6 +206,8 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     known = f", {options.known.words}" if options.known else ""
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
     console.print(what, markup=False, soft_wrap=True)
+    if options.expectation:
+        console.print(options.expectation, markup=False, soft_wrap=True)
     for note in getattr(options.sequence, "notes", ()):
         console.print(note, markup=False, soft_wrap=True)
     for stage in cascade.skipped:
@@ -235,12 +241,14 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
         tell(line)
     if outputs.file is not None and summary.frames:
         tell(size_line(outputs.file, summary.frames))
-        for line in saved_lines(outputs, summary.frames):
+        for line in [*saved_lines(outputs, summary.frames), *next_lines(outputs.file)]:
             tell(line)
         if report is not None:
             from inspector.cli.report import write_report_of
 
             write_report_of(outputs.file, report, on_stderr)
+    for line in summary.matrix_lines():
+        tell(line)
     if outputs.page is not None and not summary.interrupted:
         tell(f"Serving at {outputs.page} until Ctrl-C.")
     if summary.verdict:

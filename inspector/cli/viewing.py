@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import wraps
@@ -75,6 +76,15 @@ def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (overwrite_option, *reversed(_OPTIONS)):
         decorated = option(decorated)
     return decorated
+
+
+def next_lines(file: Path) -> list[str]:
+    """What can be done with a recording."""
+    quoted = shlex.quote(str(file))
+    return [
+        f"A page of it: calib-inspect report {quoted} --out report/ --open",
+        f"The result for other tools: calib-inspect export {quoted} --format ros  (kitti, opencv, json, yaml)",
+    ]
 
 
 def saved_lines(outputs: Outputs, frames: int) -> list[str]:

@@ -56,7 +56,9 @@ def watch_sequence(
     from inspector.record.outputs import Outputs
     from inspector.run.watching import CANNOT_TELL, CHANGED, as_json, sentences, word
 
-    options = checked(opening(), {**asked, "as_is": not disturbed(asked), "drive": True})
+    options = checked(
+        opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}
+    )
     record = bool(viewing.save or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, replace(viewing, headless=True), None) if record else Outputs()
     with recording_to(outputs):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from calibnet.datasets.frame import Sequence
-from calibnet.datasets.selection import select_frames
+from calibnet.datasets.selection import select_frames, spread
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.known import Known
@@ -17,6 +17,12 @@ from inspector.record.contents import Coloring, Contents, Detail, Part
 from inspector.run.start import Start
 
 DEFAULT_RANGE = MiscalibrationRange(5, 0.5)
+
+
+MANY_FRAMES = 200
+"""Frames up to which all are run, and recorded in full, unless the user says otherwise."""
+COST = {True: (0.6, 0.9), False: (0.9, 4.7)}
+"""Seconds on two cores and megabytes a frame, the drive's solution included; of overview detail, and of full."""
 
 
 class OptionsError(ConfigError):
@@ -29,7 +35,8 @@ class RunOptions:
 
     Attributes:
         sequence: what to calibrate.
-        frames: positions in it, as `select_frames` reads them.
+        frames: positions in it, as `select_frames` reads them; None for all, or of a long sequence for
+            `MANY_FRAMES` from all over it.
         camera: which camera of the rig, where the dataset has several.
         as_is: the sequence's extrinsic is what is to be corrected, and no reference.
         range: to draw the miscalibration from; None for `DEFAULT_RANGE`.
@@ -54,7 +61,7 @@ class RunOptions:
     """
 
     sequence: Sequence
-    frames: str = ":"
+    frames: str | None = None
     camera: int | str | None = None
     as_is: bool = False
     range: MiscalibrationRange | None = None
@@ -93,7 +100,7 @@ class RunOptions:
                 "or --miscalibrate to take its calibration for the reference, or choose another --color.",
             ),
             (
-                (self._level is Detail.CUSTOM) != (self.parts is not None),
+                self.detail is not None and (self.detail is Detail.CUSTOM) != (self.parts is not None),
                 "--detail custom and --log belong together: --log says which parts to record.",
             ),
         ):
@@ -103,7 +110,11 @@ class RunOptions:
     @property
     def _level(self) -> Detail:
         """The detail, or what ``parts`` alone means."""
-        return self.detail or (Detail.FULL if self.parts is None else Detail.CUSTOM)
+        if self.detail is not None:
+            return self.detail
+        if self.parts is not None:
+            return Detail.CUSTOM
+        return Detail.OVERVIEW if len(self.positions) >= MANY_FRAMES else Detail.FULL
 
     @cached_property
     def positions(self) -> list[int]:
@@ -112,7 +123,27 @@ class RunOptions:
         Raises:
             DatasetError: there are none.
         """
-        return select_frames(self.sequence, self.frames)
+        if self.frames is None and self.is_long:
+            return spread(len(self.sequence), MANY_FRAMES)
+        return select_frames(self.sequence, self.frames or ":")
+
+    @property
+    def is_long(self) -> bool:
+        """Whether the sequence has so many frames that some of them tell as much."""
+        return len(self.sequence) > MANY_FRAMES
+
+    @property
+    def expectation(self) -> str:
+        """What the run will take, in a sentence; empty for a short one."""
+        count = len(self.positions)
+        if count < MANY_FRAMES:
+            return ""
+        seconds, megabytes = (count * cost for cost in COST[self._level is Detail.OVERVIEW])
+        some = ""
+        if self.frames is None and self.is_long:
+            some = f"{count} of its {len(self.sequence):,} frames, spread over all (--frames : runs every one). "
+        level = " in overview detail (--detail full keeps everything)" if self.detail is None and not self.parts else ""
+        return f"{some}Some {_minutes(seconds)} on two cores, some {_size(megabytes)}{level}."
 
     @property
     def solves_drive(self) -> bool:
@@ -151,15 +182,24 @@ class RunOptions:
         return {
             "sequence": self.sequence.name,
             "rig": self.sequence.rig,
-            "frames": self.frames,
+            "frames": self.frames or (f"{MANY_FRAMES} spread over all" if self.is_long else ":"),
             "camera": "" if self.camera is None else str(self.camera),
             "start": str(self.start),
             "seed": self.seed,
             **({"known": self.known.words} if self.known else {}),
             "stages": ",".join(map(str, stages)),
             "preset": self.preset,
-            "detail": str(self.detail or Detail.FULL),
+            "detail": str(self.detail or (self._level if self.parts is None else Detail.FULL)),
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),
             "sequence_estimate": self.solves_drive,
         }
+
+
+def _minutes(seconds: float) -> str:
+    minutes = max(1, round(seconds / 60))
+    return "1 minute" if minutes == 1 else f"{minutes} minutes" if minutes < 120 else f"{minutes / 60:.0f} hours"
+
+
+def _size(megabytes: float) -> str:
+    return f"{megabytes:.0f} MB" if megabytes < 1000 else f"{megabytes / 1000:.1f} GB"

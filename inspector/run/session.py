@@ -30,7 +30,7 @@ from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import DriveCalibrator, with_causes
 from calibnet.runtime.interruption import StopRequest
 from calibnet.trace import DriveEstimate
-from calibnet.verdict import BadFrame
+from calibnet.verdict import REJECTED, BadFrame
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
@@ -109,6 +109,8 @@ class Session:
                     if recording is None:
                         layout = Layout.of(observation, self.contents, self.drive)
                         recording = Recording(self.outputs.open(), self.description, layout)
+                        if self.outputs.page is not None:
+                            self.console.print(f"Watch it at {self.outputs.page}", markup=False, soft_wrap=True)
                         initial, reference = observation.trace.initial, observation.reference
                     one_mount &= bool(np.allclose(observation.trace.initial, initial, atol=1e-9))
                     self.outputs.check_space()
@@ -186,6 +188,8 @@ class Session:
         self._record_drive_overlays(recording, estimate, stop)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict
+        if estimate.verdict is None or estimate.verdict.word != REJECTED:
+            summary.found = estimate.camera_from_lidar
 
     def _no_drive(self, recording: Recording, summary: Summary, why: str) -> None:
         """Say why the drive is not solved, here and in the recording."""

@@ -9,7 +9,8 @@ from statistics import median
 
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import PoseError, pose_error
-from calibnet.verdict import BadFrame, Verdict
+from calibnet.geometry.types import Extrinsic
+from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector.record.observation import Observation
 from inspector.verdicts import counted, line
 
@@ -28,6 +29,7 @@ class Summary:
         started: when the first frame was begun, in seconds of the clock.
         ended: when the last one was done; None while it is not.
         drive: what all frames together came to, in words.
+        found: the drive's ``camera_from_lidar`` or, of a single frame, that frame's; None where neither is accepted.
         drive_verdict: whether that is good.
         given_verdict: whether the calibration that the run started from is good, where it was to be verified.
     """
@@ -39,6 +41,7 @@ class Summary:
     interrupted: bool = False
     explained: int = 0
     drive: str = ""
+    found: Extrinsic | None = field(default=None, repr=False)
     drive_verdict: Verdict | None = field(default=None, repr=False)
     given_verdict: Verdict | None = field(default=None, repr=False)
     started: float = field(default_factory=time.monotonic)
@@ -57,6 +60,8 @@ class Summary:
             self.verdicts[observation.frame.index] = trace.verdict
         if observation.reference is not None:
             self._numbers.append(observation.frame.index)
+        word = None if trace.verdict is None else trace.verdict.word
+        self.found = trace.corrected if self.frames == 1 and word != REJECTED else None
         self._change.append(pose_error(trace.corrected, trace.initial))
         for errors, extrinsic in ((self._initial, trace.initial), (self._corrected, trace.corrected)):
             error = observation.error(extrinsic)
@@ -120,6 +125,13 @@ class Summary:
                 f"{len(worse)} of {_frames(len(self._corrected))} worse than before, in angle or place: {numbers}."
             )
         return lines
+
+    def matrix_lines(self) -> list[str]:
+        """What was found, as the rows of a matrix."""
+        if self.found is None:
+            return []
+        rows = [" ".join(f"{value:9.5f}" for value in row) for row in self.found[:3]]
+        return [f"camera_from_lidar (metres), {'the whole drive as one' if self.drive else 'of this frame'}:", *rows]
 
     @property
     def verdict(self) -> str:

@@ -147,3 +147,16 @@ def test_frames_that_became_worse_are_counted(record: Callable[..., Any], tmp_pa
     told = summary.of_frames()
     assert told[1].startswith("Worst: frame 1, ")
     assert told[2] == "1 of 3 frames worse than before, in angle or place: 1."
+
+
+def test_the_end_of_a_run_has_what_was_found_as_a_matrix(record: Callable[..., Any], tmp_path: Path) -> None:
+    of_drive = record(tmp_path / "a.rrd", detail="overview", strides=(32,), drive=True).matrix_lines()
+    assert of_drive[0] == "camera_from_lidar (metres), the whole drive as one:"
+    drive = read_run(tmp_path / "a.rrd").drive
+    assert drive is not None
+    np.testing.assert_allclose([[float(value) for value in row.split()] for row in of_drive[1:]], drive[:3], atol=1e-5)
+    one = record(tmp_path / "b.rrd", length=1, detail="overview", strides=(32,)).matrix_lines()
+    assert one[0] == "camera_from_lidar (metres), of this frame:"
+    several = record(tmp_path / "c.rrd", detail="overview", strides=(32,))
+    rejected = record(tmp_path / "d.rrd", length=1, detail="overview", strides=(32,), doubted=(0,))
+    assert several.matrix_lines() == rejected.matrix_lines() == []

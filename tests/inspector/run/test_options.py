@@ -87,3 +87,20 @@ def test_the_identity_has_the_names_that_recordings_always_had() -> None:
 def test_frames_that_are_not_there() -> None:
     with pytest.raises(DatasetError, match="select nothing of test/drive"):
         _ = asked(frames="7").positions
+
+
+def test_of_a_long_sequence_frames_from_all_over_it_are_run_and_it_says_what_that_takes() -> None:
+    many = Drive(list(range(4541)))
+    options = RunOptions(sequence=many)
+    assert len(options.positions) == 200
+    assert options.positions[-1] == 4540 and set(np.diff(options.positions)) <= {22, 23}
+    assert not options.contents.dense and options.identity([5])["detail"] == "overview"
+    assert options.identity([5])["frames"] == "200 spread over all"
+    assert options.expectation == (
+        "200 of its 4,541 frames, spread over all (--frames : runs every one). Some 2 minutes on two cores, some "
+        "180 MB in overview detail (--detail full keeps everything)."
+    )
+    everything = RunOptions(sequence=many, frames=":", detail=Detail.FULL)
+    assert len(everything.positions) == 4541 and everything.contents.dense
+    assert everything.expectation == "Some 68 minutes on two cores, some 21.3 GB."
+    assert asked().expectation == "" and asked().contents.dense
