@@ -51,23 +51,26 @@ def watch(looks: Sequence[DriveLook]) -> Watch:
     white = (said - said.mean(axis=0)) @ whitener.T
     excess = long_run_excess(white)
     changes = _changes(frames, said, white / math.sqrt(excess), covariance * excess)
-    half, count = WINDOW // 2, len(said)
-    counts = np.array([min(count, at + half) - max(0, at - half) for at in range(count)])
-    deviation = np.sqrt(np.diag(covariance) * excess)
-    return Watch(
-        frames,
-        said,
-        windowed(said),
-        deviation / np.sqrt(counts)[:, None],
-        changes,
-        deviation * math.sqrt(2 / WINDOW),
+    means, counts = windowed(
+        said, [int(np.searchsorted(frames, change.frame)) for change in changes if change.until is None]
     )
+    deviation = np.sqrt(np.diag(covariance) * excess)
+    return Watch(frames, said, means, deviation / np.sqrt(counts)[:, None], changes, deviation * math.sqrt(2 / WINDOW))
 
 
-def windowed(said: Floats) -> Floats:
-    """Means ``[N, 6]`` of the frames around each; fewer at the ends."""
-    half = WINDOW // 2
-    return np.array([said[max(0, position - half) : position + half].mean(axis=0) for position in range(len(said))])
+def windowed(said: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]:
+    """Means ``[N, 6]`` of the frames around each, and of how many ``[N]``; none reaches across a change.
+
+    Args:
+        said: ``[N, 6]``.
+        borders: positions of the first frames after changes, ascending.
+    """
+    means, counts, half = np.empty_like(said), np.empty(len(said)), WINDOW // 2
+    for start, stop in pairwise([0, *borders, len(said)]):
+        for at in range(start, stop):
+            around = said[max(start, at - half) : min(stop, at + half)]
+            means[at], counts[at] = around.mean(axis=0), len(around)
+    return means, counts
 
 
 def tempered(said: Floats) -> Floats:

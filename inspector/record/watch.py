@@ -85,6 +85,6 @@ def watch_blueprint() -> rrb.Blueprint:
     text = rrb.TextDocumentView(origin=TEXT, name="Did the mount move?")
     return rrb.Blueprint(
         rrb.Horizontal(text, rrb.Grid(*views, grid_columns=3), column_shares=[0.24, 0.76]),
-        rrb.TimePanel(timeline=entities.FRAME),
+        rrb.TimePanel(timeline=entities.FRAME, state="collapsed"),
         collapse_panels=True,
     )

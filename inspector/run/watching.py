@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calibnet.geometry.types import Floats
-from calibnet.watch import WINDOW, Change, Watch, Watched
+from calibnet.watch import SMALLEST_CM, SMALLEST_DEG, WINDOW, Change, Watch, Watched
 
 NO_CHANGE, CHANGED, CANNOT_TELL = "no change", "changed", "cannot tell"
 AXES = ("x", "y", "z", "pitch", "yaw", "roll")
@@ -44,8 +44,9 @@ def said(change: Change) -> str:
     """A change in a sentence."""
     size = f"{change.rotation_deg:.2f}° / {change.translation_cm:.0f} cm"
     turn, shift = most(change)
-    axes = f"most of it {turn} and {shift}"
-    sure = f"{100 * change.confidence:.4g} % sure"
+    shifted = f" and {shift}" if change.translation_cm >= SMALLEST_CM else ""
+    axes = f"most of it {turn}{shifted}" if change.rotation_deg >= SMALLEST_DEG else f"most of it {shift}"
+    sure = "more than 99.99 % sure" if change.confidence > 0.9999 else f"{100 * change.confidence:.4g} % sure"
     if change.until is not None:
         return f"Frames {change.frame} to {change.until}: the mount drifts by {size} ({axes}; {sure})."
     return f"Frame {change.frame}: the mount has moved by {size} ({axes}; {sure})."

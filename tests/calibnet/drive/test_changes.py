@@ -85,6 +85,13 @@ def test_the_windowed_estimate_lies_in_its_band() -> None:
     np.testing.assert_allclose(found.smallest, np.sqrt(2) * found.sigma[200], rtol=1e-9)
 
 
+def test_no_window_reaches_across_a_step() -> None:
+    found = watch(looks(moved(noise(100), 50, 4 * YAW)))
+    before, after = found.windowed[49, 4], found.windowed[50, 4]
+    assert np.degrees(after - before) == pytest.approx(2.0, abs=0.25)
+    assert found.sigma[49, 4] == pytest.approx(found.sigma[25, 4] * np.sqrt(WINDOW / (WINDOW // 2 + 1)), rel=0.01)
+
+
 def test_too_few_frames_and_too_small_changes() -> None:
     with pytest.raises(ValueError, match="16 are needed"):
         watch(looks(noise(2 * SHORTEST - 1)))
