@@ -13,6 +13,7 @@ from calibnet.cascade.prepared import PreparedFrames, prepared
 from calibnet.cascade.stage import Stage, load_stage
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
+from calibnet.drive.rig import RigCamera, solve_rig
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
@@ -217,6 +218,41 @@ class Cascade:
         doubt = self.coefficients.drive_doubt_of(self.stages[-1].range)
         verdict = judge_drive(estimate, start, self.stages[0].range, doubt)
         return upright.undo_drive(replace(estimate, verdict=verdict))
+
+    def calibrate_rig(
+        self,
+        cameras: Sequence[RigCamera],
+        initial: Extrinsic,
+        observer: Callable[[int, int], None] | None = None,
+    ) -> DriveEstimate:
+        """Correct the one pose of a rig whose cameras are known relative to each other.
+
+        See `calibnet.drive.rig.solve_rig`.
+
+        Args:
+            cameras: of the rig, each with its frames.
+            initial: ``rig_from_lidar`` to start from, 4x4; what is known beforehand is known of it.
+            observer: as of `calibrate_drive`.
+
+        Returns:
+            The estimate; its ``camera_from_lidar`` is ``rig_from_lidar``, and its covariance in the rig's frame.
+
+        Raises:
+            CalibrationError: no frame of any camera could be calibrated.
+            DatasetError: none could be read.
+        """
+        searched, prepared_cameras = self.stages[0].range, []
+        for camera in cameras:
+            upright = Upright.of(camera.camera_from_rig @ initial, searched)
+            frames, turned = PreparedFrames(camera.frames, upright), upright.extrinsic(camera.camera_from_rig)
+            prepared_cameras.append(RigCamera(camera.name, frames, turned))
+        held = self.known.about(initial) if self.known else None
+        estimate = solve_rig(self.stages, prepared_cameras, initial, self.common, observer, held)
+        if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
+            stages = [*wider, *self.stages]
+            estimate = solve_rig(stages, prepared_cameras, initial, self.common, observer, held)
+        verdict = judge_drive(estimate, initial, searched, self.coefficients.doubt_of(self.stages[-1].range))
+        return replace(estimate, verdict=verdict)
 
     def _run(
         self,

@@ -41,6 +41,7 @@ class Folder(PairedSequence):
         camera: str | None = None,
         frames: FrameChoice = BY_NAME,
         max_time_difference: float | None = None,
+        clouds: Path | None = None,
     ) -> None:
         """Open a folder.
 
@@ -51,6 +52,7 @@ class Folder(PairedSequence):
             camera: its name, in a calibration file of several cameras.
             frames: names of the coordinate frames of camera and LiDAR, in a file of many.
             max_time_difference: pair by time, what is at most so many milliseconds apart, see `pair`.
+            clouds: folder of the scans; ``clouds`` in ``root`` by default.
 
         Raises:
             DatasetError: one of them is missing, malformed or cannot be right, or images and scans do not pair.
@@ -59,7 +61,9 @@ class Folder(PairedSequence):
         layout = "a data folder holds images/, clouds/ and calibration.yaml"
         require_folder(root, layout)
         images = files_by_stem(require_folder(root / "images", layout), IMAGE_SUFFIXES, "images")
-        scans = files_by_stem(require_folder(root / "clouds", layout), SCAN_SUFFIXES, "scans")
+        scans = files_by_stem(
+            require_folder(root / "clouds" if clouds is None else clouds, layout), SCAN_SUFFIXES, "scans"
+        )
         pairing = pair(images, scans, max_time_difference)
         self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
         assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None

@@ -64,12 +64,12 @@ class Consensus:
         Raises:
             ValueError: there are none.
         """
-        mean, covariance = self._agreed()
+        mean, covariance = self.agreed()
         if self.held is not None:
             mean, covariance = self.held.fused(mean, inverse(covariance + self.common), self.before)
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
-    def _agreed(self) -> tuple[Vector6, Matrix6]:
+    def agreed(self) -> tuple[Vector6, Matrix6]:
         """The correction of all frames, without what is known beforehand, and its covariance."""
         if not self._vectors:
             raise ValueError("There is no frame to estimate from.")
@@ -98,16 +98,16 @@ class Consensus:
             starts: where the alignment starts, of which the best result is taken; at what the frames agree on by
                 default.
         """
-        agreed = self.estimate()
+        known = self.estimate()
         others = [pose_vector(one.camera_from_lidar @ invert(self.before)) for one in starts]
-        likely, covariance = self._agreed()
+        likely, covariance = self.agreed()
         covariance = covariance + common
         if self.held is not None:
             likely, covariance = self.held.fused(likely, inverse(covariance), self.before)
-        if agreed.rotation_deg > FARTHEST_ROTATION_DEG or agreed.translation_cm > 100 * FARTHEST_TRANSLATION_M:
+        if known.rotation_deg > FARTHEST_ROTATION_DEG or known.translation_cm > 100 * FARTHEST_TRANSLATION_M:
             evidence = ()
         correction, covariance = align(evidence, likely, covariance, others)
-        return Estimate(pose_from_vector(correction) @ self.before, covariance, agreed.frames)
+        return Estimate(pose_from_vector(correction) @ self.before, covariance, known.frames)
 
     def _solve(self, vectors: Floats, informations: Floats, weights: Floats) -> tuple[Matrix6, Vector6]:
         """Summed normal equations of vectors ``[N, 6]`` and informations ``[N, 6, 6]``: matrix and solution."""

@@ -36,6 +36,7 @@ COMMANDS = {
     "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
     "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
     "bag": LazyCommand("inspector.cli.inspect:bag", "The same for a ROS 1 or ROS 2 bag, or an MCAP file."),
+    "rig": LazyCommand("inspector.cli.rig:rig", "Several cameras on one LiDAR, each alone or all as one rig."),
     "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
     "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand and see what the cascade answers."),
     "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),

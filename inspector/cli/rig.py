@@ -1,0 +1,99 @@
+"""``calib-inspect rig``: several cameras and a LiDAR, each camera on its own, or all as one rigid rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from calibnet.geometry.types import Transform
+from calibnet.runtime.writing import Kind
+from inspector.cli.errors import VERDICT_CODES
+from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES
+from inspector.cli.output import JSON_FILE, make_console, overwrite_option, prepare_json, say, write, write_json
+
+
+@click.command()
+@click.argument("folders", type=FOLDER, nargs=-1, required=True, metavar="FOLDER | DIR DIR...")
+@click.option(
+    "--rigid",
+    is_flag=True,
+    help="The cameras are known relative to each other, by rig_from_camera in their calibrations or else by the "
+    "extrinsics given: one pose for all.",
+)
+@click.option(
+    "--miscalibrate",
+    "miscalibration",
+    type=MISCALIBRATION,
+    help="Put this on the rig, in the first camera's axes, and take the extrinsics given for the truth.",
+)
+@click.option("--fix", type=AXES, help="Axes that are known exactly, of each camera, or of the first with --rigid.")
+@click.option("--prior-translation", type=LENGTH, help="The place is known to this, on each axis.")
+@click.option("--prior-rotation", type=ANGLE, help="The rotation is known to this, about each axis.")
+@click.option("--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run.")
+@click.option("--preset", default="compact", show_default=True, help="Network to use.")
+@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The extrinsics as JSON; - for stdout.")
+@click.option(
+    "--output",
+    type=FOLDER,
+    metavar="DIR",
+    help="Write a calibration.yaml with what was found for each camera there, NAME.yaml; not what is rejected.",
+)
+@overwrite_option
+def rig(
+    folders: tuple[Path, ...],
+    rigid: bool,
+    miscalibration: Transform | None,
+    fix: tuple[str, ...] | None,
+    prior_translation: float | None,
+    prior_rotation: float | None,
+    stages: tuple[int, ...],
+    preset: str,
+    weights: Path | None,
+    json_file: str | None,
+    output: Path | None,
+) -> int:
+    """Calibrate several cameras against one LiDAR.
+
+    FOLDER holds cameras/NAME/ for each camera, with images/ and calibration.yaml, and clouds/ for those that have none
+    themselves. Or give a plain folder for each camera. Without --rigid each camera is solved on its own, from all its
+    frames; with it all frames of all cameras say where the one rig is.
+
+    Exits with 0 if everything is accepted, 1 if something is rejected, 4 if something cannot be told.
+    """
+    from calibnet.cascade.cascade import Cascade
+    from calibnet.geometry.known import Known
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.export.registry import export_as
+    from inspector.run.rig import open_rig, solve
+    from inspector.run.session import STOPPING, frame_progress
+
+    prepare_json(json_file)
+    cameras = open_rig(folders)
+    known = Known.of(fix or (), prior_translation, prior_rotation)
+    cascade = Cascade.load(preset, stages, weights, False, known)
+    with StopRequest(STOPPING) as stop, frame_progress(make_console()) as progress:
+
+        def observer(name: str) -> Callable[[int, int], None]:
+            task = progress.add_task(name, total=None)
+
+            def advance(read: int, total: int) -> None:
+                progress.update(task, completed=read, total=total)
+                if stop.requested:
+                    raise KeyboardInterrupt
+
+            return advance
+
+        solved = solve(cascade, cameras, rigid, miscalibration, observer)
+    beside = json_file == "-"
+    for line in solved.lines():
+        say(line, err=beside)
+    write_json(json_file, solved.as_dict())
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+        for name, exported in solved.exported().items():
+            write(output / f"{name}.yaml", export_as("yaml", exported).encode(), Kind.EXPORT)
+            say(f"Saved {output / f'{name}.yaml'}.", err=beside)
+    return VERDICT_CODES[solved.word]

@@ -1,0 +1,146 @@
+"""``calib-inspect rig``: how a rig lies in folders, where its cameras are relative to each other, and what is said."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_allclose
+
+from calibnet.cascade.cascade import Cascade
+from calibnet.datasets.calibration_files import read_calibration
+from calibnet.drive.rig import adjoint
+from calibnet.errors import DatasetError
+from calibnet.geometry import invert, miscalibration, rotation_from_vector, transform
+from calibnet.trace import DriveEstimate
+from calibnet.verdict import Verdict, Word, moved
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from inspector.run.rig import open_rig, poses
+from tests.support.fakes import REFERENCE
+from tests.support.folder import write_folder
+
+RIGHT_FROM_LEFT = transform(rotation_from_vector([0.0, 0.02, 0.0]), [-0.5, 0.0, 0.0])
+FOUND = miscalibration([0.1, 0.2, 0.3], [0.01, 0.02, 0.03])
+COVARIANCE = np.diag([0.01**2] * 3 + [0.001**2] * 3)
+Invoke = Callable[..., tuple[int, str, str]]
+
+
+class RigCascade:
+    """Finds `FOUND` before the start, whatever it sees."""
+
+    word: Word = "accepted"
+
+    def _estimate(self, initial: np.ndarray) -> DriveEstimate:
+        found = FOUND @ initial
+        verdict = Verdict(self.word, "Because.", found, moved(initial, found), (), COVARIANCE, 2)
+        return DriveEstimate(found, COVARIANCE, 2, verdict=verdict)
+
+    def calibrate_drive(self, frames: Any, initial: np.ndarray, observer: Any = None) -> DriveEstimate:
+        assert len(frames) == 2
+        return self._estimate(initial)
+
+    def calibrate_rig(self, cameras: Any, initial: np.ndarray, observer: Any = None) -> DriveEstimate:
+        observer(1, 2)
+        return self._estimate(initial)
+
+
+@pytest.fixture
+def invoke(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Invoke:
+    monkeypatch.setattr(Cascade, "load", staticmethod(lambda *_: RigCascade()))
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        code = run(cli, ["rig", *arguments])
+        return code, *capsys.readouterr()
+
+    return call
+
+
+def change(folder: Path, **values: Any) -> None:
+    path = folder / "calibration.yaml"
+    content = yaml.safe_load(path.read_text())
+    path.write_text(yaml.safe_dump({name: value for name, value in (content | values).items() if value is not None}))
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    """Two cameras that share the scans."""
+    root = tmp_path / "my rig"
+    for name in ("left", "right"):
+        write_folder(root / "cameras" / name, 2)
+    shutil.move(root / "cameras" / "left" / "clouds", root / "clouds")
+    shutil.rmtree(root / "cameras" / "right" / "clouds")
+    change(root / "cameras" / "right", camera_from_lidar=(RIGHT_FROM_LEFT @ REFERENCE).tolist())
+    return root
+
+
+def test_a_rig_is_one_folder_or_one_for_each_camera(rig: Path, tmp_path: Path) -> None:
+    cameras = open_rig([rig])
+    assert list(cameras) == ["left", "right"]
+    assert [len(camera[0].points) for camera in cameras.values()] == [6000, 6000]
+    apart = [write_folder(tmp_path / name, 1) for name in ("b", "a")]
+    assert list(open_rig(apart)) == ["b", "a"]
+
+
+def test_what_is_no_rig(rig: Path, tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="holds no rig: put a folder of images/ and"):
+        open_rig([tmp_path])
+    other = write_folder(tmp_path / "other" / "left", 1)
+    with pytest.raises(DatasetError, match="Two cameras are called left"):
+        open_rig([write_folder(tmp_path / "more" / "left", 1), other])
+
+
+def test_cameras_are_relative_to_each_other_as_the_extrinsics_say(rig: Path) -> None:
+    camera_from_rig, start = poses(open_rig([rig]), rigid=True)
+    assert_allclose(start, REFERENCE)
+    assert_allclose(camera_from_rig["left"], np.eye(4), atol=1e-12)
+    assert_allclose(camera_from_rig["right"], RIGHT_FROM_LEFT, atol=1e-12)
+
+
+def test_rig_from_camera_goes_before_the_extrinsics(rig: Path) -> None:
+    body_from_left = transform(rotation_from_vector([0.1, 0.2, 0.3]), [1.0, 2.0, 3.0])
+    other = transform(rotation_from_vector([0.0, -0.01, 0.0]), [0.6, 0.0, 0.0])
+    change(rig / "cameras" / "left", rig_from_camera=body_from_left.tolist())
+    with pytest.raises(DatasetError, match="Only some calibrations say rig_from_camera; add it to that of right"):
+        poses(open_rig([rig]), rigid=True)
+    change(rig / "cameras" / "right", rig_from_camera=(body_from_left @ other).tolist())
+    camera_from_rig, start = poses(open_rig([rig]), rigid=True)
+    assert_allclose(camera_from_rig["right"], invert(other), atol=1e-9)
+    assert_allclose(start, REFERENCE)
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_what_is_found_is_told_of_every_camera(rig: Path, invoke: Invoke, rigid: bool) -> None:
+    flags = ["--rigid"] if rigid else []
+    code, out, err = invoke(str(rig), *flags, "--json", "-", "--output", "found")
+    assert code == 0, err
+    content = json.loads(out)
+    assert content["verdict"] == "accepted" and content["rigid"] is rigid
+    right = RIGHT_FROM_LEFT @ FOUND @ REFERENCE if rigid else FOUND @ RIGHT_FROM_LEFT @ REFERENCE
+    assert_allclose(content["cameras"]["right"]["camera_from_lidar"], right, atol=1e-9)
+    expected = adjoint(RIGHT_FROM_LEFT) @ COVARIANCE @ adjoint(RIGHT_FROM_LEFT).T if rigid else COVARIANCE
+    assert_allclose(content["cameras"]["right"]["sigma"]["covariance"], expected, atol=1e-12)
+    assert f"of 2 cameras {'as one rigid rig' if rigid else 'each on its own'}" in err
+    assert_allclose(read_calibration(Path("found/right.yaml")).camera_from_lidar, right, atol=1e-9)
+
+
+def test_a_disturbed_rig_is_held_against_what_it_was(rig: Path, invoke: Invoke) -> None:
+    _, out, _ = invoke(str(rig), "--rigid", "--miscalibrate", "0,0,0,0,0,0")
+    assert "left: accepted, corrected by 0.37°" in out and "off the reference by 0.37°" in out
+    assert out.splitlines()[-1] == "Verdict: accepted, of 2 cameras as one rigid rig."
+
+
+def test_the_worst_camera_decides(rig: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RigCascade, "word", "rejected")
+    code, out, _ = invoke(str(rig), "--output", "found")
+    assert code == 1 and "left: rejected" in out
+    assert not Path("found/left.yaml").exists(), "what is rejected is not written"
+    monkeypatch.setattr(RigCascade, "word", "cannot tell")
+    assert invoke(str(rig), "--rigid")[0] == 4
