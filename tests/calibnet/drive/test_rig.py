@@ -86,7 +86,7 @@ def test_what_is_known_of_the_rig_counts():
 def springs(correction: np.ndarray) -> tuple[float, np.ndarray]:
     """Evidence as of edges, but smooth: points of the camera frame that are pulled along and towards its centre."""
     points = POINTS @ correction[:3, :3].T + correction[:3, 3]
-    forces = points + [1.0, -2.0, 0.5]
+    forces = points + np.array([1.0, -2.0, 0.5])
     value = float((0.5 * points**2 + points * [1.0, -2.0, 0.5]).sum())
     return value, np.concatenate([forces.sum(0), np.cross(points - correction[:3, 3], forces).sum(0)])
 
