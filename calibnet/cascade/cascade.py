@@ -13,7 +13,8 @@ from calibnet.cascade.prepared import PreparedFrames, prepared
 from calibnet.cascade.stage import Stage, load_stage
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.drive.rig import RigCamera, solve_rig
+from calibnet.datasets.rig import RigCamera
+from calibnet.drive.rig import solve_rig
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert

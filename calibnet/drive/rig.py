@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from calibnet.alignment import gather
 from calibnet.alignment.evidence import Evidence, Term
 from calibnet.alignment.solve import align
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.rig import RigCamera
 from calibnet.datasets.selection import spread
 from calibnet.drive.consensus import FARTHEST_ROTATION_DEG, FARTHEST_TRANSLATION_M, Consensus
 from calibnet.drive.convergence import Due
@@ -24,25 +25,10 @@ from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, 
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
 from calibnet.geometry.known import Held, inverse
-from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
-from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vector6
+from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
+from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
 from calibnet.trace import DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import BadFrame
-
-
-@dataclass(frozen=True, eq=False)
-class RigCamera:
-    """A camera of a rig, and its frames with the LiDAR.
-
-    Attributes:
-        name: for messages.
-        frames: of this camera.
-        camera_from_rig: 4x4, where the rig is.
-    """
-
-    name: str
-    frames: Frames
-    camera_from_rig: Transform = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -60,13 +46,6 @@ class InRig:
         pivot = rotation @ correction[:3, 3] + self.camera_from_rig[:3, 3]  # that the rig turns about
         torque = gradient[3:] + np.cross(of_camera[:3, 3] - pivot, gradient[:3])
         return value, np.concatenate([rotation.T @ gradient[:3], rotation.T @ torque])
-
-
-def adjoint(camera_from_rig: Transform) -> Floats:
-    """``[6, 6]``: the motion ``(translation, rotation)`` of a camera by one of the rig, small ones of both."""
-    rotation, (x, y, z) = camera_from_rig[:3, :3], camera_from_rig[:3, 3]
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.block([[rotation, cross @ rotation], [np.zeros((3, 3)), rotation]])
 
 
 def joined(

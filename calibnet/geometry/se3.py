@@ -98,6 +98,12 @@ def pose_from_vector(vector: Vector6) -> Transform:
     return transform(rotation_from_vector(vector[3:]), vector[:3])
 
 
+def adjoint(camera_from_rig: Transform) -> Floats:
+    """``[6, 6]``: the small motion ``(translation, rotation)`` of a camera that one of the rig is."""
+    rotation = camera_from_rig[:3, :3]
+    return np.block([[rotation, _cross(camera_from_rig[:3, 3]) @ rotation], [np.zeros((3, 3)), rotation]])
+
+
 def euler_xyz(rotation: NDArray[np.floating]) -> Vector3:
     """The three angles, in radians, of ``rotation_from_euler_xyz`` (for |b| < 90 degrees)."""
     return np.array(

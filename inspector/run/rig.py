@@ -10,9 +10,10 @@ from typing import Protocol
 import numpy as np
 
 from calibnet.datasets.folder import Folder
-from calibnet.drive.rig import RigCamera, adjoint
+from calibnet.datasets.rig import RigCamera
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import CameraModel, invert, pose_error
+from calibnet.geometry.se3 import adjoint
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.trace import DriveEstimate

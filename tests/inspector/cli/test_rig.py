@@ -15,9 +15,9 @@ from numpy.testing import assert_allclose
 
 from calibnet.cascade.cascade import Cascade
 from calibnet.datasets.calibration_files import read_calibration
-from calibnet.drive.rig import adjoint
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert, miscalibration, rotation_from_vector, transform
+from calibnet.geometry.se3 import adjoint
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import Verdict, Word, moved
 from inspector.cli.errors import run
