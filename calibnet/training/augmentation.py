@@ -72,10 +72,10 @@ def virtual_camera(
 
 
 def thin_scan(points: NDArray[np.float32], generator: Generator, recipe: ScanRecipe) -> NDArray[np.float32]:
-    """Fewer beams, fewer points, another reach, noise and another response of the receiver."""
+    """Fewer beams, which those of a scanner nearby have, fewer points, another reach, noise and another response."""
     keep = np.ones(len(points), bool)
     if generator.random() < recipe.banded:
-        elevation = np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))
+        elevation = elevation_for_another(points, generator, recipe)
         band = np.floor(elevation / np.radians(generator.uniform(*recipe.band_deg))).astype(np.int64)
         period = generator.integers(*recipe.bands, endpoint=True)
         keep &= band % period == generator.integers(period)
@@ -91,6 +91,18 @@ def thin_scan(points: NDArray[np.float32], generator: Generator, recipe: ScanRec
         response = generator.uniform(*recipe.response)
         points[:, 3] = np.clip(response * points[:, 3] ** generator.uniform(*recipe.response_gamma), 0, 1)
     return points
+
+
+def elevation_for_another(points: NDArray[np.float32], generator: Generator, recipe: ScanRecipe) -> NDArray[np.float32]:
+    """Elevation ``[N]``, radians, for a scanner nearby that is tilted: its rings cross those of the true one."""
+    roll, pitch = np.radians(generator.normal(0.0, recipe.tilt_deg, 2))
+    if generator.random() < recipe.upended:
+        pitch += np.pi / 2
+    turn = rotation_from_euler_xyz(np.array([roll, pitch, 0.0])).astype(np.float32)
+    place = generator.normal(0.0, recipe.apart_m, 3).astype(np.float32)
+    x, y, z = turn @ (points[:, :3] - place).T
+    elevation: NDArray[np.float32] = np.arctan2(z, np.hypot(x, y))
+    return elevation
 
 
 def photometric(image: NDArray[np.uint8], generator: Generator, recipe: PictureRecipe) -> NDArray[np.uint8]:

@@ -33,6 +33,12 @@ class ScanRecipe:
     """Width of a band, degrees."""
     bands: tuple[int, int] = (2, 4)
     """Of how many neighbouring bands one is kept."""
+    tilt_deg: float = 6.0
+    """Standard deviation of the angles by which the scanner of these bands is tilted about its x and y axes."""
+    upended: float = 0.1
+    """Share of these scanners whose axis points forward instead of up, so that their rings run around the view."""
+    apart_m: float = 0.3
+    """Standard deviation of that scanner's distance from the true one along each axis, metres."""
     thinned: float = 0.5
     """Share of the scans that keep points at random."""
     kept: tuple[float, float] = (0.15, 1.0)

@@ -6,6 +6,7 @@ import signal
 from collections.abc import Iterator
 from typing import cast
 
+import cv2
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader, Sampler
 
@@ -33,6 +34,8 @@ class BatchNumbers(Sampler[list[int]]):
 
 def open_batches(fabric: Fabric, samples: TrainingSamples, first: int, batch: int, workers: int) -> Iterator[Batch]:
     """All batches from number ``first`` on, prepared by so many other processes, on the fabric's device."""
+    # workers that have OpenCV's threads for all cores each hinder one another; told after the fork, they wait for ever
+    cv2.setNumThreads(1)
     loader = DataLoader(
         samples,
         batch_sampler=BatchNumbers(first, batch, fabric.global_rank, fabric.world_size),
@@ -40,6 +43,7 @@ def open_batches(fabric: Fabric, samples: TrainingSamples, first: int, batch: in
         num_workers=workers,
         worker_init_fn=leave_signals_to_main,
         prefetch_factor=4 if workers else None,
+        pin_memory=fabric.device.type == "cuda",
     )
     return cast(Iterator[Batch], iter(fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
 

@@ -9,15 +9,17 @@ import torch
 from lightning_fabric import Fabric
 
 from calibnet.cascade.stage import Stage
+from calibnet.datasets import Sequence
 from calibnet.errors import ConfigError
 from calibnet.geometry import RANGES, MiscalibrationRange
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork
-from calibnet.training.data import Source, training_sources
+from calibnet.training.data import Source, training_sources, validation_sequences
 from calibnet.training.devices import launch
 from calibnet.training.draws import Draws
 from calibnet.training.frames import TrainingFrames
 from calibnet.training.options import TrainingOptions
+from calibnet.training.packed import packed_residuals, read_packed
 from calibnet.training.recipe import RECIPE, OptimizerRecipe, Recipe
 from calibnet.training.residuals import residual_errors, stages_before
 from calibnet.training.samples import TrainingSamples
@@ -63,7 +65,7 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
     start = initialize(network, options)
     stage = open_stage(network, options)
     recipe = recipe.of_run(options, network.config)
-    sources, held_out = training_sources(options)
+    sources, held_out = open_sources(options)
     frames = open_frames(sources, recipe, stage, options)
     draws = open_draws(options, recipe, frames, stage, start.to(fabric.device) if start else None)
     return Training(
@@ -121,6 +123,15 @@ def open_stage(network: CalibrationNetwork, options: TrainingOptions) -> Stage:
     return Stage(number, network.range, network, manifest.settings(network.range))
 
 
+def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]]:
+    """What is trained on, packed or not, and what is validated on."""
+    if not options.packed:
+        return training_sources(options)
+    if options.data:
+        raise ConfigError("Give either --packed, frames that were packed beforehand, or --data.")
+    return read_packed(Path(options.packed)), validation_sequences(options)
+
+
 def open_frames(sources: list[Source], recipe: Recipe, stage: Stage, options: TrainingOptions) -> TrainingFrames:
     """Frames at the size of the stage's image, or cuttings of it where that is larger than the preset's input."""
     config, size = stage.network.config, stage.settings.image_size
@@ -137,6 +148,8 @@ def open_draws(
     would leave what this stage never sees, and a stage that looks once needs no practice in looking again.
     """
     drawn = recipe.draws.of(stage.range)
+    if options.packed and (travelled := packed_residuals(Path(options.packed), stage.range)):
+        return Draws(drawn.range, recipe.draws, travelled, drawn.residual_share)
     if not options.after:
         return Draws(drawn.range, recipe.draws)
     before = stages_before(options.preset, stage.range, Path(options.after))

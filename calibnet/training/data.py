@@ -39,7 +39,7 @@ def training_sources(options: TrainingOptions) -> tuple[list[Source], list[Seque
     Raises:
         ConfigError: there is nothing to train on.
     """
-    validation = [sequence for spec in options.validate for sequence in open_data(spec)]
+    validation = validation_sequences(options)
     held_out = {sequence.name for sequence in validation}
     real = [sequence for spec in options.data for sequence in open_data(spec) if sequence.name not in held_out]
     sources: list[Source] = []
@@ -54,6 +54,11 @@ def training_sources(options: TrainingOptions) -> tuple[list[Source], list[Seque
     if not sources:
         raise ConfigError("There is nothing to train on: give --data, or a --synthetic share above 0.")
     return sources, validation
+
+
+def validation_sequences(options: TrainingOptions) -> list[Sequence]:
+    """The held-out frames, which training never draws from."""
+    return [sequence for spec in options.validate for sequence in open_data(spec)]
 
 
 def open_data(spec: str) -> list[Sequence]:

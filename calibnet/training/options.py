@@ -22,6 +22,8 @@ class TrainingOptions:
     """Folder of checkpoint, weights and manifest."""
     data: list[str] = field(default_factory=list)
     """Real frames to train on, each ``DATASET:FOLDER[:SEQUENCE]``."""
+    packed: str | None = None
+    """Folder of frames packed beforehand (`calibnet.training.packed`), instead of ``data`` and ``synthetic``."""
     validate: list[str] = field(default_factory=list)
     """Held-out frames of that form, never trained on."""
     synthetic: float = 0.4

@@ -165,7 +165,7 @@ class PaceRecipe:
 
     report_seconds: float = 5.0
     """Seconds of training between lines of progress."""
-    checkpoint_seconds: float = 120.0
+    checkpoint_seconds: float = 30.0
     """Seconds of training between checkpoints."""
     validation_seconds: float = 600.0
     """Seconds of training between validations."""

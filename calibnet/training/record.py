@@ -25,6 +25,7 @@ def training_record(
         "scene_cache": None,
         "data": _without_folders(options.data),
         "validate": _without_folders(options.validate),
+        "packed": options.packed and Path(options.packed).name,
         "initialize": options.initialize and Path(options.initialize).name,
         "after": options.after and Path(options.after).name,
     }
@@ -75,7 +76,9 @@ def recipe_sentence(training: Training, samples: int) -> str:
     else:
         start = "random weights" if config.image_encoder == "own" else config.image_encoder
     data = _without_folders(options.data)
-    if options.synthetic > 0:
+    if options.packed:
+        data = ["packed frames"]
+    elif options.synthetic > 0:
         data += [f"{options.synthetic:.0%} synthetic scenes" if data else "synthetic scenes"]
     parts = [f"from {start}", f"{samples:,} samples of {', '.join(data)}"]
     if draws.residuals:

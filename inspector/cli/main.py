@@ -47,6 +47,9 @@ COMMANDS = {
     "check": LazyCommand("inspector.cli.check:check", "Fail when a recording is rejected or exceeds limits; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
+    "pack-training": LazyCommand(
+        "inspector.cli.pack_training:pack_training", "Pack training frames, to train elsewhere."
+    ),
     "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
     "benchmark": LazyCommand(

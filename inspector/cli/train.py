@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     metavar="DATASET:DIR[:SEQ]",
     help="Real frames, for instance kitti-raw:DIR or folder:DIR. Repeatable.",
 )
+@click.option("--packed", type=FOLDER, help="Frames of pack-training, instead of --data and --synthetic.")
 @click.option(
     "--validate",
     multiple=True,
@@ -120,6 +121,7 @@ def train(
     range_: MiscalibrationRange | None,
     every_stage: bool,
     data: tuple[str, ...],
+    packed: Path | None,
     validate: tuple[str, ...],
     synthetic: float,
     scenes: int,
@@ -140,7 +142,7 @@ def train(
 ) -> None:
     """Train one stage of the cascade, or all of them, and write the weights.
 
-    Uses CUDA, and several GPUs, where there are any. Checkpoints every two minutes; an interrupted run
+    Uses CUDA, and several GPUs, where there are any. Checkpoints twice a minute; an interrupted run
     continues with --resume.
 
     \b
@@ -162,6 +164,7 @@ def train(
         range=str(range_ or ""),
         output=str(output),
         data=list(data),
+        packed=str(packed) if packed else None,
         validate=list(validate),
         synthetic=synthetic,
         scenes=scenes,

@@ -159,3 +159,24 @@ def test_magnifying_stops_at_the_pixels_that_there_are() -> None:
         enlarged = after.camera.matrix[0, 0] > 1.05 * native
         unmagnified = virtual_camera(before, 160, 512, np.random.default_rng(seed), RECIPE.camera)
         assert not enlarged or after.camera.matrix[0, 0] == unmagnified.camera.matrix[0, 0]
+
+
+def test_beams_of_a_scanner_elsewhere_cross_those_of_the_true_one() -> None:
+    points = np.column_stack([ring(0.0), np.ones(3600)]).astype(np.float32)
+    recipe = replace(RECIPE.scan, banded=1.0, thinned=0.0, shortened=0.0, upended=0.0)
+    level = replace(recipe, tilt_deg=0.0, apart_m=0.0)
+    shares = {"level": [], "tilted": []}
+    for seed in range(40):
+        for name, of in (("level", level), ("tilted", recipe)):
+            kept = thin_scan(points, np.random.default_rng(seed), of)
+            shares[name].append(len(kept) / len(points))
+    assert set(shares["level"]) == {0.0, 1.0}, "a ring is one beam, kept or not"
+    partly = [0.1 < share < 0.9 for share in shares["tilted"]]
+    assert sum(partly) > 30, "the beams of a tilted scanner have some points of each"
+
+
+def ring(elevation_deg: float) -> NDArray[np.float64]:
+    """Points all around at one elevation, 20 m away."""
+    azimuth = np.linspace(-np.pi, np.pi, 3600, endpoint=False)
+    height = np.full(3600, np.tan(np.radians(elevation_deg)))
+    return 20 * np.column_stack([np.cos(azimuth), np.sin(azimuth), height])

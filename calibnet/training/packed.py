@@ -1,0 +1,195 @@
+"""Training frames packed into a few files, to be trained on where neither datasets nor the synthetic world are.
+
+A GPU is often lent for minutes, without a network and with little installed. Parts of bounded size travel there one by
+one, and each is of use without the others: frames are spread over them at random. Pictures are JPEGs no larger than
+training needs; scans keep what a miscalibrated camera might see, rounded to millimetres, as differences from point to
+point, which compress to a third. With them travel the residuals that the stages before leave (`Draws`), since measuring
+them takes longer than a short training has.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+from annotated_types import Interval
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+from torch import Tensor
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import DatasetError
+from calibnet.geometry import MiscalibrationRange, PinholeCamera
+from calibnet.geometry.types import Transform
+from calibnet.runtime.reading import parse_json, require_file
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import one_line
+from calibnet.training.data import Source
+
+KEY = "calib-inspect-frames"
+"""Of the metadata that says what a part's sources are."""
+PATTERN = "frames-{:03d}.safetensors"
+STEPS_PER_METRE = 256
+"""Resolution of packed points; 16 bits reach 128 m, farther points are left out."""
+FARTHEST_M = 2**15 / STEPS_PER_METRE
+LARGEST_BYTES = 4 << 30
+"""Of a part."""
+
+
+def unpack_picture(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """JPEG to RGB ``[H, W, 3]``; ``ValueError`` if it is none."""
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    if image is None:
+        raise ValueError("no picture")
+    return np.asarray(image, np.uint8)[..., ::-1].copy()
+
+
+def unpack_scan(data: bytes) -> NDArray[np.float32]:
+    """What `calibnet.training.packing.pack_scan` made: ``[N, 4]``, rounded."""
+    flat = np.frombuffer(zlib.decompress(data), np.uint8)
+    octets = flat.reshape(7, len(flat) // 7)
+    difference = octets[:6].reshape(3, 2, -1).transpose(0, 2, 1).copy().view(np.int16)[..., 0]
+    points = np.empty((octets.shape[1], 4), np.float32)
+    points[:, :3] = np.cumsum(difference, axis=1, dtype=np.int16).T / np.float32(STEPS_PER_METRE)
+    points[:, 3] = octets[6] / np.float32(255)
+    return points
+
+
+class PackedSequence:
+    """The packed frames of one source, in all parts that are there."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.rig = name, name
+        self._frames: list[tuple[Part, int]] = []
+
+    def take(self, part: Part, position: int) -> None:
+        """Add the frame at this position of a part."""
+        self._frames.append((part, position))
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[position] for position in range(len(self)))
+
+    def __getitem__(self, position: int) -> Frame:
+        """Unpack one frame."""
+        part, number = self._frames[position]
+        return part.frame(number, f"packed {self.name}")
+
+
+@dataclass(frozen=True)
+class SourceOfPart:
+    """What a part says of one of its sources, see `Source`."""
+
+    name: str
+    weight: Annotated[float, Interval(ge=0, le=1)]
+    synthetic: bool
+
+
+@dataclass(frozen=True)
+class Part:
+    """One file of packed frames.
+
+    Attributes:
+        path: of the file.
+        sources: of all parts.
+        tensors: as `calibnet.training.packing.Packer` names them.
+    """
+
+    path: Path
+    sources: list[SourceOfPart]
+    tensors: dict[str, Tensor]
+
+    @classmethod
+    def read(cls, path: Path) -> Part:
+        """Read a part.
+
+        Raises:
+            DatasetError: it is cut short, or no packed frames at all.
+        """
+        origin, remedy = f"Packed training frames {path}", "pack them again"
+        require_file(path, origin, LARGEST_BYTES, DatasetError, remedy)
+        try:
+            with safe_open(path, framework="pt") as file:
+                tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
+                about = parse_json((file.metadata() or {}).get(KEY, ""))
+        except (SafetensorError, OSError, ValueError) as error:
+            raise DatasetError(f"{origin} cannot be read ({one_line(error, 200)}); {remedy}.") from None
+        part = cls(path, validated(list[SourceOfPart], about, origin, DatasetError, remedy), tensors)
+        if not part._is_whole():
+            raise DatasetError(f"{origin} do not fit together; {remedy}.")
+        return part
+
+    def _is_whole(self) -> bool:
+        tensors = self.tensors
+        count = len(tensors.get("sources", ()))
+        shapes = {"sources": (count,), "matrices": (count, 3, 3), "extrinsics": (count, 4, 4)}
+        for name in ("pictures", "scans"):
+            shapes[f"{name}.ends"] = (count,)
+        if not count or any(name not in tensors or tensors[name].shape != shape for name, shape in shapes.items()):
+            return False
+        ends = [(tensors[f"{name}.ends"], tensors.get(name)) for name in ("pictures", "scans")]
+        whole = all(of is not None and bool((end.diff() > 0).all()) and int(end[-1]) == len(of) for end, of in ends)
+        return whole and int(tensors["sources"].min()) >= 0 and int(tensors["sources"].max()) < len(self.sources)
+
+    def frame(self, number: int, source: str) -> Frame:
+        """Unpack one frame; ``source`` names it.
+
+        Raises:
+            DatasetError: its picture or scan is damaged.
+        """
+        matrix, extrinsic = (self.tensors[name][number].numpy() for name in ("matrices", "extrinsics"))
+        try:
+            image = unpack_picture(self._piece("pictures", number))
+            points = unpack_scan(self._piece("scans", number).tobytes())
+        except (cv2.error, zlib.error, ValueError) as error:
+            raise DatasetError(f"Frame {number} of {self.path} is damaged ({one_line(error, 200)}).") from None
+        camera = PinholeCamera(image.shape[1], image.shape[0], matrix)
+        return Frame(number, 0.0, image, points, camera, extrinsic, source)
+
+    def _piece(self, name: str, number: int) -> NDArray[np.uint8]:
+        ends = self.tensors[f"{name}.ends"]
+        piece: NDArray[np.uint8] = self.tensors[name][
+            int(ends[number - 1]) if number else 0 : int(ends[number])
+        ].numpy()
+        return piece
+
+
+def read_packed(folder: Path) -> list[Source]:
+    """What the parts in a folder hold, as sources of training frames.
+
+    Raises:
+        DatasetError: there are none, or one cannot be read.
+    """
+    parts = [Part.read(path) for path in _parts(folder)]
+    sequences = [PackedSequence(source.name) for source in parts[0].sources]
+    for part in parts:
+        if part.sources != parts[0].sources:
+            raise DatasetError(f"{part.path} is of another packing than {parts[0].path}; keep one in a folder.")
+        for position, number in enumerate(part.tensors["sources"].tolist()):
+            sequences[number].take(part, position)
+    return [
+        Source(sequence, about.weight, about.synthetic)
+        for sequence, about in zip(sequences, parts[0].sources, strict=True)
+        if len(sequence)
+    ]
+
+
+def packed_residuals(folder: Path, stage: MiscalibrationRange) -> list[Transform]:
+    """The residuals that travelled with the frames, 4x4 each; none if none did."""
+    name = f"residuals.{stage}"
+    parts = (Part.read(path).tensors for path in _parts(folder))
+    return [delta for part in parts if name in part for delta in part[name].numpy()]
+
+
+def _parts(folder: Path) -> list[Path]:
+    paths = sorted(folder.glob(PATTERN.replace("{:03d}", "*")))
+    if not paths:
+        raise DatasetError(f"No packed training frames are in {folder}; make them with calib-inspect pack-training.")
+    return paths

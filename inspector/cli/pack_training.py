@@ -1,0 +1,87 @@
+"""``calib-inspect pack-training``: training frames in a few files, to be trained on elsewhere."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+
+from calibnet.training.options import TrainingOptions
+from inspector.cli.options import FOLDER
+
+UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
+
+
+class Size(click.ParamType[int]):
+    """A number of bytes, as ``30MiB``."""
+
+    name = "size"
+
+    def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Bytes of the text."""
+        if isinstance(value, int):
+            return value
+        match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(KiB|MiB|GiB)", value)
+        if match is None:
+            self.fail(f"{value!r} is no size; write it as 30MiB, with KiB, MiB or GiB.", param, ctx)
+        return int(float(match[1]) * UNITS[match[2]])
+
+
+@click.command("pack-training")
+@click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Real frames, as in train. Repeatable.")
+@click.option("--validate", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames that are left out.")
+@click.option("--synthetic", type=click.FloatRange(0, 1), default=TrainingOptions.synthetic, show_default=True)
+@click.option("--scenes", type=click.IntRange(1), default=500, show_default=True, help="Synthetic scenes to pack.")
+@click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
+@click.option("--after", type=FOLDER, help="Weights whose residuals travel too; measuring them takes minutes.")
+@click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
+@click.option("--max-size", type=Size(), default="30MiB", show_default=True, help="Of a part.")
+def pack_training(
+    data: tuple[str, ...],
+    validate: tuple[str, ...],
+    synthetic: float,
+    scenes: int,
+    scene_cache: Path | None,
+    after: Path | None,
+    preset: str,
+    seed: int,
+    out: Path,
+    max_size: int,
+) -> None:
+    """Pack training frames into a few files that `train --packed` reads.
+
+    For a machine with a GPU and little else: pictures and scans at the resolution training needs, synthetic scenes
+    included, in parts of bounded size, each of which is of use alone.
+
+    \b
+    calib-inspect pack-training --data kitti-raw:KITTI/raw --data folder:RIGS --out packed
+    calib-inspect train --packed packed --range 5/0.5 --minutes 8 --batch 64 --workers 15
+    """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
+    from rich.console import Console
+    from rich.progress import track
+
+    from calibnet.training.packing import pack_training as pack
+
+    options = TrainingOptions(
+        preset,
+        range="",
+        output="",
+        data=list(data),
+        validate=list(validate),
+        synthetic=synthetic,
+        scenes=scenes,
+        scene_cache=str(scene_cache) if scene_cache else None,
+        after=str(after) if after else None,
+        seed=seed,
+    )
+    console = Console(stderr=True, highlight=False)
+
+    def tracked(places: Iterable[tuple[int, int]]) -> Iterable[tuple[int, int]]:
+        return track(list(places), "Packing", console=console)
+
+    parts = pack(options, out, max_size, tracked)
+    console.print(f"{parts} {'part' if parts == 1 else 'parts'} in {out}")
