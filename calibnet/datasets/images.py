@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import struct
 import warnings
 import zlib
@@ -17,6 +18,7 @@ from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import MEGABYTE, read_file
 
+logging.getLogger("PIL").addHandler(logging.NullHandler())  # what Pillow thinks of a damaged file is in our sentence
 LARGEST_BYTES = 256 * MEGABYTE
 """Of a picture's file."""
 MOST_PIXELS = 100_000_000

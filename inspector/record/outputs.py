@@ -7,11 +7,12 @@ import os
 import platform
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ from calibnet.runtime.writing import Kind
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
+PR_SET_PDEATHSIG = 1
+"""Of Linux's prctl: the signal that a process gets when its parent ends."""
 RESERVE_BYTES = 32 * 1024 * 1024
 """Free disk space below which recording stops, while the footer can still be written."""
 
@@ -132,7 +135,8 @@ class Outputs:
     def _open_viewer(self) -> list[Any]:
         port = free_port()
         try:
-            start_program([rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"], port)
+            command = [rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"]
+            start_program(command, port, outlives_us=True)
         except ConfigError:
             if self.file is None:
                 raise
@@ -195,9 +199,21 @@ def open_command(file: Path) -> str:
     return f"{program} {file}"
 
 
-def start_program(command: list[str], port: int) -> subprocess.Popen[bytes]:
-    """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port."""
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+def start_program(command: list[str], port: int, outlives_us: bool = False) -> subprocess.Popen[bytes]:
+    """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port.
+
+    Args:
+        command: the program.
+        port: that it opens.
+        outlives_us: it goes on when this process ends, as a window does; else Linux ends it even if this one is killed.
+    """
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        preexec_fn=None if outlives_us else end_with_parent(),
+    )
     deadline = time.monotonic() + START_TIMEOUT_S
     listening_since = None
     # A viewer that finds no screen or graphics driver opens its port first and ends a moment later.
@@ -209,6 +225,22 @@ def start_program(command: list[str], port: int) -> subprocess.Popen[bytes]:
             listening_since = time.monotonic()
         time.sleep(0.05)
     return process
+
+
+def end_with_parent() -> Callable[[], None] | None:
+    """What a child does before it becomes its program, so that it ends when we do; nothing where only Linux can."""
+    if sys.platform != "linux":
+        return None
+    import ctypes
+
+    libc, parent = ctypes.CDLL(None), os.getpid()
+
+    def bind() -> None:
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent:  # it ended before the call
+            os._exit(1)
+
+    return bind
 
 
 def _listening(host: str, port: int) -> bool:

@@ -1,13 +1,14 @@
 """A Rerun recording of a calibration run: opened with its first frame, closed with a footer.
 
-The same input and seed give the same data (``rerun rrd compare --unordered``): no wall-clock
-timeline, chunks cut by frames alone, an id made from the run's options. Frames are flushed as they
-come, so that memory stays bounded and a killed run leaves what it had recorded.
+The same input and seed give the same data: no wall-clock timeline, an id made from the run's options. A run whose pace
+lets it cut chunks by frames alone (`FLUSH_S`) also gives the same chunks (``rerun rrd compare --unordered``). Frames
+are flushed as they come, so that memory stays bounded and a killed run leaves all but its last second.
 """
 
 from __future__ import annotations
 
 import hashlib
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -29,13 +30,15 @@ from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
 
 FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
-"""Fewest and most frames between two flushes; a kill loses at most these.
+"""Fewest and most frames between two flushes, of a run that is fast enough to have so many within `FLUSH_S`.
 
 A flush writes one chunk an entity. Each costs 3 kB of file, much beside a small frame, and some of
 the memory that collects the footer: 0.5 MB a flush. So the longer a run, the rarer the flushes.
 """
 FLUSH_SHARE = 25
 """Frames recorded for each frame that a kill may lose."""
+FLUSH_S = 1.0
+"""Seconds after a flush from which on the next frame is flushed at once: a kill loses what the last second recorded."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,7 @@ class Recording:
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
         self._stream.flush()  # a recording that is cut off anywhere later can still be read
+        self._flushed = time.monotonic()
 
     def log(self, observation: Observation) -> None:
         """Log everything about one frame and hand it to the sinks."""
@@ -100,9 +104,11 @@ class Recording:
     def _flush_when_due(self) -> None:
         self._unflushed += 1
         fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
-        if self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most):
+        due = self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most)
+        if due or time.monotonic() - self._flushed >= FLUSH_S:
             self._unflushed = 0
             self._stream.flush()
+            self._flushed = time.monotonic()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
         """Log which frames could not be used, and why; nothing else is there of them."""

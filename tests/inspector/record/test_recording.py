@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 
 from calibnet.verdict import Cause
 from inspector import entities
+from inspector.record import recording as recording_module
 from inspector.record.outputs import rerun_binary
 from inspector.record.tabs import cascade, cost_volumes
 from tests.support.judged import REASON, UNSURE
@@ -139,7 +140,10 @@ def test_table_names_errors_skipped_stages_and_no_milliseconds(full_recording: P
 
 
 @pytest.mark.parametrize("detail", ["full", "overview"])
-def test_same_seed_same_recording(record: Callable[..., Any], tmp_path: Path, detail: str) -> None:
+def test_same_seed_same_recording(
+    record: Callable[..., Any], tmp_path: Path, detail: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording_module, "FLUSH_S", 60.0)  # a busy machine cuts other chunks
     for name in ("a", "b"):
         record(tmp_path / f"{name}.rrd", length=5, detail=detail)
     assert compare(tmp_path / "a.rrd", tmp_path / "b.rrd") == 0
@@ -150,6 +154,30 @@ def test_another_seed_is_another_recording(record: Callable[..., Any], tmp_path:
     for seed in (1, 2):
         record(tmp_path / f"{seed}.rrd", length=1, detail="overview", seed=seed, stages=(5,), strides=(32,))
     assert compare(tmp_path / "1.rrd", tmp_path / "2.rrd") == 1
+
+
+@pytest.mark.parametrize(("seconds", "flushed"), [(0.1, [4, 8]), (0.4, [3, 6, 9]), (2.0, list(range(1, 11)))])
+def test_a_kill_loses_what_the_last_second_recorded(
+    record: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float, flushed: list[int]
+) -> None:
+    """Ten frames at a pace of so many seconds each, and after which of them everything was handed to the file."""
+    now, frames, after = [0.0], [0], []
+    monkeypatch.setattr(recording_module.time, "monotonic", lambda: now[0])
+    log, flush = recording_module.Recording.log, recording_module.Stream.flush
+
+    def logged(recording: Any, observation: Any) -> None:
+        now[0] += seconds
+        frames[0] += 1
+        log(recording, observation)
+
+    def counted(stream: Any) -> None:
+        after.append(frames[0])
+        flush(stream)
+
+    monkeypatch.setattr(recording_module.Recording, "log", logged)
+    monkeypatch.setattr(recording_module.Stream, "flush", counted)
+    record(tmp_path / "run.rrd", length=10, detail="overview", stages=(5,), strides=(32,))
+    assert after == [0, *flushed, 10]
 
 
 def compare(one: Path, other: Path) -> int:

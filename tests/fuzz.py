@@ -1,0 +1,336 @@
+"""Fuzzing of every parser: coverage-guided by atheris where that is installed, else by random changes alone.
+
+    python -m tests.fuzz [--seconds 5] [--corpus FOLDER] [TARGET ...]
+
+Each target is run in a process of its own, on a corpus that begins with whole inputs and, with ``--corpus``, keeps what
+was found. An input may end in an error of ours only; anything else, a crash, or more than `HANG_S` is a finding, which
+is printed and kept as a file. `.ci/run` gives each target 5 seconds; an hour each is for the hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from calibnet.errors import CalibnetError
+from tests.hostile import calibrations, clouds, pictures, weights
+from tests.hostile.recordings import VERDICT
+
+HANG_S, GIGABYTES = 10, 2.0
+"""An input that takes longer, or grows the process by more, is a finding."""
+LARGEST = 1 << 16
+"""Bytes of an input."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A parser.
+
+    Attributes:
+        parse: takes any bytes; raises an error of ours, a ``ValueError`` of its own kind, or nothing.
+        seeds: whole inputs.
+        words: pieces of the format that are put in.
+    """
+
+    parse: Callable[[bytes], object]
+    seeds: tuple[bytes, ...]
+    words: tuple[bytes, ...] = ()
+
+
+def _scan(suffix: str, data: bytes) -> object:
+    from calibnet.datasets.scans import read_scan
+
+    return _as_file(f"scan{suffix}", data, read_scan)
+
+
+def _image(data: bytes) -> object:
+    from calibnet.datasets.images import read_image
+
+    return _as_file("image.png", data, read_image)
+
+
+def _calibration(data: bytes) -> object:
+    from calibnet.datasets.folder import read_calibration_of
+
+    return _as_file("calibration.yaml", data, lambda path: read_calibration_of(path.parent))
+
+
+def _kitti(data: bytes) -> object:
+    from calibnet.datasets.kitti import read_calibration_file
+
+    return _as_file("calib.txt", data, partial(read_calibration_file, sizes={"P2": 12, "Tr": 12}))
+
+
+def _times(data: bytes) -> object:
+    from calibnet.datasets.kitti import read_times
+
+    return _as_file("times.txt", data, partial(read_times, seconds=float))
+
+
+def _weights(data: bytes) -> object:
+    from calibnet.weights.files import read_header
+
+    return _as_file("w.safetensors", data, read_header)
+
+
+def _manifest(data: bytes) -> object:
+    from calibnet.weights.manifest import load_manifest
+
+    return _as_file("compact.toml", data, lambda path: load_manifest("compact", path.parent))
+
+
+def _preset(data: bytes) -> object:
+    from calibnet.network.config import parse_config
+    from calibnet.runtime.reading import parse_toml
+
+    return parse_config({"name": "fuzz", **parse_toml(data.decode("utf-8", "replace"))}, "It")
+
+
+def _verdict(data: bytes) -> object:
+    from inspector.read.understood import understood
+    from inspector.read.verdict import read_verdict
+
+    with understood(Path("run.rrd")):
+        return read_verdict(data.decode("utf-8", "replace"), Path("run.rrd"))
+
+
+def _yaml(data: bytes) -> object:
+    from calibnet.runtime.reading import parse_yaml
+
+    return parse_yaml(data.decode("utf-8", "replace"))
+
+
+_MEMORY = Path("/dev/shm")
+_FOLDER = tempfile.TemporaryDirectory(prefix="calib-inspect-fuzz-", dir=_MEMORY if _MEMORY.is_dir() else None)
+
+
+def _as_file(name: str, data: bytes, read: Callable[[Path], object]) -> object:
+    path = Path(_FOLDER.name) / name
+    path.write_bytes(data)
+    return read(path)
+
+
+def _seeds_of_scans(suffix: str) -> tuple[bytes, ...]:
+    kept = clouds.POINTS[:12]
+    contents = {
+        ".pcd": [clouds.pcd(kept, form) for form in ("ascii", "binary", "binary_compressed")],
+        ".ply": [clouds.ply(kept, form) for form in ("ascii", "binary_little_endian")],
+        ".npy": [clouds.npy(kept)],
+        ".bin": [kept.tobytes(), np.tile(clouds.POINTS, (1, 1))[:200].tobytes()],
+        ".feather": [clouds.FEATHER],
+        ".parquet": [clouds.PARQUET],
+    }
+    return tuple(contents[suffix])
+
+
+def _small(form: str) -> bytes:
+    return pictures.encoded(form, pictures.Image.fromarray(pictures.PIXELS[:16, :16]))
+
+
+WORDS = tuple(
+    b"FIELDS|SIZE|TYPE|COUNT|WIDTH|HEIGHT|POINTS|DATA|ascii|binary|binary_compressed|_|F|U|4294967296|-1|nan|inf|1e400|"
+    b"element vertex|property float|property list uchar int|end_header|format|0|99999999999".split(b"|")
+)
+TARGETS: dict[str, Target] = {
+    **{
+        f"scan{suffix}": Target(partial(_scan, suffix), _seeds_of_scans(suffix), WORDS)
+        for suffix in (".pcd", ".ply", ".npy", ".bin", ".feather", ".parquet")
+    },
+    "image": Target(_image, tuple(_small(form) for form in ("PNG", "JPEG", "BMP", "TIFF", "WEBP"))),
+    "calibration": Target(
+        _calibration,
+        (
+            calibrations.text().encode(),
+            calibrations.BOMB.encode(),
+            b'{"width": 400, "height": 120}',
+            b"%YAML:1.0\n---\n",
+        ),
+        (b"&a ", b"*a", b"!!int ", b"!!opencv-matrix", b"<<: ", b"camera_matrix: ", b".nan", b"2011-01-01", b"[[[["),
+    ),
+    "kitti calib": Target(_kitti, (b"P2: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n",), WORDS),
+    "kitti times": Target(_times, (b"0.0\n0.104\n0.207\n",), WORDS),
+    "weights": Target(_weights, (weights.file(lambda _: None)[: 1 << 15],)),
+    "manifest": Target(
+        _manifest, ((weights.PACKAGE / "compact.toml").read_bytes(),), (b"nan", b"inf", b"[[stages]]", b"looks = ")
+    ),
+    "preset": Target(
+        _preset, ((weights.PACKAGE.parent / "network/presets/compact.toml").read_bytes(),), (b"nan", b"[", b"999999999")
+    ),
+    "verdict": Target(_verdict, (json.dumps(VERDICT).encode(),), (b"NaN", b"null", b"[", b"1e999", b'"causes"')),
+    "yaml": Target(
+        _yaml, (calibrations.text().encode(),), (b"&a ", b"*a", b"!!float ", b"? ", b"| \n", b"%YAML", b"{[")
+    ),
+}
+COUNTED = "stat::number_of_executed_units:"
+"""What libFuzzer writes before the number of inputs."""
+FOUND = Path(tempfile.gettempdir()) / "calib-inspect-findings"
+
+
+def try_one(name: str, data: bytes) -> None:
+    """Parse one input; whatever is no error of ours is raised."""
+    try:
+        TARGETS[name].parse(data[:LARGEST])
+    except CalibnetError as error:
+        assert str(error).endswith("."), f"no sentence: {error}"
+        assert "\n" not in str(error), f"no one sentence: {error}"
+    except ValueError:
+        if name not in ("yaml", "preset", "verdict"):
+            raise
+
+
+def changed(data: bytes, words: tuple[bytes, ...], draw: random.Random, others: list[bytes]) -> bytes:
+    """An input with a few random changes."""
+    content = bytearray(data)
+    for _ in range(1 + draw.randrange(4)):
+        place = draw.randrange(len(content) + 1)
+        kind = draw.randrange(6)
+        if kind == 0 and content:
+            content[min(place, len(content) - 1)] ^= 1 << draw.randrange(8)
+        elif kind == 1:
+            content[place : place + draw.randrange(1, 9)] = draw.randbytes(draw.randrange(9))
+        elif kind == 2 and words:
+            content[place : place + draw.randrange(9)] = draw.choice(words)
+        elif kind == 3:
+            del content[place : place + draw.randrange(1, 1 + max(1, len(content) // 4))]
+        elif kind == 4:
+            other = draw.choice(others)
+            start = draw.randrange(len(other) + 1)
+            content[place:place] = other[start : start + draw.randrange(200)]
+        else:
+            content[place:place] = content[place : place + draw.randrange(1, 50)] * draw.randrange(1, 20)
+    return bytes(content[:LARGEST])
+
+
+def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True) -> int:
+    """Run one target in this process; returns the number of inputs, and raises at a finding."""
+    signal.signal(signal.SIGALRM, _hang)
+    try_one(name, TARGETS[name].seeds[0])  # what is imported lazily counts for no input
+    _limit_memory()
+    if guided:
+        try:
+            import atheris
+        except ImportError:
+            guided = False
+    if guided:
+        return _guided(atheris, name, seconds, corpus)
+    target, draw, pool = TARGETS[name], random.Random(time.time_ns()), list(TARGETS[name].seeds)
+    if corpus is not None and corpus.is_dir():
+        pool += [path.read_bytes() for path in corpus.iterdir()]
+    count, end = 0, time.monotonic() + seconds
+    while time.monotonic() < end:
+        data = changed(draw.choice(pool), target.words, draw, pool)
+        _watched(name, data)
+        count += 1
+        if draw.random() < 0.02 and len(pool) < 500:
+            pool.append(data)
+    return count
+
+
+def _watched(name: str, data: bytes) -> None:
+    signal.alarm(HANG_S)
+    try:
+        try_one(name, data)
+    except BaseException:
+        FOUND.mkdir(exist_ok=True)
+        file = FOUND / f"{name.replace(' ', '-')}-{abs(hash(data)):x}"
+        file.write_bytes(data)
+        sys.stderr.write(f"{name}: a finding, kept as {file}\n")
+        raise
+    finally:
+        signal.alarm(0)
+
+
+def _guided(atheris: Any, name: str, seconds: float, corpus: Path | None) -> int:
+    """libFuzzer, guided by the coverage of our modules; it ends the process."""
+    target, count = TARGETS[name], 0
+    folder = corpus or Path(tempfile.mkdtemp(prefix="calib-inspect-corpus-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, seed in enumerate(target.seeds):
+        (folder / f"seed-{number}").write_bytes(seed)
+    with atheris.instrument_imports(
+        include=["calibnet.runtime", "calibnet.datasets", "calibnet.weights", "inspector.read"]
+    ):
+        for seed in target.seeds:  # imports what the target imports lazily
+            try_one(name, seed)
+
+    def one(data: bytes) -> None:
+        nonlocal count
+        count += 1
+        _watched(name, data)
+
+    FOUND.mkdir(exist_ok=True)
+    options = [f"-max_total_time={max(1, int(seconds))}", f"-max_len={LARGEST}", "-verbosity=0"]
+    options += [f"-artifact_prefix={FOUND}/", "-rss_limit_mb=0"]
+    if target.words:
+        words = folder.with_name(f"{folder.name}-words")
+        words.write_text("".join('"' + "".join(f"\\x{byte:02x}" for byte in word) + '"\n' for word in target.words))
+        options.append(f"-dict={words}")
+    atheris.Setup([sys.argv[0], *options, "-print_final_stats=1", str(folder)], one, enable_python_coverage=True)
+    atheris.Fuzz()
+    return count
+
+
+def _hang(_: int, __: FrameType | None) -> None:
+    raise TimeoutError(f"more than {HANG_S} s")
+
+
+def _limit_memory() -> None:
+    import resource
+
+    import psutil
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    largest = psutil.Process().memory_info().vms + int(GIGABYTES * (1 << 30))
+    resource.setrlimit(resource.RLIMIT_AS, (min(largest, soft) if soft > 0 else largest, hard))
+
+
+def main() -> int:
+    """Run the targets that are named, or all; returns the number of those with a finding."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--corpus", type=Path, help="Folder of corpora, one a target; made if need be.")
+    parser.add_argument("--random", action="store_true", help="Random changes, all targets in this one process.")
+    parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    total, failed = 0, []
+    for name in asked.targets or TARGETS:
+        count, found = 0, ""
+        if asked.random or asked.here:
+            try:
+                count = fuzz(
+                    name, asked.seconds, asked.corpus and asked.corpus / name.replace(" ", "-"), not asked.random
+                )
+            except BaseException as error:
+                found = f"{type(error).__name__}: {error}"
+        else:
+            options = ["--seconds", str(asked.seconds), *(["--corpus", str(asked.corpus)] if asked.corpus else [])]
+            command = [sys.executable, "-m", "tests.fuzz", name, "--here", *options]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            counts = [line.split()[-1] for line in done.stderr.splitlines() if line.startswith(COUNTED)]
+            count = int(counts[-1]) if counts else 0
+            found = (done.stdout + done.stderr)[-4000:] if done.returncode else ""
+        total += count
+        failed += [name] if found else []
+        sys.stdout.write(f"{name}: {count} inputs\n{found and found + chr(10)}")
+        sys.stdout.flush()
+    sys.stdout.write(f"{total} inputs; findings: {', '.join(failed) or 'none'}.\n")
+    return len(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
