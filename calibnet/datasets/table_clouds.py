@@ -101,8 +101,8 @@ def _columns(read: Any, data: bytes) -> Columns:
     try:
         table = read(pa.BufferReader(data))
         table.validate(full=True)
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise CloudError(f"it is truncated, damaged or no such file ({error})") from None
+    except (pa.ArrowException, OSError, ValueError):
+        raise CloudError("it is truncated, damaged or no such file") from None
     if table.num_rows > MOST_POINTS:
         raise CloudError(f"it holds {table.num_rows:,} points, and {MOST_POINTS:,} are the most that are read")
     columns: Columns = {}
