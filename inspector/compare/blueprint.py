@@ -9,6 +9,8 @@ from inspector.compare.comparison import Comparison
 from inspector.record.tabs.views import LEGEND_HEIGHT, SCREEN_HEIGHT, SCREEN_WIDTH, View, legend, overlay_view
 
 COMPARISON_TABLE = "comparison/table"
+LEGEND_RUNS = "legend/runs"
+"""The names of the runs in the colours of their curves."""
 LARGEST_OVERLAY = 390.0
 """Height in pixels beyond which curves and table would have too little room."""
 TITLE_BAR = 64.0
@@ -35,7 +37,8 @@ def results_tab(comparison: Comparison) -> View:
     below: View = table
     if any(run.run.has_reference for run in comparison.runs):
         curves = [_curves(comparison, kind, unit) for kind, unit in entities.ERROR_KINDS.items()]
-        below = rrb.Horizontal(rrb.Vertical(*curves), table, column_shares=[1.0, 1.2])
+        plots = rrb.Vertical(*curves, legend("Runs", LEGEND_RUNS), row_shares=[1.0, 1.0, 0.2])
+        below = rrb.Horizontal(plots, table, column_shares=[1.0, 1.2])
     overlays = side_by_side(_corrected(comparison))
     height = _overlay_height(comparison)
     if not comparison.one_coloring:
@@ -81,7 +84,7 @@ def _curves(comparison: Comparison, kind: str, unit: str) -> rrb.TimeSeriesView:
         origin="/",
         contents=[f"/{run.path(entities.error_corrected(kind))}" for run in comparison.runs],
         name=f"{kind.capitalize()} error of the corrected extrinsic [{unit}]",
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        plot_legend=rrb.PlotLegend(visible=False),  # it would lie over the curves' ends
         axis_y=rrb.ScalarAxis(range=(0.0, HEADROOM * _largest(comparison, kind))),
     )
 

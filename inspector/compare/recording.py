@@ -15,10 +15,12 @@ from rerun.chunk import Chunk
 
 from inspector import entities
 from inspector.colors import Rgb
-from inspector.compare.blueprint import COMPARISON_TABLE, make_comparison_blueprint
+from inspector.compare.blueprint import COMPARISON_TABLE, LEGEND_RUNS, make_comparison_blueprint
 from inspector.compare.comparison import ComparedRun, Comparison
 from inspector.compare.table import comparison_table
+from inspector.record.pictures.legends import log_names
 from inspector.record.stream import Stream
+from inspector.record.subtree import Subtree
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
@@ -47,8 +49,10 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
     try:
         table = rr.TextDocument(comparison_table(comparison), media_type=rr.MediaType.MARKDOWN)
         stream.rec.log(COMPARISON_TABLE, table, static=True)
-        for number, run in enumerate(comparison.runs):
-            _log_curves(stream.rec, run, RUN_COLORS[number % len(RUN_COLORS)])
+        shown = {run.name: RUN_COLORS[number % len(RUN_COLORS)] for number, run in enumerate(comparison.runs)}
+        log_names(Subtree(stream.rec), LEGEND_RUNS, shown)
+        for run in comparison.runs:
+            _log_curves(stream.rec, run, shown[run.name])
         for count, chunk in enumerate(_copied(comparison), start=1):
             rr.send_chunks(chunk, recording=stream.rec)
             if count % CHUNKS_A_FLUSH == 0:
