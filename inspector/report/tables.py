@@ -9,24 +9,29 @@ from calibnet.geometry import MiscalibrationRange
 from inspector.report.metrics import Figures, State
 from inspector.report.verdict import ROTATION, TRANSLATION
 
-STATISTICS = ("mean", "median", "std", "p95")
+STATISTICS, MORE = ("median", "p95"), ("mean", "std")
+"""Of both errors; a telephone shows the first two."""
 
 
 def stages_table(figures: Figures) -> str:
-    """Mean, median, standard deviation and p95 of both errors and, with a reference, the success rates."""
-    groups = ["<th></th>"]
-    groups += [f'<th class="group" colspan="{len(STATISTICS)}">{name}</th>' for name in ("Rotation", "Translation")]
-    heads = ["<th>after</th>", *(f"<th>{name}</th>" for name in STATISTICS * 2)]
+    """Median, p95, mean and standard deviation of both errors and, with a reference, the success rates."""
+    groups, heads = ["<th></th>"], ["<th>after</th>"]
+    for kind in ("Rotation", "Translation"):
+        groups += [f'<th class="group" colspan="2">{kind}</th>', '<th class="group more" colspan="2"></th>']
+        heads += [f"<th>{name}</th>" for name in STATISTICS] + [f'<th class="more">{name}</th>' for name in MORE]
     if figures.has_reference:
-        groups.append('<th class="group" colspan="2">Frames within</th>')
-        heads += ["<th>2° and 5 cm</th>", "<th>1° and 2.5 cm</th>"]
+        groups.append('<th class="group more" colspan="2">Frames within</th>')
+        heads += ['<th class="more">2° and 5 cm</th>', '<th class="more">1° and 2.5 cm</th>']
     rows = []
     for state in figures.states:
         metrics = state.metrics
-        cells = [ROTATION.say(getattr(metrics.rotation_deg, name)) for name in STATISTICS]
-        cells += [TRANSLATION.say(getattr(metrics.translation_cm, name)) for name in STATISTICS]
+        cells = []
+        for quantity, errors in ((ROTATION, metrics.rotation_deg), (TRANSLATION, metrics.translation_cm)):
+            cells += [_cell(quantity.say(getattr(errors, name))) for name in STATISTICS]
+            cells += [_cell(quantity.say(getattr(errors, name)), more=True) for name in MORE]
         if figures.has_reference:
-            cells += [f"{share:.0%}" for share in (metrics.success_2deg_5cm, metrics.success_1deg_2_5cm)]
+            shares = (metrics.success_2deg_5cm, metrics.success_1deg_2_5cm)
+            cells += [_cell(f"{share:.0%}", more=True) for share in shares]
         rows.append(_row(state, cells))
     return _table([groups, heads], rows)
 
@@ -38,8 +43,8 @@ def axes_table(figures: Figures) -> str:
     rows = []
     for state in figures.states:
         rotation, translation = state.metrics.rotation_deg, state.metrics.translation_cm
-        cells = [ROTATION.say(angle) for angle in (rotation.roll, rotation.pitch, rotation.yaw)]
-        cells += [TRANSLATION.say(offset) for offset in (translation.x, translation.y, translation.z)]
+        cells = [_cell(ROTATION.say(angle)) for angle in (rotation.roll, rotation.pitch, rotation.yaw)]
+        cells += [_cell(TRANSLATION.say(offset)) for offset in (translation.x, translation.y, translation.z)]
         rows.append(_row(state, cells))
     return _table([heads], rows)
 
@@ -48,7 +53,12 @@ def _row(state: State, cells: Iterable[str]) -> str:
     trained_for = ""
     if state.range is not None:
         trained_for = f' <span class="range">{escape(MiscalibrationRange.parse(state.range).label)}</span>'
-    return f"<th>{state.name}{trained_for}</th>" + "".join(f"<td>{cell}</td>" for cell in cells)
+    return f"<th>{state.name}{trained_for}</th>" + "".join(cells)
+
+
+def _cell(text: str, more: bool = False) -> str:
+    """A cell; one that says ``more`` is left out where there is little room."""
+    return f'<td class="more">{text}</td>' if more else f"<td>{text}</td>"
 
 
 def _table(heads: Iterable[Iterable[str]], rows: Iterable[str]) -> str:
