@@ -83,8 +83,8 @@ def test_page_states_the_figures_of_the_run(known: RecordedRun, tmp_path: Path, 
     assert f"Corrected 5\u00a0frames of fake/00 from {initial.rotation_deg.median:.1f}°" in page
     for state in figures.states:
         assert f"<td>{state.metrics.rotation_deg.p95:.2f}°</td>" in page
-        assert f"<td>{state.metrics.translation_cm.mean:.1f}\u00a0cm</td>" in page
-    assert "<td>100%</td><td>100%</td>" in page  # 0.027 of 5° and 0.5 m is within both range_
+        assert f'<td class="more">{state.metrics.translation_cm.mean:.1f}\u00a0cm</td>' in page
+    assert '<td class="more">100%</td><td class="more">100%</td>' in page  # 0.027 of 5° and 0.5 m is within both range_
     assert "stage 3" in page and "±5°/0.5 m" in page
     assert page.count('<div class="compare">') == 3
     assert page.count("<svg viewBox") == 4  # two curves, two histograms
