@@ -21,11 +21,9 @@ from calibnet.datasets.kitti import (
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
 from calibnet.geometry import transform
 
-CALIBRATION_ROWS = {"P0": 12, "P1": 12, "P2": 12, "P3": 12, "Tr": 12}
-
 
 class KittiOdometry(PairedSequence):
-    """One sequence of KITTI odometry, or of any folder in its layout."""
+    """One sequence of KITTI odometry, or of any folder in its layout: the camera's ``P`` and ``Tr`` are enough."""
 
     def __init__(self, root: Path | str, sequence: str | int, camera: int = 2) -> None:
         """Open a sequence.
@@ -44,13 +42,14 @@ class KittiOdometry(PairedSequence):
         velodyne = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
         scans = files_by_stem(velodyne, (".bin",), "scans")
         check_paired(images, scans)
-        rows = read_calibration_file(folder / "calib.txt", CALIBRATION_ROWS)
+        rows = read_calibration_file(folder / "calib.txt", {f"P{camera}": 12, "Tr": 12})
         camera0_from_lidar = rows["Tr"].reshape(3, 4)
         self._fixed = rectified_calibration(
             rows[f"P{camera}"].reshape(3, 4), transform(camera0_from_lidar[:, :3], camera0_from_lidar[:, 3])
         )
-        seconds = read_times(folder / "times.txt", float)
-        files = frame_files(images, scans, times_of(images, seconds, folder / "times.txt"))
+        times = folder / "times.txt"
+        seconds = read_times(times, float) if times.exists() else []  # own data may have none
+        files = frame_files(images, scans, times_of(images, seconds, times))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"
         super().__init__(f"kitti-odometry/{sequence}", f"{rig}, camera {camera}", files)

@@ -54,7 +54,7 @@ def export(
     lidar_frame: str,
     parent: str,
 ) -> int:
-    """Write the corrected extrinsic as KITTI calib.txt, ROS 2 static transform, OpenCV YAML, JSON or calibration.yaml.
+    """Write the corrected extrinsic in the format of another tool, or as a calibration.yaml of ours.
 
     By default that of the whole drive; of a run without one, the median of all frames: the rotation and the
     translation with the smallest sum of distances to those of the frames, which outliers hardly move. Every file says

@@ -24,6 +24,9 @@ FORMATS = Registry(
         "opencv": "inspector.export.formats:as_opencv",
         "json": "inspector.export.formats:as_json",
         "yaml": "inspector.export.formats:as_calibration",
+        "urdf": "inspector.export.robots:as_urdf",
+        "autoware": "inspector.export.robots:as_autoware",
+        "koide3": "inspector.export.robots:as_koide3",
     },
 )
 

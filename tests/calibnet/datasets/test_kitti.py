@@ -94,7 +94,18 @@ def test_odometry_times_come_from_the_file(write_layout):
     with pytest.raises(DatasetError, match=r"times\.txt: line 2 is no time"):
         layout.open()
     times.unlink()
-    with pytest.raises(DatasetError, match=r"times\.txt cannot be read"):
+    assert_allclose([frame.timestamp for frame in layout.open()], [0.0, 0.1, 0.2])
+
+
+def test_own_data_in_the_layout_of_odometry_needs_one_projection_and_the_extrinsic(write_layout):
+    layout = write_layout("kitti-odometry")
+    rows = layout.calibration.read_text().splitlines()
+    layout.calibration.write_text("\n".join(row for row in rows if row.startswith(("P2", "Tr"))) + "\n")
+    frame = layout.open()[1]
+    assert_allclose(frame.camera.matrix, layout.matrix)
+    assert_allclose(frame.camera_from_lidar, layout.camera_from_lidar, atol=1e-12)
+    with pytest.raises(DatasetError, match=r"has no row 'P2'"):
+        layout.calibration.write_text(rows[-1] + "\n")
         layout.open()
 
 

@@ -38,7 +38,7 @@ def test_what_a_format_does_wrong_is_named(write: Callable[[Exported], str], sen
 
 def test_a_format_of_another_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install_toys(tmp_path, monkeypatch)
-    assert FORMATS.names() == ("kitti", "ros", "opencv", "json", "yaml", "broken", "csv")
+    assert FORMATS.names() == ("kitti", "ros", "opencv", "json", "yaml", "urdf", "autoware", "koide3", "broken", "csv")
     check_export_format(FORMATS.load("csv"))
     assert export_as("csv", example()).startswith(repr(float(example().camera_from_lidar[0, 0])))
     with pytest.raises(ConfigError, match="export format 'broken' of package broken_package cannot be imported"):
