@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from calibnet.evaluation.verdict_runs import VerdictRun
 
 
+MOST_WORKERS = 8
+"""Of a gigabyte of memory each, unless more are asked for."""
+
+
 @click.command("fit-verdict")
 @click.option("--weights", type=FOLDER, required=True, help="Folder of the weights; the coefficients go there.")
 @click.option("--preset", default="compact", show_default=True, help="Network of the weights.")
@@ -52,7 +56,9 @@ if TYPE_CHECKING:
 @click.option(
     "--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run, from their first's range."
 )
-@click.option("--workers", type=click.IntRange(0), help="Processes, of one thread each.  [default: as many as cores]")
+@click.option(
+    "--workers", type=click.IntRange(0), help="Processes, of one thread each.  [default: as many as cores, 8 at most]"
+)
 def fit_verdict(
     weights: Path,
     preset: str,
@@ -92,7 +98,7 @@ def fit_verdict(
     marks = fingerprints(preset, weights, ranges)
     path = coefficients_path(preset, weights)
     until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
-    processes = (os.cpu_count() or 1) if workers is None else workers
+    processes = min(os.cpu_count() or 1, MOST_WORKERS) if workers is None else workers
     console = make_console()
 
     def made(source: Source, count: int, title: str) -> list[VerdictRun]:
