@@ -319,6 +319,8 @@ function showSteps() {
     if (one.error) row.insertCell().textContent = figures(one.error);
     row.insertCell().textContent = i ? figures(one.moved) : "–";
   }
+  // a verdict is on what a try found: beside a pose that nothing has judged it must not look like one on that
+  at("answer").classList.toggle("past", Boolean(answer) && (step === 0 || step === "reference"));
   at("take").disabled = !(answer && step !== 0 && step !== "reference");
 }
 

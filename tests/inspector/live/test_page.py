@@ -105,7 +105,9 @@ def test_drag_let_go_and_see_the_answer(browser: Browser, make: Callable[..., Li
     made = session.bench.tries[0].as_dict(session.bench.reference)
     expected = [[f"{step['error'][0]:.2f}", f"{step['error'][1]:.1f}"] for step in made["steps"]]
     assert shown == expected
+    assert page.locator("#answer.past").count() == 0
     page.get_by_role("radio", name="Mine").click()
+    assert page.locator("#answer.past").count() == 1, "nothing has judged the pose of the sliders"
     assert page.locator("#caption").inner_text() == f"mine: {expected[0][0]}°, {expected[0][1]} cm off"
     page.get_by_role("radio", name="Reference").click()
     assert page.locator("#caption").inner_text() == "reference"
