@@ -42,10 +42,23 @@ def _object(root: Path, name: str) -> Iterator[Sequence]:
     yield open_sequence("kitti-object", root, split=name or "train")
 
 
+def _tracking(root: Path, name: str) -> Iterator[Sequence]:
+    for folder in sorted((root / "training" / "velodyne").glob(name or "*")):
+        for camera in (2, 3):
+            if (root / "training" / f"image_0{camera}" / folder.name).is_dir():
+                yield open_sequence("kitti-tracking", root, sequence=folder.name, camera=camera)
+
+
 def _folder(root: Path, name: str) -> Iterator[Sequence]:
     for folder in sorted({file.parent for file in [*root.glob("calibration.yaml"), *root.glob("*/calibration.yaml")]}):
         if not name or folder.name == name:
             yield open_sequence("folder", folder)
 
 
-FINDERS = {"kitti-raw": _raw, "kitti-odometry": _odometry, "kitti-object": _object, "folder": _folder}
+FINDERS = {
+    "kitti-raw": _raw,
+    "kitti-odometry": _odometry,
+    "kitti-object": _object,
+    "kitti-tracking": _tracking,
+    "folder": _folder,
+}

@@ -41,6 +41,8 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
     rows: dict[str, list[str]] = {}
     for line in lines:
         key, colon, text = line.partition(":")
+        if not colon:  # KITTI tracking leaves it out behind some names
+            key, colon, text = line.strip().partition(" ")
         name = key.strip()
         if colon and rows.setdefault(name, text.split()) != text.split() and name in sizes:
             raise DatasetError(f"Calibration {path} has two rows {name!r}; keep the right one.")

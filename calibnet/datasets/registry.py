@@ -21,6 +21,7 @@ DATASETS = Registry(
         "kitti-odometry": "calibnet.datasets.kitti_odometry:KittiOdometry",
         "kitti-raw": "calibnet.datasets.kitti_raw:KittiRaw",
         "kitti-object": "calibnet.datasets.kitti_object:KittiObject",
+        "kitti-tracking": "calibnet.datasets.kitti_tracking:KittiTracking",
         "folder": "calibnet.datasets.folder:Folder",
     },
 )

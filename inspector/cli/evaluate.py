@@ -174,7 +174,7 @@ def run_battery(
 def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:
     """Open what ``--sequences`` names; each dataset calls its parts differently."""
     options = {} if camera is None else {"camera": camera}
-    if dataset not in ("kitti-odometry", "kitti-raw", "kitti-object"):
+    if dataset not in ("kitti-odometry", "kitti-raw", "kitti-object", "kitti-tracking"):
         return [open_sequence(dataset, root / part, **options) for part in parts or ["."]]
     if dataset == "kitti-object":
         return [open_sequence(dataset, root, split=part, **options) for part in parts or ["training"]]

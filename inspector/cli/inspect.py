@@ -133,6 +133,19 @@ def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) ->
     return calibrate(open_raw(date, number, root, camera), camera=camera, **asked)
 
 
+@click.command()
+@click.argument("sequence")
+@root_option
+@camera_option
+@run_options
+def tracking(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
+    """Calibrate a sequence of the KITTI tracking benchmark, for instance 0004.
+
+    --root is the folder that holds `training`.
+    """
+    return calibrate(open_tracking(sequence, root, camera), camera=camera, **asked)
+
+
 @click.command("object")
 @split_option
 @root_option
@@ -238,6 +251,13 @@ def open_raw(date: str, number: str, root: Path | None, camera: int) -> Sequence
     from calibnet.datasets import open_sequence
 
     return open_sequence("kitti-raw", require_root(root, "raw"), date=date, drive=number, camera=camera)
+
+
+def open_tracking(sequence: str, root: Path | None, camera: int) -> Sequence:
+    """A sequence of KITTI tracking."""
+    from calibnet.datasets import open_sequence
+
+    return open_sequence("kitti-tracking", require_root(root, "tracking"), sequence=sequence, camera=camera)
 
 
 def open_object(split: str, root: Path | None, camera: int) -> Sequence:

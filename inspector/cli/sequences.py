@@ -1,4 +1,4 @@
-"""The subcommands ``seq|raw|object|folder|bag`` of groups that say something of a sequence, such as `verify`."""
+"""The subcommands ``seq|raw|tracking|object|folder|bag`` of groups that say something of a sequence, such as verify."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from inspector.cli.inspect import (
     open_object,
     open_odometry,
     open_raw,
+    open_tracking,
     root_option,
     split_option,
 )
@@ -59,6 +60,15 @@ def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
     def raw(date: str, number: str, root: Path | None, camera: int, **asked: Any) -> int:
         """Of a KITTI raw drive, for instance 2011_09_26 0005."""
         return act(lambda: open_raw(date, number, root, camera), camera=camera, **asked)
+
+    @group.command()
+    @click.argument("sequence")
+    @root_option
+    @camera_option
+    @options
+    def tracking(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
+        """Of a KITTI tracking sequence, for instance 0004."""
+        return act(lambda: open_tracking(sequence, root, camera), camera=camera, **asked)
 
     @group.command("object")
     @split_option

@@ -127,6 +127,18 @@ def write_kitti_object(root: Path) -> Layout:
     return layout
 
 
+def write_kitti_tracking(root: Path) -> Layout:
+    folder = root / "training"
+    layout = Layout(opener("kitti-tracking", root, sequence=7), root, [0, 1, 2], K, exact_extrinsic(RECTIFYING))
+    write_frames(layout, folder / "image_02" / "0007", folder / "velodyne" / "0007", ["000000", "000001", "000002"])
+    (folder / "calib").mkdir()
+    velodyne = np.column_stack([VELODYNE_ROTATION, VELODYNE_OFFSET])
+    rows = [*projections("P{}"), f"R_rect {numbers(RECTIFYING)}", f"Tr_velo_cam {numbers(velodyne)}"]
+    layout.calibration = folder / "calib" / "0007.txt"
+    layout.calibration.write_text("\n".join(rows) + "\n")
+    return layout
+
+
 def folder_calibration(**changes: Any) -> str:
     values = {
         "width": 64,
@@ -151,6 +163,7 @@ LAYOUTS: dict[str, Callable[[Path], Layout]] = {
     "kitti-odometry": write_kitti_odometry,
     "kitti-raw": write_kitti_raw,
     "kitti-object": write_kitti_object,
+    "kitti-tracking": write_kitti_tracking,
     "folder": write_folder,
 }
 """One line a dataset of the registry; the protocol's test fails for a dataset without one."""

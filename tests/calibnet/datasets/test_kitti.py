@@ -97,6 +97,23 @@ def test_odometry_times_come_from_the_file(write_layout):
     assert_allclose([frame.timestamp for frame in layout.open()], [0.0, 0.1, 0.2])
 
 
+def test_a_tracking_sequence_leaves_out_what_has_no_scan(write_layout):
+    """KITTI published no scan of four images of sequence 0001."""
+    layout = write_layout("kitti-tracking")
+    for part, suffix in (("image_02", "png"), ("velodyne", "bin")):
+        folder = layout.root / "training" / part
+        (folder / "0007").rename(folder / "0001")
+        for number, gap in enumerate((176, 177, 181)):
+            (folder / "0001" / f"{number:06d}.{suffix}").rename(folder / "0001" / f"{gap:06d}.{suffix}")
+    layout.calibration.rename(layout.calibration.with_name("0001.txt"))
+    (layout.root / "training" / "velodyne" / "0001" / "000177.bin").unlink()
+    sequence = open_sequence("kitti-tracking", layout.root, sequence="0001")
+    assert [frame.index for frame in sequence] == [176, 181]
+    assert_allclose([frame.timestamp for frame in sequence], [0.0, 0.5])
+    with pytest.raises(DatasetError, match="sequences there: 0001"):
+        open_sequence("kitti-tracking", layout.root, sequence=3)
+
+
 def test_own_data_in_the_layout_of_odometry_needs_one_projection_and_the_extrinsic(write_layout):
     layout = write_layout("kitti-odometry")
     rows = layout.calibration.read_text().splitlines()
