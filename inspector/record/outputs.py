@@ -28,6 +28,8 @@ from calibnet.runtime.writing import Kind
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
+SWITCHED_OFF = ("0", "off", "false", "no")
+"""Values of the variable RERUN with which Rerun records nothing, without a word."""
 PR_SET_PDEATHSIG = 1
 """Of Linux's prctl: the signal that a process gets when its parent ends."""
 RESERVE_BYTES = 32 * 1024 * 1024
@@ -65,6 +67,8 @@ class Outputs:
         Raises:
             ConfigError: the file may not or cannot be written, or nothing listens at ``connect``.
         """
+        if os.environ.get("RERUN", "").lower() in SWITCHED_OFF:
+            raise ConfigError("RERUN in the environment switches Rerun off, so nothing would be recorded; unset it.")
         if self.connect is not None:
             host, port = _address(self.connect)
             if not _listening(host, port):

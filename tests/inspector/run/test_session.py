@@ -157,6 +157,16 @@ def test_a_full_disk_stops_in_time_for_the_footer(
     RrdReader(file).store()
 
 
+@pytest.mark.parametrize("value", ["off", "0", "False"])
+def test_a_rerun_that_is_switched_off_is_said_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    monkeypatch.setenv("RERUN", value)
+    with pytest.raises(ConfigError, match="switches Rerun off"):
+        Outputs(tmp_path / "run.rrd").check()
+    assert not list(tmp_path.iterdir())
+
+
 def test_outputs_refuse_what_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for bad in (tmp_path, tmp_path / "file" / "run.rrd", Path(os.devnull)):
