@@ -16,9 +16,11 @@ import click
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import (
     DEMO_LENGTH,
+    bag_options,
     camera_option,
     disturbed,
     folder_options,
+    open_bag,
     open_folder,
     open_object,
     open_odometry,
@@ -133,6 +135,14 @@ def folder(directory: Path, dataset: str, keeping: Keeping, **asked: Any) -> int
     """On your own images and scans; without --range their calibration is the guess, and there is no reference."""
     sequence = open_folder(directory, dataset, asked)
     return serve_live(sequence, keeping, as_is=not disturbed(asked), **asked)
+
+
+@live.command()
+@bag_options
+@live_options
+def bag(files: tuple[Path, ...], keeping: Keeping, **asked: Any) -> int:
+    """On a ROS 1 or ROS 2 bag, or an MCAP file; without --range its own extrinsic is the guess."""
+    return serve_live(open_bag(files, asked), keeping, as_is=not disturbed(asked), **asked)
 
 
 @live.command()

@@ -43,6 +43,7 @@ def test_it_serves_until_it_is_ended(tmp_path: Path) -> None:
         (["demo", "--range", "5/0.5", "--miscalibrate", "1,1,1,0,0,0"], 2, "not both"),
         (["seq", "04"], 3, "No KITTI folder"),
         (["folder", "{empty}"], 3, "calibration"),
+        (["bag", "{mine}"], 3, "mine.yaml"),
     ],
 )
 def test_what_cannot_be_is_a_sentence(
