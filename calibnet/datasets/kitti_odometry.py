@@ -5,6 +5,7 @@ Read here rather than by pykitti, which opens whatever has a file's name and wai
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from calibnet.datasets.calibration import Calibration
@@ -48,7 +49,8 @@ class KittiOdometry(PairedSequence):
             rows[f"P{camera}"].reshape(3, 4), transform(camera0_from_lidar[:, :3], camera0_from_lidar[:, 3])
         )
         times = folder / "times.txt"
-        seconds = read_times(times, float) if times.exists() else []  # own data may have none
+        # own data may have none; a link that leads nowhere is not none
+        seconds = read_times(times, float) if os.path.lexists(times) else []
         files = frame_files(images, scans, times_of(images, seconds, times))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"

@@ -24,7 +24,7 @@ FILES: dict[str, tuple[Build, str]] = {
     "calib of an object": (listed, OBJECT),
 }
 MAY_BE_EMPTY = {"times.txt", "timestamps.txt"}
-MAY_BE_MISSING = {"timestamps.txt"}
+MAY_BE_MISSING = {"times.txt", "timestamps.txt"}
 
 
 def row_changed(key: str, change: Callable[[list[str]], list[str]]) -> Callable[[bytes], bytes]:
