@@ -28,8 +28,8 @@ NEARLY = 0.97
 """Share of the best layout's telling from which on a simpler one, or KITTI's, is as good."""
 CLEARLY = 0.8
 """Share of it above which another layout is a rival."""
-FARTHEST_M = 5_000.0
-"""Coordinates of a sensor's own scan are smaller; half a number read as one is mostly larger by far, or 0."""
+FARTHEST_M = 200_000.0
+"""Coordinates of a scan are smaller, in millimetres too; half a number read as one is mostly larger by far, or 0."""
 
 
 def read_bin(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:

@@ -27,6 +27,10 @@ def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> Calibration
         DatasetError: it cannot be read, or what it says cannot be used; the message names it.
     """
     content, of_opencv = parse(path)
+    if wanted.camera is not None and not kalibr.is_known(content):
+        raise DatasetError(
+            f"Calibration {path} holds one camera, and none by the name {wanted.camera}; leave --camera out."
+        )
     if transforms.is_list(content):
         return transforms.read_list(content, path, wanted)
     if koide.is_known(content):

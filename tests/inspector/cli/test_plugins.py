@@ -33,7 +33,7 @@ def start(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     [
         ("evaluate", ("folder|broken|toy", "edge-alignment|broken|nothing")),
         ("folder", ("folder|broken|toy",)),
-        ("export", ("kitti|ros|opencv|json|yaml|broken|csv",)),
+        ("export", ("kitti|ros|opencv|json|yaml|urdf|autoware|koide3|broken|csv",)),
         ("train", ("geometric|regression|broken|still",)),
     ],
 )
