@@ -40,6 +40,7 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
         ({"hourglass_blocks": [1, 1, 1]}, "hourglass_blocks"),
         ({"head": "transformer"}, "geometric, regression"),
         ({"normalization": "layer"}, "normalization: input should be 'group' or 'batch'"),
+        ({"image_encoder": "resnet"}, "image_encoder: input should be 'own' or 'efficientnet-lite0'"),
         ({"widths": 8}, "mine.toml"),
     ],
 )

@@ -132,7 +132,6 @@ def test_gradients_of_depthwise_convolutions_are_single_precision_under_autocast
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"image_encoder": "resnet"}, "image_encoder must be one of own, efficientnet-lite0"),
         ({"share_extractor": True}, "share_extractor must be false"),
         ({"widths": (8, 8, 16), "blocks": (0, 0, 1), "scales": (2, 4, 8)}, "four widths or more"),
     ],
