@@ -1,13 +1,18 @@
 """KITTI raw, synced and rectified drives: ``DATE/DATE_drive_NNNN_sync``.
 
-Read here rather than by pykitti, as in `kitti_odometry`.
+Calibration and times come through pykitti, which opens whatever has a file's name and waits for it. So every file is
+read here before, and what is wrong with it is said in a sentence. The frames are listed here: pykitti looks for one
+type of image at a time.
 """
 
 from __future__ import annotations
 
 import os
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
+from typing import Any
+
+import pykitti
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.kitti import (
@@ -20,11 +25,13 @@ from calibnet.datasets.kitti import (
     times_of,
 )
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
-from calibnet.geometry import transform
+from calibnet.errors import DatasetError
+from calibnet.runtime.text import one_line
 
 CALIBRATION_ROWS = {
     "calib_cam_to_cam.txt": {f"P_rect_0{n}": 12 for n in range(4)} | {f"R_rect_0{n}": 9 for n in range(4)},
     "calib_velo_to_cam.txt": {"R": 9, "T": 3},
+    "calib_imu_to_velo.txt": {"R": 9, "T": 3},
 }
 
 KNOWN_GAPS = {"2011_09_26_drive_0009_sync": {f"{number:010d}" for number in range(177, 181)}}
@@ -53,24 +60,46 @@ class KittiRaw(PairedSequence):
         without_scan = KNOWN_GAPS.get(folder.name, set()) - scans.keys()
         paired_images = {stem: image for stem, image in images.items() if stem not in without_scan}
         check_paired(paired_images, scans)
-        cameras, lidar = (read_calibration_file(root / date / name, rows) for name, rows in CALIBRATION_ROWS.items())
-        camera0_from_lidar = transform(lidar["R"].reshape(3, 3), lidar["T"])
-        rectifying = transform(cameras["R_rect_00"].reshape(3, 3), [0.0, 0.0, 0.0])
-        self._fixed = rectified_calibration(cameras[f"P_rect_0{camera}"].reshape(3, 4), rectifying @ camera0_from_lidar)
-        timestamps = folder / "oxts" / "timestamps.txt"
-        files = frame_files(paired_images, scans, times_of(images, _times(timestamps), timestamps))
+        for name, rows in CALIBRATION_ROWS.items():
+            read_calibration_file(root / date / name, rows)
+        kitti = _open(root, date, drive)
+        self._fixed = rectified_calibration(
+            getattr(kitti.calib, f"P_rect_{camera}0"), kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect
+        )
+        seconds = [(time - kitti.timestamps[0]).total_seconds() for time in kitti.timestamps]
+        files = frame_files(paired_images, scans, times_of(images, seconds, kitti.timestamp_file))
         super().__init__(f"kitti-raw/{date}_drive_{drive}", f"KITTI {date}, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
 
 
-def _times(path: Path) -> list[float]:
-    """Seconds of every frame since the first, exact to the microsecond; none for a drive that has no times."""
-    if not os.path.lexists(path):  # a link that leads nowhere is no drive without times
-        return []
-    times = read_times(path, lambda line: datetime.fromisoformat(line[:26]).replace(tzinfo=UTC).timestamp())
-    return [round(time - times[0], 6) for time in times]
+class _Reader(pykitti.raw):  # type: ignore[misc]  # pykitti has no types
+    """pykitti's reader without the GPS/IMU packets, and content with a drive that has no times."""
+
+    @property
+    def timestamp_file(self) -> Path:
+        return Path(self.data_path) / "oxts" / "timestamps.txt"
+
+    def _load_timestamps(self) -> None:
+        self.timestamps: list[Any] = []
+        if os.path.lexists(self.timestamp_file):  # a link that leads nowhere is no drive without times
+            read_times(self.timestamp_file, lambda line: datetime.fromisoformat(line[:26]).timestamp())
+            super()._load_timestamps()
+
+    def _load_oxts(self) -> None:
+        self.oxts: list[Any] = []
+
+
+def _open(root: Path, date: str, drive: str) -> _Reader:
+    try:
+        return _Reader(str(root), date, drive)
+    except ValueError as error:
+        folder = root / date / f"{date}_drive_{drive}_sync" / "oxts"
+        raise DatasetError(
+            f"{folder / 'timestamps.txt'} or a calib_*.txt of {date} is malformed ({one_line(error, 200)}); get them "
+            "from KITTI."
+        ) from None
 
 
 def _drive_folder(root: Path, date: str, drive: str) -> Path:
