@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from inspector.read.screenshots import HeadlessViewer, file_stem
+from inspector.read.screenshots import HeadlessViewer, file_stem, smaller
 
 VULKAN_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 
@@ -84,3 +84,14 @@ def test_a_layout_without_tabs_is_one_page() -> None:
     viewer.client = Blueprints({"/viewport": {"ViewportBlueprint": {"root_container": "gone"}}})  # type: ignore[assignment]
     assert viewer.pages() == [()]
     viewer.show(())
+
+
+def test_a_picture_is_written_with_the_same_pixels_in_fewer_bytes() -> None:
+    rows, columns = np.mgrid[:240, :320]
+    window = np.stack([rows % 256, columns % 256, (rows * columns) % 256, np.full_like(rows, 255)], -1).astype(np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(window).save(buffer, "PNG", compress_level=1)
+    small = smaller(buffer.getvalue())
+    assert len(small) < 0.9 * len(buffer.getvalue())
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(small)).convert("RGB")), window[..., :3])
+    assert smaller(small) == small
