@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import cv2
 import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import decode_image
 from calibnet.errors import DatasetError
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Transform
@@ -39,19 +39,20 @@ STEPS_PER_METRE = 256
 FARTHEST_M = 2**15 / STEPS_PER_METRE
 LARGEST_BYTES = 4 << 30
 """Of a part."""
-
-
-def unpack_picture(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """JPEG to RGB ``[H, W, 3]``; ``ValueError`` if it is none."""
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
-    if image is None:
-        raise ValueError("no picture")
-    return np.asarray(image, np.uint8)[..., ::-1].copy()
+LARGEST_SCAN = 1 << 28
+"""Bytes of a scan, unpacked: some forty million points."""
 
 
 def unpack_scan(data: bytes) -> NDArray[np.float32]:
-    """What `calibnet.training.packing.pack_scan` made: ``[N, 4]``, rounded."""
-    flat = np.frombuffer(zlib.decompress(data), np.uint8)
+    """What `calibnet.training.packing.pack_scan` made: ``[N, 4]``, rounded.
+
+    Raises:
+        ValueError: it is cut short, or unpacks to more than `LARGEST_SCAN`.
+    """
+    unpacker = zlib.decompressobj()
+    flat = np.frombuffer(unpacker.decompress(data, LARGEST_SCAN), np.uint8)
+    if not unpacker.eof:
+        raise ValueError("its scan is cut short or too large")
     octets = flat.reshape(7, len(flat) // 7)
     difference = octets[:6].reshape(3, 2, -1).transpose(0, 2, 1).copy().view(np.int16)[..., 0]
     points = np.empty((octets.shape[1], 4), np.float32)
@@ -146,19 +147,17 @@ class Part:
         """
         matrix, extrinsic = (self.tensors[name][number].numpy() for name in ("matrices", "extrinsics"))
         try:
-            image = unpack_picture(self._piece("pictures", number))
-            points = unpack_scan(self._piece("scans", number).tobytes())
-        except (cv2.error, zlib.error, ValueError) as error:
+            image = decode_image(self._piece("pictures", number))
+            points = unpack_scan(self._piece("scans", number))
+        except (zlib.error, ValueError) as error:
             raise DatasetError(f"Frame {number} of {self.path} is damaged ({one_line(error, 200)}).") from None
         camera = PinholeCamera(image.shape[1], image.shape[0], matrix)
         return Frame(number, 0.0, image, points, camera, extrinsic, source)
 
-    def _piece(self, name: str, number: int) -> NDArray[np.uint8]:
+    def _piece(self, name: str, number: int) -> bytes:
         ends = self.tensors[f"{name}.ends"]
-        piece: NDArray[np.uint8] = self.tensors[name][
-            int(ends[number - 1]) if number else 0 : int(ends[number])
-        ].numpy()
-        return piece
+        start, end = int(ends[number - 1]) if number else 0, int(ends[number])
+        return self.tensors[name][start:end].numpy().tobytes()
 
 
 def read_packed(folder: Path) -> list[Source]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from pyarrow import feather, parquet
 
-from tests.hostile.inputs import Build, car
+from tests.hostile.inputs import Build, car, car_with
 from tests.hostile.rows import FINE, Row, instead_of
 from tests.support.clouds import npy, pcd, ply
 
@@ -22,14 +21,7 @@ TEXT_PLY, BINARY_PLY = ply(POINTS, "ascii"), ply(POINTS)
 
 def scan(suffix: str, content: bytes) -> Build:
     """A car's folder whose scan is this."""
-
-    def made(root: Path) -> list[str]:
-        command = car(root)
-        (root / "car/clouds/0000.bin").unlink()
-        (root / f"car/clouds/0000{suffix}").write_bytes(content)
-        return command
-
-    return made
+    return car_with("clouds/0000.bin", suffix, content)
 
 
 def line_changed(content: bytes, change: Callable[[bytes], bytes]) -> bytes:

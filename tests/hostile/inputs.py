@@ -38,6 +38,19 @@ def car(root: Path) -> list[str]:
     return ["folder", CAR, *RUN]
 
 
+def car_with(usual: str, suffix: str, content: bytes) -> Build:
+    """Calibrate a car's folder in which this stands in the place of one file."""
+
+    def made(root: Path) -> list[str]:
+        command = car(root)
+        file = root / CAR / usual
+        file.unlink()
+        file.with_suffix(suffix).write_bytes(content)
+        return command
+
+    return made
+
+
 def car_exported(root: Path) -> list[str]:
     """Export the calibration of a car's folder, which reads nothing else of it."""
     put(CAR, root)

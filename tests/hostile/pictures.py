@@ -6,12 +6,11 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from tests.hostile.inputs import Build, car
+from tests.hostile.inputs import Build, car, car_with
 from tests.hostile.rows import FINE, Row, instead_of
 
 SIZE = (400, 120)
@@ -101,14 +100,7 @@ GOOD = {
 
 def picture(suffix: str, content: bytes) -> Build:
     """A car's folder whose picture is this."""
-
-    def made(root: Path) -> list[str]:
-        command = car(root)
-        (root / "car/images/0000.png").unlink()
-        (root / f"car/images/0000{suffix}").write_bytes(content)
-        return command
-
-    return made
+    return car_with("images/0000.png", suffix, content)
 
 
 def rows() -> Iterator[Row]:

@@ -12,13 +12,15 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import decode_image
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry import RANGES, miscalibration, project
+from calibnet.training import packed as packed_module
 from calibnet.training import packing
 from calibnet.training.build import build
 from calibnet.training.data import Source
 from calibnet.training.options import TrainingOptions
-from calibnet.training.packed import KEY, STEPS_PER_METRE, packed_residuals, read_packed, unpack_picture, unpack_scan
+from calibnet.training.packed import KEY, STEPS_PER_METRE, packed_residuals, read_packed, unpack_scan
 from calibnet.training.packing import FARTHEST_M, LARGEST_WIDTH, pack_picture, pack_scan, pack_training, smaller
 from tests.calibnet.training.tiny_run import options, trainer_of
 from tests.support.scene import Scenes, make_frame
@@ -59,9 +61,18 @@ def test_points_come_back_rounded_and_in_order() -> None:
     assert unpack_scan(pack_scan(points[:0])).shape == (0, 4)
 
 
+def test_a_scan_that_is_cut_or_unpacks_without_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = pack_scan(np.zeros((1000, 4), np.float32))
+    with pytest.raises(ValueError, match="cut short or too large"):
+        unpack_scan(whole[:-3])
+    monkeypatch.setattr(packed_module, "LARGEST_SCAN", 6999)
+    with pytest.raises(ValueError, match="cut short or too large"):
+        unpack_scan(whole)
+
+
 def test_a_picture_comes_back_in_its_own_colours() -> None:
     image = make_frame(1).image
-    again = unpack_picture(np.frombuffer(pack_picture(image), np.uint8))
+    again = decode_image(pack_picture(image))
     assert again.shape == image.shape and again.dtype == np.uint8
     difference = again.astype(float) - image
     assert np.sqrt((difference**2).mean()) < 8, "as JPEG has it; red and blue swapped would differ by 60"
