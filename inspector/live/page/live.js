@@ -302,14 +302,19 @@ function showAnswer() {
 function showSteps() {
   const answer = tries[current], known = Boolean(state.frame.reference);
   const choices = [[0, "Mine"], ...(answer ? answer.steps.slice(1).map((one, i) => [i + 1, `After ${one.name}`]) : []), ...(known ? [["reference", "Reference"]] : [])];
-  at("shown").replaceChildren(...choices.map(([value, name]) => {
-    const button = document.createElement("button");
-    button.setAttribute("role", "radio");
-    button.setAttribute("aria-checked", String(value === step));
-    button.textContent = name;
-    button.onclick = () => show(current, value);
-    return button;
-  }));
+  // buttons stay while their names do: one that is replaced between press and release never hears the click
+  const names = choices.map(([, name]) => name), buttons = at("shown").children;
+  if (names.join() !== Array.from(buttons, (button) => button.textContent).join())
+    at("shown").replaceChildren(...names.map((name) => {
+      const button = document.createElement("button");
+      button.setAttribute("role", "radio");
+      button.textContent = name;
+      return button;
+    }));
+  for (const [i, [value]] of choices.entries()) {
+    buttons[i].setAttribute("aria-checked", String(value === step));
+    buttons[i].onclick = () => show(current, value);
+  }
   const rows = answer ? answer.steps : [];
   at("steps").innerHTML = rows.length ? `<tr><th></th>${rows[0].error ? "<th>off by</th>" : ""}<th>moved by</th></tr>` : "";
   for (const [i, one] of rows.entries()) {
