@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,13 @@ def sample_exposure(generator: Generator) -> Exposure:
         blur=float(generator.uniform(0.3, 0.9)),
         quality=int(generator.integers(50, 96)) if generator.random() < 0.5 else 0,
     )
+
+
+def sample_indoor_exposure(generator: Generator) -> Exposure:
+    """Draw how a camera exposes where light is scarce: darker, and with more noise."""
+    usual = sample_exposure(generator)
+    level, noise = float(np.exp(generator.uniform(np.log(0.015), np.log(0.25)))), float(generator.uniform(0.0, 0.05))
+    return replace(usual, level=level, noise=noise)
 
 
 def pixel_rays(camera: PinholeCamera) -> NDArray[np.float32]:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.random import Generator
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.synthetic.camera import Exposure, photograph, sample_exposure
+from calibnet.datasets.synthetic.camera import Exposure, photograph, sample_exposure, sample_indoor_exposure
+from calibnet.datasets.synthetic.hall import sample_hall
 from calibnet.datasets.synthetic.lidar import scan
-from calibnet.datasets.synthetic.rig import Rig, sample_rig
+from calibnet.datasets.synthetic.mesh import Mesh
+from calibnet.datasets.synthetic.rig import Rig, sample_indoor_rig, sample_rig
 from calibnet.datasets.synthetic.scene import sample_scene
 from calibnet.datasets.synthetic.shading import caster
+from calibnet.datasets.synthetic.weather import Weather
 from calibnet.datasets.synthetic.world import World
 from calibnet.geometry import invert
 from calibnet.geometry.types import Transform
@@ -19,8 +24,21 @@ TRAINING_SECTOR = float(np.radians(65.0))
 """Half the azimuth around the camera's axis that training frames scan."""
 
 
+class Surroundings(Protocol):
+    """What a frame is taken of: a `World` along a road, or a `Hall`."""
+
+    @property
+    def weather(self) -> Weather:
+        """Its light."""
+        ...
+
+    def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
+        """Everything around a vehicle, see `World.mesh`."""
+        ...
+
+
 def render_frame(
-    world: World,
+    world: Surroundings,
     rig: Rig,
     world_from_vehicle: Transform,
     generator: Generator,
@@ -51,7 +69,7 @@ def render_frame(
     rays = caster(mesh)
     points = scan(rays, mesh, rig.lidar, world_from_lidar, facing, sector, generator)
     settings = exposure or sample_exposure(generator)
-    image = photograph(rays, mesh, world.scene.weather, rig.camera, world_from_camera, settings, generator)
+    image = photograph(rays, mesh, world.weather, rig.camera, world_from_camera, settings, generator)
     return Frame(index, timestamp, image, points, rig.camera, rig.camera_from_lidar.copy(), source)
 
 
@@ -71,3 +89,12 @@ def sample_frame(seed: int) -> Frame:
     rig = sample_rig(generator)
     pose = scene.pose(generator.uniform(50.0, 350.0), yaw=generator.normal(0.0, 0.03))
     return render_frame(World(scene), rig, pose, generator, sector=TRAINING_SECTOR, source=f"synthetic seed {seed}")
+
+
+def sample_indoor_frame(seed: int) -> Frame:
+    """One random hall seen by one random rig, small enough to be drawn during training."""
+    generator = np.random.default_rng([seed, 1])
+    hall = sample_hall(generator)
+    rig, exposure = sample_indoor_rig(generator), sample_indoor_exposure(generator)
+    source = f"synthetic hall, seed {seed}"
+    return render_frame(hall, rig, hall.place, generator, sector=TRAINING_SECTOR, exposure=exposure, source=source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -193,3 +193,36 @@ KITTI_LIKE = Rig(
     ),
 )
 """A rig like the one of KITTI's cars: a wide colour image and a 64-beam scanner on the roof."""
+
+
+def sample_indoor_rig(generator: Generator, pixels: int = 128_000, maximum_width: int = 520) -> Rig:
+    """Draw a robot's or a slow car's rig: a scanner that looks up as far as down, a squarer and often wider picture."""
+    beams = int(generator.choice([16, 32, 64, 128], p=[0.25, 0.3, 0.3, 0.15]))
+    up = float(generator.choice([15.0, 22.5, 45.0, 52.0]))
+    degrees = np.linspace(up, -generator.uniform(0.5, 1.0) * up, beams)
+    lidar = replace(
+        sample_lidar(generator),
+        name=f"indoor-{beams}",
+        elevation=np.radians(degrees),
+        azimuth_shift=np.zeros(beams),
+        azimuth_step=float(np.radians(generator.uniform(0.25, 0.5))),
+        minimum_range=float(generator.uniform(0.3, 1.0)),
+    )
+    aspect = float(generator.choice([1.333, 1.333, 1.6, 1.78]))
+    width = int(min(maximum_width, np.sqrt(pixels * aspect)))
+    height = round(width / aspect)
+    focal = 0.5 * width / np.tan(0.5 * np.radians(generator.triangular(50.0, 85.0, 112.0)))
+    center = np.array([0.5 * width - 0.5, 0.5 * height - 0.5]) + generator.normal(0.0, 0.02, 2) * width
+    matrix = np.array([[focal, 0.0, center[0]], [0.0, focal, center[1]], [0.0, 0.0, 1.0]])
+    position = np.clip(generator.normal([0.05, 0.0, -0.1], [0.15, 0.2, 0.12]), -0.6, 0.6)
+    yaw, pitch, roll = (float(angle) for angle in generator.normal(0.0, np.radians([4.0, 4.0, 1.5])))
+    tilt = generator.normal(0.0, np.radians(1.0), 2)
+    return Rig(
+        name=f"synthetic {lidar.name}, {width}x{height}",
+        camera=PinholeCamera(width, height, matrix),
+        camera_from_lidar=camera_pose(yaw, pitch, roll, position),
+        vehicle_from_lidar=transform(
+            rotation_from_euler_xyz([tilt[0], tilt[1], 0.0]), [0.0, 0.0, generator.uniform(0.7, 1.8)]
+        ),
+        lidar=lidar,
+    )

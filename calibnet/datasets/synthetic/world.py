@@ -8,6 +8,7 @@ from calibnet.datasets.synthetic.mesh import Mesh, concatenate
 from calibnet.datasets.synthetic.population import CHUNK, populate
 from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.surroundings import horizon, moving_traffic
+from calibnet.datasets.synthetic.weather import Weather
 from calibnet.geometry.types import Transform
 
 _KEPT = 24
@@ -21,6 +22,11 @@ class World:
         """Start with nothing populated."""
         self.scene = scene
         self._chunks: OrderedDict[tuple[int, bool], Mesh] = OrderedDict()
+
+    @property
+    def weather(self) -> Weather:
+        """The scene's light."""
+        return self.scene.weather
 
     def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
         """Everything around a vehicle, as triangles in the world.

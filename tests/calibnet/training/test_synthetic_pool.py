@@ -20,8 +20,8 @@ def test_scenes_are_rendered_once_and_read_back(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr(synthetic, "sample_frame", sample_frame)
     pool = SyntheticPool(5, 2, tmp_path)
-    first, again = pool[3], SyntheticPool(5, 2, tmp_path)[3]
-    assert drawn == [2_000_003] and len(pool) == 5
+    first, again = pool[2], SyntheticPool(5, 2, tmp_path)[2]
+    assert drawn == [2_000_002] and len(pool) == 5
     assert np.array_equal(first.image, again.image) and np.array_equal(first.points, again.points)
     assert np.array_equal(first.camera_from_lidar, again.camera_from_lidar)
     assert np.array_equal(first.camera.matrix, again.camera.matrix)
@@ -38,3 +38,14 @@ def test_a_scene_cut_short_is_drawn_again(tmp_path: Path, monkeypatch: pytest.Mo
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:keep])
     assert np.array_equal(pool[0].points, expected)
+
+
+def test_one_scene_of_four_is_a_hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from calibnet.datasets import synthetic
+
+    drawn: list[tuple[str, int]] = []
+    for name in ("sample_frame", "sample_indoor_frame"):
+        monkeypatch.setattr(synthetic, name, lambda seed, name=name: drawn.append((name, seed)) or make_frame(1))
+    list(SyntheticPool(8, 2, tmp_path))
+    assert [seed for name, seed in drawn if name == "sample_indoor_frame"] == [2_000_003, 2_000_007]
+    assert len(drawn) == 8

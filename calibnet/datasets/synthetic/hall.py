@@ -1,0 +1,276 @@
+"""Indoors: garages and warehouses, low or high, lit by lamps, with walls, pillars and a ceiling all around.
+
+Almost all that a scanner on a car meets lies below it or far away; one indoors has returns above its horizon, within
+metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from calibnet.datasets.synthetic import library
+from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, patches, quads, rectangle
+from calibnet.datasets.synthetic.textures import atlas
+from calibnet.datasets.synthetic.weather import Weather
+from calibnet.geometry import rotation_from_euler_xyz, transform
+from calibnet.geometry.types import Floats, Transform
+
+GARAGE, WAREHOUSE = "garage", "warehouse"
+_PANEL = 1.5
+"""Side of the panels of walls, floor and ceiling, metres; each has its own light."""
+_BAY = (2.5, 5.0)
+"""Width and depth of a place to park, metres."""
+_BULB_HEIGHT = 0.08
+"""Metres by which lamps hang below the ceiling."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hall:
+    """One hall: what stands in it, its light, and where a vehicle stands.
+
+    Attributes:
+        kind: `GARAGE` or `WAREHOUSE`.
+        weather: its light; no sun, and nobody sees the sky.
+        place: ``world_from_vehicle``, 4x4.
+        everything: its triangles.
+    """
+
+    kind: str
+    weather: Weather
+    place: Transform
+    everything: Mesh
+
+    def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
+        """All of it, wherever the vehicle is; nothing moves."""
+        return self.everything
+
+
+def sample_hall(generator: Generator) -> Hall:
+    """Draw a hall with all that stands in it."""
+    kind = GARAGE if generator.random() < 0.6 else WAREHOUSE
+    low = kind == GARAGE
+    height = generator.uniform(2.3, 3.6) if low else generator.uniform(4.0, 9.0)
+    aisle = generator.uniform(5.0, 7.5)
+    rows = 1 if generator.random() < 0.5 else 2
+    size = np.array([generator.uniform(18.0, 60.0), rows * (aisle + 2 * _BAY[1]), height])
+    lamps = _lamps(generator, size)
+    middles = [0.0] if rows == 1 else [-0.5 * aisle - _BAY[1], 0.5 * aisle + _BAY[1]]
+    aisles = [(middle, aisle) for middle in middles]
+    parts = [*_shell(generator, size), *_overhead(generator, size, lamps)]
+    for middle, width in aisles:
+        for side in (-1.0, 1.0):
+            edge = middle + side * 0.5 * width
+            parts += _pillars(generator, size, edge)
+            parts += _parked(generator, size, edge, side) if low else _racks(generator, size, edge, side)
+    place = _place(generator, size, aisles)
+    parts += _people_and_things(generator, size, aisles, place)
+    everything = _lit(concatenate(parts), lamps, generator)
+    return Hall(kind, _light(generator), place, everything)
+
+
+def _material(generator: Generator, *groups: str, dark: float = 0.35, bright: float = 1.1) -> Material:
+    value = float(generator.uniform(dark, bright))
+    tint = value * np.exp(generator.normal(0.0, 0.05, 3))
+    return Material(atlas().pick(str(generator.choice(groups)), generator), (tint[0], tint[1], tint[2]))
+
+
+def _sheet(corner: Floats, along: Floats, up: Floats, material: Material) -> Mesh:
+    """A rectangle in panels of `_PANEL`, so that light may fall off over it."""
+    counts = [max(2, round(float(np.linalg.norm(edge)) / _PANEL)) for edge in (along, up)]
+    share = [np.linspace(0.0, 1.0, count + 1) for count in counts]
+    grid = corner + share[0][:, None, None] * along + share[1][None, :, None] * up
+    lengths = np.linalg.norm(along), np.linalg.norm(up)
+    uv = np.stack(np.meshgrid(share[0] * lengths[0], -share[1] * lengths[1], indexing="ij"), axis=-1)
+    return quads(patches(grid), patches(uv), material)
+
+
+def _shell(generator: Generator, size: Floats) -> Iterator[Mesh]:
+    """Floor, ceiling and walls, these painted to breast height at times, with doors and signs on them."""
+    height = size[2]
+    x, y, z = np.diag(size)
+    corner = -0.5 * (x + y)
+    yield _sheet(corner, x, y, _material(generator, "concrete", "concrete", "asphalt", "paint", dark=0.25))
+    yield _sheet(corner + z, x, y, _material(generator, "concrete", "plaster", "metal"))
+    wall = _material(generator, "concrete", "plaster", "brick", "metal", dark=0.3)
+    skirt = replace(_material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.8, 3)))
+    painted, breast = generator.random() < 0.4, generator.uniform(0.8, 1.4)
+    for start, along in ((corner, x), (corner + x, y), (corner + x + y, -x), (corner + y, -y)):
+        yield _sheet(start, along, z, wall)
+        inwards = np.cross(z, along) / np.linalg.norm(np.cross(z, along))
+        if painted:
+            yield _sheet(start + 0.01 * inwards, along, z * breast / height, skirt)
+        run = along / np.linalg.norm(along)
+        for at in np.arange(3.0, float(np.linalg.norm(along)) - 3.0, 6.0) + generator.uniform(-2, 2):
+            if generator.random() < 0.6:
+                yield from _on_wall(generator, start + at * run + 0.03 * inwards, run, height)
+
+
+def _on_wall(generator: Generator, foot: Floats, run: Floats, height: float) -> Iterator[Mesh]:
+    """A door, a sign, a cabinet or a down pipe on a wall."""
+    up, kind = np.array([0.0, 0.0, 1.0]), int(generator.integers(4))
+    if kind == 0:
+        tint = tuple(generator.uniform(0.03, 0.7, 3))
+        door = Material(atlas().pick("metal", generator), tint)
+        tall = min(generator.uniform(2.0, 3.0), height - 0.1)
+        yield rectangle(foot, generator.choice([0.95, 1.9, 3.0]) * run, tall * up, door)
+    elif kind == 1:
+        face = Material(atlas().pick(str(generator.choice(["sign", "art"])), generator), reflectance=1.5)
+        side = generator.uniform(0.4, 1.2)
+        yield rectangle(foot + generator.uniform(1.0, height - side) * up, side * run, side * up, face, unit_uv=True)
+    elif kind == 2:
+        yield box(foot, (0.5, 0.5, generator.uniform(0.8, 1.9)), _material(generator, "plain", "metal", dark=0.1))
+    else:
+        yield cylinder(
+            foot, foot + height * up, generator.uniform(0.04, 0.12), _material(generator, "metal", "plain"), 6
+        )
+
+
+def _lamps(generator: Generator, size: Floats) -> Floats:
+    """Where lamps hang, ``[L, 3]``: in rows along x, some of them dead."""
+    length, width, height = size
+    x = np.arange(-0.5 * length + 2.0, 0.5 * length - 1.0, generator.uniform(3.0, 8.0))
+    y = np.arange(-0.5 * width + 2.5, 0.5 * width - 1.0, generator.uniform(4.0, 8.0))
+    places = np.array([(a, b, height - _BULB_HEIGHT) for a in x for b in y])
+    return places[generator.random(len(places)) < generator.uniform(0.5, 1.0)]
+
+
+def _overhead(generator: Generator, size: Floats, lamps: Floats) -> Iterator[Mesh]:
+    """Beams, pipes, ducts and lamps under the ceiling."""
+    length, width, height = size
+    beam = _material(generator, "concrete", "metal")
+    deep, wide = generator.uniform(0.15, 0.5), generator.uniform(0.15, 0.5)
+    for x in np.arange(-0.5 * length + 1.0, 0.5 * length, generator.uniform(2.5, 8.0)):
+        yield box((x, 0.0, height - deep), (wide, width, deep), beam)
+    for _ in range(int(generator.integers(1, 6))):
+        y, down = generator.uniform(-0.45, 0.45) * width, deep + generator.uniform(0.05, 0.3)
+        pipe = _material(generator, "metal", "plain", dark=0.1)
+        ends = (-0.5 * length, y, height - down), (0.5 * length, y, height - down)
+        if generator.random() < 0.3:
+            yield box((0.0, y, height - down - 0.2), (length, generator.uniform(0.3, 0.9), 0.3), pipe)
+        else:
+            yield cylinder(*ends, generator.uniform(0.03, 0.15), pipe, 8)
+    glow = Material(atlas().pick("lamp", generator), (6.0, 6.0, 5.6))
+    tube = (1.4, 0.12, 0.06) if generator.random() < 0.7 else (0.5, 0.5, 0.08)
+    for lamp in lamps:
+        yield box(lamp - (0, 0, generator.uniform(0.0, 0.02)), tube, glow)
+
+
+def _pillars(generator: Generator, size: Floats, edge: float) -> Iterator[Mesh]:
+    """A row of pillars along an aisle, banded at times."""
+    if generator.random() < 0.15:
+        return
+    body, thick = _material(generator, "concrete", "plaster", "metal"), generator.uniform(0.25, 0.7)
+    band = replace(_material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.9, 3)))
+    banded, round_ = generator.random() < 0.5, generator.random() < 0.3
+    for x in np.arange(-0.5 * size[0] + 2.0, 0.5 * size[0] - 1.0, 2 * _BAY[0] * int(generator.integers(1, 3))):
+        if round_:
+            yield cylinder((x, edge, 0.0), (x, edge, size[2]), 0.5 * thick, body, 12)
+        else:
+            yield box((x, edge, 0.0), (thick, thick, size[2]), body)
+        if banded:
+            yield box((x, edge, 0.4), (thick + 0.02, thick + 0.02, generator.uniform(0.3, 1.0)), band)
+
+
+def _parked(generator: Generator, size: Floats, edge: float, side: float) -> Iterator[Mesh]:
+    """Lines of places to park at right angles to the aisle, and vehicles in some of them."""
+    width, depth = _BAY
+    paint = replace(_material(generator, "paint", dark=0.6), reflectance=1.0)
+    share = generator.uniform(0.1, 0.9)
+    for x in np.arange(-0.5 * size[0] + 0.6, 0.5 * size[0] - width, width):
+        yield rectangle((x, edge, 0.008), (0.1, 0.0, 0.0), (0.0, side * depth, 0.0), paint)
+        if generator.random() < share:
+            mesh, colour = library.pick_vehicle(
+                "van" if size[2] > 2.9 and generator.random() < 0.1 else "car", generator
+            )
+            turn = 0.5 * np.pi * (1 if generator.random() < 0.5 else -1) + generator.normal(0.0, 0.03)
+            at = (
+                x + 0.5 * width + generator.normal(0.0, 0.1),
+                edge + side * (0.5 * depth + generator.normal(0, 0.2)),
+                0.0,
+            )
+            yield mesh.placed(at, turn, colour=colour)
+
+
+def _racks(generator: Generator, size: Floats, edge: float, side: float) -> Iterator[Mesh]:
+    """Shelves with boxes, or boxes on the floor."""
+    steel = Material(atlas().pick("metal", generator), tuple(generator.uniform(0.05, 0.7, 3)))
+    levels = int(generator.integers(1, max(2, int(size[2] // 1.6))))
+    for x in np.arange(-0.5 * size[0] + 1.0, 0.5 * size[0] - 3.0, generator.uniform(2.8, 3.6)):
+        if generator.random() < 0.25:
+            continue
+        middle = edge + side * 1.4
+        for level in range(levels):
+            shelf = 1.5 * level + 0.1
+            yield box((x + 1.3, middle, shelf - 0.1), (2.7, 1.1, 0.1), steel)
+            for place in (0.45, 1.3, 2.15):
+                if generator.random() < 0.7:
+                    bulk = generator.uniform((0.4, 0.5, 0.3), (0.8, 1.0, 1.2))
+                    material = _material(generator, "planks", "cloth", "plain", "art", dark=0.1)
+                    yield box((x + place, middle + generator.normal(0, 0.08), shelf), tuple(bulk), material)
+        for post in (0.0, 2.65):
+            yield box((x + post, middle - side * 0.55, 0.0), (0.08, 0.08, 1.5 * levels + 0.3), steel)
+
+
+def _place(generator: Generator, size: Floats, aisles: list[tuple[float, float]]) -> Transform:
+    """``world_from_vehicle`` in an aisle, looking along it or, more rarely, anywhere."""
+    middle, width = aisles[int(generator.integers(len(aisles)))]
+    x = generator.uniform(-0.5, 0.2) * (size[0] - 8.0)
+    yaw = generator.normal(0.0, 0.15) if generator.random() < 0.7 else generator.uniform(-1.2, 1.2)
+    position = [x, middle + generator.uniform(-0.25, 0.25) * width, 0.0]
+    turned = rotation_from_euler_xyz([0.0, 0.0, yaw])
+    if generator.random() < 0.5:
+        turned, position[0] = rotation_from_euler_xyz([0.0, 0.0, yaw + np.pi]), -x
+    return transform(turned, position)
+
+
+def _people_and_things(
+    generator: Generator, size: Floats, aisles: list[tuple[float, float]], place: Transform
+) -> Iterator[Mesh]:
+    """People, bins, cones and crates in the aisles, none within two metres of the vehicle."""
+    for middle, width in aisles:
+        for _ in range(int(generator.integers(2, 9))):
+            at = np.array(
+                [generator.uniform(-0.45, 0.45) * size[0], middle + generator.uniform(-0.45, 0.45) * width, 0.0]
+            )
+            name = str(generator.choice(["person", "bin", "bollard", "person"]))
+            shape, turn = library.pick(name, generator), generator.uniform(0.0, 6.3)
+            colour = generator.uniform(0.03, 0.7, 3)
+            if np.linalg.norm(at - place[:3, 3]) > 2.0:
+                yield shape.placed(at, turn, colour=colour)
+
+
+def _lit(mesh: Mesh, lamps: Floats, generator: Generator) -> Mesh:
+    """Tints by the light that falls on each triangle: of the lamps, by distance, beside what comes from all sides."""
+    middle = mesh.corners.mean(axis=1)
+    light: NDArray[np.float32] = np.zeros(len(middle), np.float32)
+    for lamp in lamps.astype(np.float32):
+        light += 1.0 / (1.0 + ((middle - lamp) ** 2).sum(axis=1))
+    share = float(generator.uniform(0.0, 0.9))
+    light = light / max(float(np.median(light)), 1e-6) if len(lamps) else np.ones_like(light)
+    factor = (1.0 - share) + share * np.minimum(light, 6.0)
+    shining = mesh.tint.max(axis=1) > 3.0
+    return replace(mesh, tint=np.where(shining[:, None], mesh.tint, mesh.tint * factor[:, None]))
+
+
+def _light(generator: Generator) -> Weather:
+    """Light from all sides, warm or cold."""
+    warm = np.exp(generator.normal(0.0, 0.12))
+    tone = np.array([warm, 1.0, 1.0 / warm], dtype=np.float32)
+    ambient = (tone * generator.uniform(0.5, 1.0)).astype(np.float32)
+    zero = np.zeros(3, dtype=np.float32)
+    return Weather(
+        sun_direction=np.array([0.0, 0.0, 1.0], dtype=np.float32),
+        sun=zero,
+        zenith=ambient,
+        horizon=0.3 * ambient,
+        ambient=ambient,
+        bounce=(ambient * np.float32(generator.uniform(0.2, 0.9))).astype(np.float32),
+        clouds=1.0,
+        cloud_shift=np.zeros(2, dtype=np.float32),
+        visibility=2500.0,
+    )
