@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibnet.exhibit import Curve, Exhibit
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform, Vector6
 from calibnet.verdict import REJECTED, BadFrame, Verdict
@@ -98,6 +99,8 @@ class StageTrace:
         last_before: ``camera_from_lidar`` that its last look started from; None where that is ``before``.
         upright: ``[3, 3]``, ``camera`` from the frame's camera, where the picture was turned upright; None where it
             was not. `detail` and `matches` are of the turned picture, all extrinsics of the frame's own camera.
+        exhibits: what else a method has to show of it; empty when that was not asked for.
+        curves: of its search, likewise.
     """
 
     number: int
@@ -113,6 +116,8 @@ class StageTrace:
     matches: Matches | None = field(default=None, repr=False)
     last_before: Extrinsic | None = field(default=None, repr=False)
     upright: Rotation | None = field(default=None, repr=False)
+    exhibits: tuple[Exhibit, ...] = field(default=(), repr=False)
+    curves: tuple[Curve, ...] = field(default=(), repr=False)
 
     @property
     def looked_from(self) -> Extrinsic:
@@ -147,6 +152,7 @@ class CascadeTrace:
             applied. None where the rest speaks against the result already, or too few points are in the picture there.
         verdict: whether the result is good; None from a method that does not say.
         match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
+        method: name of the method whose run it is; empty for the cascade.
     """
 
     initial: Extrinsic = field(repr=False)
@@ -156,6 +162,7 @@ class CascadeTrace:
     wider: tuple[StageTrace, ...] = ()
     again: StageTrace | None = field(default=None, repr=False)
     verdict: Verdict | None = None
+    method: str = ""
 
     @property
     def searched(self) -> MiscalibrationRange | None:
@@ -246,6 +253,8 @@ class DriveEstimate(Estimate):
             frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
         looks: what each frame says by itself, relative to ``looked_from``.
         looked_from: ``camera_from_lidar`` that the last look started from; None from a method without looks.
+        traces: of the frames by their index, from a method that tells something of whole drives alone: each goes from
+            the drive's start to its estimate, with what is to be shown of the frame.
     """
 
     history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
@@ -254,3 +263,4 @@ class DriveEstimate(Estimate):
     verdict: Verdict | None = None
     looks: tuple[DriveLook, ...] = field(repr=False, default=())
     looked_from: Extrinsic | None = field(repr=False, default=None)
+    traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)

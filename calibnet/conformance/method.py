@@ -9,7 +9,7 @@ import numpy as np
 
 from calibnet.conformance.requirement import require, require_definite, require_rigid
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import miscalibration
+from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator
 from calibnet.trace import CascadeTrace
@@ -39,7 +39,9 @@ def check_method(calibrator: Calibrator, frame: Frame | None = None) -> None:
     require(np.array_equal(trace.corrected, again.corrected), "The same frame and start give another result.")
     blind = calibrator.calibrate(replace(chosen, camera_from_lidar=np.eye(4)), initial)
     require(np.array_equal(trace.corrected, blind.corrected), "The method looks at the frame's own extrinsic.")
-    check_trace(calibrator.calibrate(chosen, initial, detail=True), start)
+    shown = calibrator.calibrate(chosen, initial, detail=True)
+    check_trace(shown, start)
+    _check_exhibits(shown)
     if isinstance(calibrator, DriveCalibrator):
         _check_drive(calibrator, chosen, initial)
 
@@ -50,7 +52,8 @@ def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
     require(len(trace.stages) > 0, "The trace has no stage; a method without stages has one.")
     stages = (*trace.wider, *trace.stages)
     numbers = [stage.number for stage in stages]
-    require(numbers == sorted(set(numbers)), f"The stages are numbered {numbers}; numbers rise.")
+    rising = numbers == sorted(set(numbers)) and set(numbers) <= set(range(1, len(RANGES) + 1))
+    require(rising, f"The stages are numbered {numbers}; numbers rise, from 1 to {len(RANGES)}.")
     expected = initial
     for stage in stages:
         name = f"stage {stage.number}"
@@ -62,6 +65,21 @@ def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
         require(min(stage.milliseconds.values(), default=0.0) >= 0, f"{name} took less than no time.")
         expected = stage.after
     require_rigid(trace.corrected, "the corrected extrinsic")
+
+
+def _check_exhibits(trace: CascadeTrace) -> None:
+    """Pictures and curves can be shown, and have names of their own."""
+    for stage in trace.stages:
+        names = [*(shown.name for shown in stage.exhibits), *(curve.name for curve in stage.curves)]
+        require(len(set(names)) == len(names) and all(names), f"What stage {stage.number} shows is called {names}.")
+        for shown in stage.exhibits:
+            values: np.ndarray[tuple[int, ...], np.dtype[np.generic]] = np.asarray(shown.picture)
+            is_map = values.ndim == 2 and values.dtype == np.float32
+            is_picture = values.shape[2:] == (3,) and values.dtype == np.uint8
+            require(is_map or is_picture, f"{shown.name!r} is neither [H, W] float32 nor [H, W, 3] uint8.")
+        for curve in stage.curves:
+            finite = np.ndim(curve.values) == 1 and bool(np.isfinite(curve.values).all())
+            require(finite, f"{curve.name!r} is no curve of finite numbers.")
 
 
 def _check_drive(calibrator: DriveCalibrator, frame: Frame, initial: Extrinsic) -> None:

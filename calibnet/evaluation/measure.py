@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from calibnet.datasets import Sequence
+from calibnet.errors import CalibrationError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
 from calibnet.evaluation.drives import evaluate_drives
+from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import Evaluation, evaluate_frames
 from calibnet.geometry import MiscalibrationRange
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.methods.edge_alignment import EdgeAlignment
 from calibnet.verdict import REJECTED
 
@@ -77,7 +79,7 @@ def measure(
     evaluation = measurement.frames("single frames", cascade)
     held_against = {NO_CORRECTION: evaluation.initial}
     for name, method in (classical(range_) if references is None else references).items():
-        held_against[name] = measurement.frames(name, method).final
+        held_against[name] = measurement.held_against(name, method)
     evaluation = replace(evaluation, references=held_against)
     if drives:
         evaluation = measurement.with_drives(evaluation, cascade)
@@ -106,6 +108,19 @@ class _Measurement:
         return evaluate_frames(
             calibrator, chosen, self.range, self.repeats, self.seed, observer=lambda run: advance(run.sequence)
         )
+
+    def held_against(self, row: str, method: Calibrator) -> Metrics:
+        """Another method on single frames or, where it knows whole drives alone, on the drives."""
+        if not drives_only(method):
+            return self.frames(row, method).final
+        assert isinstance(method, DriveCalibrator)
+        advance = self._counter(row, None)
+        solved = evaluate_drives(
+            method, self.sequences, self.range, self.repeats, self.seed, lambda name, *_: advance(name)
+        )
+        if solved is None:
+            raise CalibrationError(f"{row} needs drives of several frames on one mount, and there is none.")
+        return solved.estimate
 
     def with_drives(self, evaluation: Evaluation, cascade: DriveCalibrator) -> Evaluation:
         """Every drive from all its frames."""

@@ -1,8 +1,12 @@
-"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive, `Explainer` of what is wrong."""
+"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive, `Explainer` of what is wrong.
+
+A method may say what it costs (`Described`), and that it needs the motion of a drive (`drives_only`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from calibnet.datasets.frame import Frame, Frames
@@ -54,6 +58,47 @@ class DriveCalibrator(Calibrator, Protocol):
             CalibrationError: no frame could be calibrated.
         """
         ...
+
+
+@dataclass(frozen=True)
+class MethodCard:
+    """What a method costs and what it was trained on, for tables.
+
+    Attributes:
+        parameters: of its networks, of all stages that run; 0 without networks.
+        multiply_adds: of its networks for one frame, likewise.
+        samples_trained: that its networks have seen, all stages together.
+        trained_on: the rigs of these, as `Sequence.rig` begins, for instance ``("KITTI 2011_09_26",)``.
+    """
+
+    parameters: int = 0
+    multiply_adds: int = 0
+    samples_trained: int = 0
+    trained_on: tuple[str, ...] = ()
+
+    def knows(self, rig: str) -> bool:
+        """Whether it was trained on a rig."""
+        return any(rig.startswith(one) for one in self.trained_on)
+
+
+@runtime_checkable
+class Described(Protocol):
+    """A method that says what it costs; one that does not is taken to have no networks."""
+
+    @property
+    def card(self) -> MethodCard:
+        """Its costs."""
+        ...
+
+
+def card_of(calibrator: object) -> MethodCard:
+    """What a method costs."""
+    return calibrator.card if isinstance(calibrator, Described) else MethodCard()
+
+
+def drives_only(calibrator: object) -> bool:
+    """Whether a method tells something of whole drives alone: it says so by an attribute ``drives_only``."""
+    return isinstance(calibrator, DriveCalibrator) and bool(getattr(calibrator, "drives_only", False))
 
 
 @runtime_checkable

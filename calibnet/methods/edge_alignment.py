@@ -5,13 +5,21 @@ It starts where networks would, which is mostly farther than edges pull: that is
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
+import torch
 
 from calibnet.alignment import align, gather, picture_camera
+from calibnet.alignment.evidence import picture_edges
 from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import resize_image
+from calibnet.exhibit import Exhibit
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.clock import Clock
 from calibnet.trace import CascadeTrace, StageTrace
 
 
@@ -25,6 +33,22 @@ class EdgeAlignment:
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""
-        found, _ = align([gather(frame, initial)], np.zeros(6), self.covariance)
+        clock = Clock(torch.device("cpu"))
+        evidence = gather(frame, initial)
+        clock("evidence")
+        found, _ = align([evidence], np.zeros(6), self.covariance)
+        clock("alignment")
         change, camera = pose_from_vector(found), picture_camera(frame.camera)
-        return CascadeTrace(initial, (StageTrace(1, self.range, camera, initial, change @ initial, change),))
+        stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
+        return CascadeTrace(initial, (replace(stage, exhibits=exhibits(frame)) if detail else stage,))
+
+
+def exhibits(frame: Frame) -> tuple[Exhibit, ...]:
+    """The edges of the picture that those of the scan are drawn to."""
+    camera = picture_camera(frame.camera)
+    grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
+    across, any_way = picture_edges(grey, camera)
+    return (
+        Exhibit("Edges across the rows: depth edges are drawn to them", across.image),
+        Exhibit("All edges: those of reflectance are drawn to them", any_way.image),
+    )

@@ -1,27 +1,47 @@
 """The methods by name; those of other packages register as ``calib_inspect.methods``.
 
-A method is a class that is called with the `MiscalibrationRange` to expect and is a `Calibrator`;
+A method is a class that is called with the `MiscalibrationRange` to expect and is a `Calibrator`; what else it can be
+told it names as keywords: ``weights`` and ``masks``, folders, and ``intrinsics``.
 `calibnet.conformance.check_method` tests one.
 """
 
 from __future__ import annotations
 
+import inspect
+from typing import Any
+
+from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.calibrator import Calibrator
 from calibnet.runtime.plugins import Registry
 
+CASCADE = "cascade"
+"""Name of our own, which is opened by `calibnet.cascade.Cascade.load`."""
 METHODS = Registry("methods", "method", {"edge-alignment": "calibnet.methods.edge_alignment:EdgeAlignment"})
 
 
-def open_method(name: str, range_: MiscalibrationRange) -> Calibrator:
+def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calibrator:
     """A method by name, ready to use.
 
     Args:
         name: one of ``METHODS.names()``.
         range_: of the miscalibrations to expect.
+        **options: what else it is told; those that are None or False are not passed on.
 
     Raises:
-        ConfigError: there is no such method, or its package is broken.
+        ConfigError: there is no such method, its package is broken, or it has no such option.
+        WeightsError: it needs weights that are not there.
     """
-    method: Calibrator = METHODS.load(name)(range_)
+    maker = METHODS.load(name)
+    asked = {option: value for option, value in options.items() if value is not None and value is not False}
+    for option in asked:
+        if not accepts(maker, option):
+            raise ConfigError(f"The method {name!r} takes no --{option.replace('_', '-')}; leave it out.")
+    method: Calibrator = maker(range_, **asked)
     return method
+
+
+def accepts(maker: Any, option: str) -> bool:
+    """Whether a method can be told something."""
+    parameters = inspect.signature(maker).parameters
+    return option in parameters or any(one.kind is one.VAR_KEYWORD for one in parameters.values())

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from calibnet.datasets import PickedFrames, Sequence, dataset_names, open_sequence, select_frames
-from calibnet.methods.registry import METHODS, open_method
+from calibnet.methods.registry import METHODS, accepts, open_method
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, STAGES
 from inspector.cli.output import (
     JSON_FILE,
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from calibnet.evaluation.battery import BatteryRun
     from calibnet.evaluation.measure import Step
     from calibnet.geometry import MiscalibrationRange
+    from calibnet.methods.calibrator import Calibrator
 
 
 @click.command()
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
     "methods",
     multiple=True,
     type=click.Choice(METHODS.names()),
-    help="Another method, on the same single frames. Repeatable.",
+    help="Another method, on the same single frames or, where it knows whole drives alone, drives. Repeatable.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @overwrite_option
@@ -127,7 +128,7 @@ def evaluate(
         run_battery(cascade, opened, range_, repeats, seed, lambda: find_sequences(dataset, root), json_file)
         return
     references = measuring.classical(range_) if classical else {}
-    references |= {name: open_method(name, range_) for name in methods}
+    references |= {name: open_reference(name, range_, weights) for name in methods}
     console = console_beside(json_file)
     with Bars() as bars:
         evaluation = measuring.measure(
@@ -144,6 +145,12 @@ def evaluate(
         )
     print_evaluation(evaluation, console)
     write_json(json_file, evaluation.as_dict())
+
+
+def open_reference(name: str, range_: MiscalibrationRange, weights: Path | None) -> Calibrator:
+    """Another method; its weights lie in the same folder as those of the cascade."""
+    told = {"weights": weights} if accepts(METHODS.load(name), "weights") else {}
+    return open_method(name, range_, **told)
 
 
 def run_battery(

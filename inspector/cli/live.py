@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import (
     DEMO_LENGTH,
@@ -28,15 +29,16 @@ from inspector.cli.inspect import (
     root_option,
     split_option,
 )
-from inspector.cli.options import FOLDER, FRAMES, MISCALIBRATION, RANGE, SEED, STAGES
+from inspector.cli.options import FOLDER, FRAMES, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
 from inspector.cli.output import overwrite_option, say
 from inspector.cli.recordings import OUTPUT_FILE
-from inspector.cli.run import announce, checked
+from inspector.cli.run import UNJUDGED, announce, checked, open_other
 from inspector.export.registry import FORMATS
 from inspector.run.options import DEFAULT_RANGE
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
+    from calibnet.methods.calibrator import Calibrator
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--frames", type=FRAMES, default=":", help="Positions to choose from, for instance 0:100:5.  [all]"),
@@ -49,6 +51,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    *METHOD_OPTIONS,
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
         "--output",
@@ -178,12 +181,16 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     options = checked(sequence, asked)
     target = Target(keeping.output, keeping.form)
     target.check()
-    cascade = Cascade.load(
-        options.preset, options.stages or options.start.stages, options.weights, wider=options.stages is None
-    )
-    announce(Console(stderr=True, highlight=False), options, cascade)
+    method: Calibrator
+    if options.method == CASCADE:
+        numbers = options.stages or options.start.stages
+        method = cascade = Cascade.load(options.preset, numbers, options.weights, wider=options.stages is None)
+        announce(Console(stderr=True, highlight=False), options, cascade)
+    else:
+        method = open_other(options)
+        say(UNJUDGED, err=True)
     bench = Bench(sequence, options.positions, options.start, options.seed)
-    session = LiveSession(bench, cascade, target, options.range or DEFAULT_RANGE)
+    session = LiveSession(bench, method, target, options.range or DEFAULT_RANGE)
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
         fetch_viewer(Path(viewer))
         try:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from calibnet.geometry.types import Transform
+from calibnet.methods.registry import CASCADE, METHODS
 from inspector.record.contents import Coloring, Detail, Part
 
 if TYPE_CHECKING:
@@ -166,3 +167,21 @@ LENGTH = QuantityType("LENGTH", "parse_length")
 ANGLE = QuantityType("ANGLE", "parse_angle")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""
+METHOD_OPTIONS = (
+    click.option(
+        "--method",
+        type=click.Choice((CASCADE, *METHODS.names())),
+        default=CASCADE,
+        show_default=True,
+        help="What calibrates: the cascade, or another method, whose results nothing judges.",
+    ),
+    click.option(
+        "--masks",
+        type=FOLDER,
+        metavar="DIR",
+        help="Masks for calib-anything: for each picture a folder of its name with a PNG for each mask.  "
+        "[default: segments of the picture]",
+    ),
+    click.option("--intrinsics", is_flag=True, help="Let pcba adjust the camera's focal length and centre as well."),
+)
+"""Of every command that calibrates with any method."""

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import ConfigError
+from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.options import (
     ANGLE,
@@ -21,6 +23,7 @@ from inspector.cli.options import (
     FOLDER,
     FRAMES,
     LENGTH,
+    METHOD_OPTIONS,
     MISCALIBRATION,
     PARTS,
     RANGE,
@@ -36,8 +39,10 @@ if TYPE_CHECKING:
 
     from calibnet.cascade.cascade import Cascade
     from calibnet.datasets import Sequence
+    from calibnet.methods.calibrator import Calibrator
     from inspector.cli.viewing import Viewing
     from inspector.record.outputs import Outputs
+    from inspector.record.recording import RunDescription
     from inspector.run.session import Session
     from inspector.run.summary import Summary
 
@@ -81,6 +86,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    *METHOD_OPTIONS,
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
         "--detail",
@@ -107,6 +113,10 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
     ),
 )
+
+
+UNJUDGED = "No result will be accepted: what it finds is not judged, which only the cascade's is."
+"""Of every method but the cascade."""
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -147,8 +157,11 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
     from calibnet.cascade.cascade import Cascade
     from calibnet.geometry.miscalibration import stages_within
     from inspector.record.recording import RunDescription
-    from inspector.run.session import Session
 
+    if options.method != CASCADE:
+        if verify:
+            raise click.UsageError("Only the cascade's results are judged; leave --method out.")
+        return prepare_other(options, outputs)
     numbers = options.stages or options.start.stages
     if verify and options.stages is None:  # how far off the calibration is, is what is asked
         numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
@@ -157,20 +170,76 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
     console = make_console()
     announce(console, options, cascade)
     provenance = describe_provenance(options.preset, stages, options.weights)
+    description = RunDescription(options.title, options.identity(stages), provenance)
+    session = make_session(options, outputs, cascade, options.solves_drive, description, console)
+    return replace(session, skipped=cascade.skipped, verify=verify)
+
+
+def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
+    """The same with another method than the cascade.
+
+    Raises:
+        ConfigError: the method is asked for what it cannot do.
+        WeightsError: its weights are missing.
+    """
+    from calibnet.methods.calibrator import DriveCalibrator, drives_only
+    from inspector.record.recording import RunDescription
+
+    method = open_other(options)
+    drive = options.solves_drive and isinstance(method, DriveCalibrator)
+    if options.drive and not drive:
+        raise ConfigError(f"{options.method} calibrates single frames and solves no drive; leave --drive out.")
+    if drives_only(method) and not drive:
+        raise ConfigError(
+            f"{options.method} needs a drive: several frames on one mount, and neither --no-drive nor --per-frame."
+        )
+    console = make_console()
+    console.print(f"{options.sequence.name} ({options.sequence.rig}), {options.start}, {options.method}", markup=False)
+    console.print(UNJUDGED, markup=False, soft_wrap=True)
+    description = RunDescription(options.title, options.identity([]), describe_provenance("", [], None))
+    return make_session(options, outputs, method, drive, description, console)
+
+
+def open_other(options: RunOptions) -> Calibrator:
+    """The method that is asked for, with nothing of it accepted."""
+    from calibnet.geometry.miscalibration import range_of
+    from calibnet.methods.registry import open_method
+    from calibnet.methods.unjudged import unjudged
+
+    start = options.start
+    method = open_method(
+        options.method,
+        start.range if start.given is None else range_of(start.given),
+        weights=options.weights,
+        masks=options.masks,
+        intrinsics=options.intrinsics,
+    )
+    return unjudged(options.method, method)
+
+
+def make_session(
+    options: RunOptions,
+    outputs: Outputs,
+    calibrator: Calibrator,
+    drive: bool,
+    description: RunDescription,
+    console: Console,
+) -> Session:
+    """A run as its options say."""
+    from inspector.run.session import Session
+
     return Session(
         sequence=options.sequence,
         positions=options.positions,
-        cascade=cascade,
-        skipped=cascade.skipped,
+        cascade=calibrator,
         start=options.start,
-        drive=options.solves_drive,
+        drive=drive,
         drive_asked=bool(options.drive),
         stop_on_bad_frame=options.on_bad_frame == "stop",
         outputs=outputs,
-        description=RunDescription(options.title, options.identity(stages), provenance),
+        description=description,
         contents=options.contents,
         console=console,
-        verify=verify,
     )
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from calibnet.errors import DatasetError
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import disturbed
 from inspector.cli.output import prepare_json, say, write_json
@@ -17,7 +16,8 @@ from inspector.cli.run import checked, choose_outputs, prepare, recording_to
 from inspector.cli.sequences import over_sequences
 
 if TYPE_CHECKING:
-    from calibnet.datasets import Frame, Sequence
+    from calibnet.cascade.cascade import Cascade
+    from calibnet.datasets import Sequence
     from calibnet.watch import Watched
     from inspector.cli.viewing import Viewing
     from inspector.run.session import Session
@@ -90,25 +90,11 @@ def watch_session(session: Session) -> Watched:
     from calibnet.drive.watching import watch_drive
     from calibnet.runtime.interruption import StopRequest
     from inspector.run.session import STOPPING, drive_observer, frame_progress
+    from inspector.run.solved import first_readable
 
     initial = session.start.initial(first_readable(session.frames))
     with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
-        return watch_drive(session.cascade, session.frames, initial, drive_observer(progress, stop))
-
-
-def first_readable(frames: Sequence) -> Frame:
-    """The first frame that can be read.
-
-    Raises:
-        DatasetError: none can.
-    """
-    failure: DatasetError | None = None
-    for position in range(len(frames)):
-        try:
-            return frames[position]
-        except DatasetError as error:
-            failure = failure or error
-    raise failure or DatasetError("There are no frames to watch.")
+        return watch_drive(cast("Cascade", session.cascade), session.frames, initial, drive_observer(progress, stop))
 
 
 over_sequences(watch, watch_sequence)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Sequence as Positions
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -24,6 +24,7 @@ MOST_UNDONE = 1000
 """Poses that can be gone back through."""
 
 
+@runtime_checkable
 class StagedCalibrator(DriveCalibrator, Protocol):
     """A method whose stages can also be run one at a time; `calibnet.cascade.cascade.Cascade` is one."""
 

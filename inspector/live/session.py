@@ -15,7 +15,7 @@ from calibnet.datasets.selection import spread
 from calibnet.errors import CalibnetError, CalibrationError, ConfigError, DatasetError
 from calibnet.geometry import MiscalibrationRange, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator
 from calibnet.trace import CascadeTrace
 from inspector.live.accept import Target, doubts, verdict_on
 from inspector.live.bench import Bench, StagedCalibrator
@@ -42,17 +42,17 @@ class LiveSession:
         stream: the recording of it.
     """
 
-    def __init__(self, bench: Bench, cascade: StagedCalibrator, target: Target, range_: MiscalibrationRange) -> None:
+    def __init__(self, bench: Bench, method: Calibrator, target: Target, range_: MiscalibrationRange) -> None:
         """Begin without a try.
 
         Args:
             bench: with its first frame.
-            cascade: that answers.
+            method: that answers: the cascade, or another one.
             target: where an accepted calibration goes.
             range_: of the sliders, and of random poses.
         """
         self.bench, self.stream = bench, TryStream()
-        self._cascade, self._target, self._range = cascade, target, range_
+        self._method, self._target, self._range = method, target, range_
         self._worker = Worker(self._tell_state, self._tell_problem)
         self._observations: dict[int, Observation] = {}
         self.tell: Tell = _nobody
@@ -91,7 +91,7 @@ class LiveSession:
         return {
             "is": "hello",
             "name": self.bench.name,
-            "stages": list(self._cascade.numbers),
+            "stages": list(self._method.numbers) if isinstance(self._method, StagedCalibrator) else [],
             "range": [self._range.rotation_deg, self._range.translation_m],
             "target": str(self._target.file),
             "palettes": palettes(),
@@ -180,27 +180,31 @@ class LiveSession:
     async def _run(self, message: dict[str, Any]) -> None:
         """Run all stages, or the one that is named, from the pose."""
         number = message.get("stage")
-        cascade = self._cascade if number is None else self._cascade.only(int(number))
+        method = self._method
+        if number is not None:
+            if not isinstance(method, StagedCalibrator):
+                raise ConfigError("This method has no stages to run one at a time.")
+            method = method.only(int(number))
         frame, start, reference = self.bench.frame, self.bench.extrinsic, self.bench.reference
 
         def compute(_: Callable[[int, int], None]) -> tuple[CascadeTrace, float]:
             began = time.perf_counter()
-            trace = cascade.calibrate(frame, start)
+            trace = method.calibrate(frame, start)
             return trace, 1000 * (time.perf_counter() - began)
 
         async def finish(result: tuple[CascadeTrace, float]) -> None:
             trace, milliseconds = result
             made = self.bench.keep(lambda number: Try.of_trace(number, frame.index, trace, milliseconds))
             await self._tell_try(made)
-            self._record(made, cascade, frame, reference)
+            self._record(made, method, frame, reference)
 
-        self._worker.ask(Job("running the cascade" if number is None else f"running stage {number}", compute, finish))
+        self._worker.ask(Job("running all stages" if number is None else f"running stage {number}", compute, finish))
 
-    def _record(self, made: Try, cascade: Calibrator, frame: Frame, reference: Extrinsic | None) -> None:
+    def _record(self, made: Try, method: Calibrator, frame: Frame, reference: Extrinsic | None) -> None:
         """Record a try when nobody waits for an answer: only then is it run again with all its details."""
 
         def compute(_: Callable[[int, int], None]) -> Observation:
-            trace = cascade.calibrate(frame, made.steps[0].camera_from_lidar, detail=True)
+            trace = method.calibrate(frame, made.steps[0].camera_from_lidar, detail=True)
             observation = Observation(frame, trace, reference)
             self.stream.log(made, observation)
             return observation
@@ -213,10 +217,13 @@ class LiveSession:
 
     async def _drive(self, message: dict[str, Any]) -> None:
         frames, start, index = self.bench.frames, self.bench.extrinsic, self.bench.frame.index
+        method = self._method
+        if not isinstance(method, DriveCalibrator):
+            raise ConfigError("This method calibrates single frames and solves no drive.")
 
         def compute(tell: Callable[[int, int], None]) -> Any:
             began = time.perf_counter()
-            return self._cascade.calibrate_drive(frames, start, tell), 1000 * (time.perf_counter() - began)
+            return method.calibrate_drive(frames, start, tell), 1000 * (time.perf_counter() - began)
 
         async def finish(result: Any) -> None:
             estimate, milliseconds = result
@@ -245,7 +252,7 @@ class LiveSession:
                 tell(done, len(positions))
                 try:
                     frame = frames[position]
-                    trace = self._cascade.calibrate(frame, pose.applied_to(start.guess_of(frame)))
+                    trace = self._method.calibrate(frame, pose.applied_to(start.guess_of(frame)))
                     badness = _badness(trace, start.reference_of(frame))
                 except (CalibrationError, DatasetError):
                     badness = math.inf

@@ -18,14 +18,14 @@ from inspector.record.contents import Contents, Part
 from inspector.record.frame import log_frame
 from inspector.record.observation import Layout, Observation
 from inspector.record.subtree import Subtree
-from inspector.record.tabs import cascade, cost_volumes, hourglass, scene
+from inspector.record.tabs import cascade, cost_volumes, exhibits, hourglass, scene
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.cost_volumes import log_windows
 from inspector.record.tabs.registry import Tab
 
 TIMELINE = "try"
 APPLICATION_ID = "calib-inspect-live"
-TABS: tuple[Tab, ...] = (cost_volumes, cascade, scene, hourglass)
+TABS: tuple[Tab, ...] = (cost_volumes, cascade, exhibits, scene, hourglass)
 """Of the viewer beside the page, which has the overview itself; the one that answers a click in the picture first."""
 CONTENTS = Contents(frozenset({Part.OVERLAYS, Part.VOLUMES, Part.HOURGLASS, Part.SCENE}), dense=True)
 

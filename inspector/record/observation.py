@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -112,11 +113,15 @@ class StageLayout:
         number: 1 to 5.
         range: for instance ``"5/0.5"``.
         grids: stride, height and width in cells of each cost volume that is shown, fine to coarse.
+        exhibits: names of what a method shows of it, in pictures.
+        curves: and in curves.
     """
 
     number: int
     range: str
     grids: tuple[Grid, ...]
+    exhibits: tuple[str, ...] = ()
+    curves: tuple[str, ...] = ()
 
     @property
     def short(self) -> str:
@@ -141,6 +146,8 @@ class Layout:
         position: of the camera in the LiDAR frame, metres.
         forward: its viewing direction there, of unit length.
         with_drive: whether an estimate from the whole drive follows the frames.
+        with_fit: whether its stages say what error they expect of their matches.
+        method: name of the method that ran; empty for the cascade.
     """
 
     stages: tuple[StageLayout, ...]
@@ -150,6 +157,8 @@ class Layout:
     position: Xyz = (0.0, 0.0, 0.0)
     forward: Xyz = (1.0, 0.0, 0.0)
     with_drive: bool = False
+    with_fit: bool = True
+    method: str = ""
 
     @property
     def start(self) -> str:
@@ -169,6 +178,8 @@ class Layout:
                 stage.number,
                 str(stage.range),
                 tuple(Grid(scale.stride, *scale.occupied.shape) for scale in contents.scales(stage.detail)),
+                tuple(exhibit.name for exhibit in stage.exhibits),
+                tuple(curve.name for curve in stage.curves),
             )
             for stage in observation.trace.stages
         )
@@ -182,6 +193,8 @@ class Layout:
             _xyz(lidar_from_camera[:3, 3]),
             _xyz(lidar_from_camera[:3, 2]),
             with_drive,
+            any(math.isfinite(stage.match_error_px) for stage in observation.trace.stages),
+            observation.trace.method,
         )
 
 

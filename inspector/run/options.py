@@ -13,6 +13,7 @@ from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.known import Known
 from calibnet.geometry.types import Transform
+from calibnet.methods.registry import CASCADE
 from inspector.record.contents import Coloring, Contents, Detail, Part
 from inspector.run.start import Start
 
@@ -51,6 +52,9 @@ class RunOptions:
         prior_rotation: likewise its rotation, in radians.
         stages: to run; None for those within the miscalibration.
         preset: network to use.
+        method: what calibrates: `calibnet.methods.registry.CASCADE`, or one of its ``METHODS``.
+        masks: folder of the masks of a method that needs some.
+        intrinsics: let a method that can correct the camera's intrinsics as well.
         weights: folder of its weights; None for those of the package.
         detail: how much of each frame is recorded; None for everything, or for what ``parts`` names.
         parts: with `Detail.CUSTOM`, what is recorded.
@@ -75,6 +79,9 @@ class RunOptions:
     prior_rotation: float | None = None
     stages: tuple[int, ...] | None = None
     preset: str = "compact"
+    method: str = CASCADE
+    masks: Path | None = None
+    intrinsics: bool = False
     weights: Path | None = None
     detail: Detail | None = None
     parts: frozenset[Part] | None = None
@@ -102,6 +109,19 @@ class RunOptions:
             (
                 self.detail is not None and (self.detail is Detail.CUSTOM) != (self.parts is not None),
                 "--detail custom and --log belong together: --log says which parts to record.",
+            ),
+            (
+                self.method == CASCADE and (self.masks is not None or self.intrinsics),
+                "--masks and --intrinsics are for other methods; choose one with --method.",
+            ),
+            (
+                self.method != CASCADE and (self.stages is not None or self.preset != "compact"),
+                f"--stages and --preset are those of the cascade; leave them out with --method {self.method}.",
+            ),
+            (
+                self.method != CASCADE and any((self.fix, self.prior_translation, self.prior_rotation)),
+                "Only the cascade can use what is known beforehand (--fix, --prior-translation, --prior-rotation); "
+                f"leave it out with --method {self.method}.",
             ),
         ):
             if wrong:
@@ -175,7 +195,8 @@ class RunOptions:
     @property
     def title(self) -> str:
         """Of the recording."""
-        return f"{self.sequence.name}, {self.start}"
+        of = "" if self.method == CASCADE else f", {self.method}"
+        return f"{self.sequence.name}, {self.start}{of}"
 
     def identity(self, stages: list[int]) -> dict[str, Any]:
         """Everything that changes the recorded data, as recordings keep it; ``stages`` are those that can run."""
@@ -188,7 +209,9 @@ class RunOptions:
             "seed": self.seed,
             **({"known": self.known.words} if self.known else {}),
             "stages": ",".join(map(str, stages)),
-            "preset": self.preset,
+            **({"preset": self.preset} if self.method == CASCADE else {"method": self.method}),
+            **({"masks": str(self.masks)} if self.masks is not None else {}),
+            **({"intrinsics": True} if self.intrinsics else {}),
             "detail": str(self.detail or (self._level if self.parts is None else Detail.FULL)),
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),

@@ -27,7 +27,7 @@ from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
-from calibnet.methods.calibrator import DriveCalibrator, with_causes
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
 from calibnet.runtime.interruption import StopRequest
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import REJECTED, BadFrame
@@ -37,6 +37,7 @@ from inspector.record.outputs import Outputs
 from inspector.record.recording import Recording, RunDescription
 from inspector.record.tabs.drive import drive_sentence
 from inspector.run.given import judge_given, suspected
+from inspector.run.solved import SolvedDrive, first_readable
 from inspector.run.start import Start
 from inspector.run.summary import Summary
 
@@ -52,7 +53,7 @@ class Session:
     Attributes:
         sequence: where frames come from.
         positions: which of them, in order.
-        cascade: what calibrates them.
+        cascade: what calibrates them: ours, or another method.
         skipped: stages that were asked for and have no weights.
         start: where each calibration starts.
         outputs: where the recording goes.
@@ -67,7 +68,7 @@ class Session:
 
     sequence: Sequence
     positions: Positions[int]
-    cascade: DriveCalibrator
+    cascade: Calibrator
     skipped: Positions[Skipped] = ()
     start: Start
     outputs: Outputs
@@ -99,11 +100,12 @@ class Session:
         one_mount = True
         try:
             with StopRequest(STOPPING) as stop, frame_progress(self.console) as progress:
+                method = self._method(progress, stop)
                 for position in progress.track(self.positions, description=self.sequence.name):
                     if stop.requested:
                         summary.interrupted = True
                         break
-                    observation = self._observe(position, summary)
+                    observation = self._observe(method, position, summary)
                     if observation is None:
                         continue
                     if recording is None:
@@ -123,7 +125,7 @@ class Session:
                     summary.frames_done()
                     if self.drive and not summary.interrupted:
                         if one_mount:
-                            self._record_drive(recording, summary, initial, reference, progress, stop)
+                            self._record_drive(method, recording, summary, initial, reference, progress, stop)
                         else:
                             self._no_drive(recording, summary, "The frames are of several mounts")
                     if summary.given_verdict is not None:
@@ -139,12 +141,20 @@ class Session:
             self.outputs.complete()
         return summary
 
-    def _observe(self, position: int, summary: Summary) -> Observation | None:
+    def _method(self, progress: Progress, stop: StopRequest) -> Calibrator:
+        """What calibrates the frames; one that tells something of whole drives alone solves theirs before."""
+        if not drives_only(self.cascade):
+            return self.cascade
+        assert isinstance(self.cascade, DriveCalibrator)
+        initial = self.start.initial(first_readable(self.frames))
+        return SolvedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
+
+    def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
         try:
             frame = self.sequence[position]
             initial = self.start.initial(frame)
-            trace = self.cascade.calibrate(frame, initial, detail=self.contents.inside)
+            trace = method.calibrate(frame, initial, detail=self.contents.inside)
             if trace.verdict is not None and summary.explained < MOST_EXPLAINED:
                 beside = partial(lags, self.frames, list(self.positions).index(position))
                 verdict = with_causes(self.cascade, frame, initial, trace.verdict, beside)
@@ -164,6 +174,7 @@ class Session:
 
     def _record_drive(
         self,
+        method: Calibrator,
         recording: Recording,
         summary: Summary,
         initial: Extrinsic,
@@ -172,8 +183,9 @@ class Session:
         stop: StopRequest,
     ) -> None:
         """Solve the drive's extrinsic from all frames, log how it converges, and say what came of it."""
+        assert isinstance(method, DriveCalibrator), "a drive is solved by a method that can"
         try:
-            estimate = self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop))
+            estimate = method.calibrate_drive(self.frames, initial, drive_observer(progress, stop))
         except CalibrationError as error:
             if not self.verify:
                 if self.drive_asked:

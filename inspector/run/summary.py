@@ -32,6 +32,7 @@ class Summary:
         found: the drive's ``camera_from_lidar`` or, of a single frame, that frame's; None where neither is accepted.
         drive_verdict: whether that is good.
         given_verdict: whether the calibration that the run started from is good, where it was to be verified.
+        method: name of the method; empty for the cascade.
     """
 
     frames: int = 0
@@ -44,6 +45,7 @@ class Summary:
     found: Extrinsic | None = field(default=None, repr=False)
     drive_verdict: Verdict | None = field(default=None, repr=False)
     given_verdict: Verdict | None = field(default=None, repr=False)
+    method: str = ""
     started: float = field(default_factory=time.monotonic)
     ended: float | None = None
     _numbers: list[int] = field(default_factory=list, repr=False)
@@ -56,6 +58,7 @@ class Summary:
         """Take in one frame."""
         trace = observation.trace
         self.frames += 1
+        self.method = trace.method
         if trace.verdict is not None:
             self.verdicts[observation.frame.index] = trace.verdict
         if observation.reference is not None:
@@ -101,7 +104,7 @@ class Summary:
         if self.drive:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
-        lines.append(f"Cascade, median milliseconds: {times}.")
+        lines.append(f"{self.method or 'Cascade'}, median milliseconds: {times}.")
         return lines
 
     def of_frames(self) -> list[str]:

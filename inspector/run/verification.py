@@ -11,6 +11,7 @@ from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit
+from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict import Verdict
 from inspector.run.given import judge_given, suspected
@@ -114,6 +115,7 @@ def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
     else:
         with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
             observer = drive_observer(progress, stop)
+            assert isinstance(session.cascade, DriveCalibrator), "the cascade is what verifies"
             found, tolerance = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
         frames.check()
     assert found is not None, "the cascade judges what it finds"

@@ -93,7 +93,7 @@ def view(layout: Layout) -> View:
         ]
     if Part.VOLUMES in layout.contents.parts:
         pages += [_stage_page(stage, layout) for stage in layout.stages if stage.grids]
-    return rrb.Tabs(*pages, name=NAME)
+    return rrb.Tabs(*pages, name="Steps" if layout.method else NAME)
 
 
 def _stage_page(stage: StageLayout, layout: Layout) -> View:

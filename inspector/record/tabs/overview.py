@@ -102,7 +102,7 @@ def view(layout: Layout) -> View:
     pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
     left: list[View] = [rrb.Tabs(*pictures, active_tab=0, name="Result"), point_legend(layout)]
     shares = [_large_height(layout), LEGEND_HEIGHT]
-    if layout.stages and Part.CURVES in layout.contents.parts:
+    if _curve_views(layout) and layout.stages and Part.CURVES in layout.contents.parts:
         curves = rrb.Horizontal(*_curve_views(layout))
         left += [curves, legend("Curves", LEGEND_CURVES)]
         shares += [SCREEN_HEIGHT - sum(shares) - LEGEND_HEIGHT, 0.8 * LEGEND_HEIGHT]
@@ -132,7 +132,7 @@ def _curve_views(layout: Layout) -> list[View]:
     The initial error is not among them: it is so large that the stages' would lie on zero. The table has it.
     """
     kinds = entities.ERROR_KINDS.items() if layout.has_reference else ()
-    errors = [
+    errors: list[View] = [
         curve_view(
             f"{kind.capitalize()} error [{unit}]",
             f"error/{kind}",
@@ -142,7 +142,7 @@ def _curve_views(layout: Layout) -> list[View]:
         )
         for kind, unit in kinds
     ]
-    return [*errors, curve_view("Fit: matches off by [px]", FIT)]
+    return [*errors, curve_view("Fit: matches off by [px]", FIT)] if layout.with_fit else errors
 
 
 def _log_errors(rec: Subtree, observation: Observation) -> None:
@@ -164,7 +164,8 @@ def _log_fit(rec: Subtree, observation: Observation) -> None:
     """The match error that every stage expects, which needs no reference, and the limit of the last one's."""
     trace = observation.trace
     for stage in trace.stages:
-        rec.log(fit_stage(stage.number), rr.Scalars(observation.image_px(stage, stage.match_error_px)))
+        if not (trace.method and math.isnan(stage.match_error_px)):
+            rec.log(fit_stage(stage.number), rr.Scalars(observation.image_px(stage, stage.match_error_px)))
     if trace.stages and math.isfinite(trace.match_error_limit_px):
         limit = observation.image_px(trace.stages[-1], trace.match_error_limit_px)
         rec.log(FIT_LIMIT, rr.Scalars(limit))
@@ -173,8 +174,8 @@ def _log_fit(rec: Subtree, observation: Observation) -> None:
 def _log_curve_styles(rec: Subtree, layout: Layout) -> None:
     looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
     log_names(rec, LEGEND_CURVES, {f"after {name}": color for name, color in looks.values()} | {"limit": colors.LIMIT})
-    curves = {fit_stage(number): look for number, look in looks.items()}
-    limits = {FIT_LIMIT: "believed: below"}
+    curves = {fit_stage(number): look for number, look in looks.items()} if layout.with_fit else {}
+    limits = {FIT_LIMIT: "believed: below"} if layout.with_fit else {}
     for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():
         curves[entities.error_initial(kind)] = ("miscalibrated", colors.INITIAL)
         curves |= {entities.error_stage(kind, number): look for number, look in looks.items()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from calibnet.geometry import RANGES, PoseError, pose_error
+from calibnet.geometry import RANGES, MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace
 from inspector import entities
@@ -89,10 +89,10 @@ def _stages(observation: Observation, path: Callable[[str], str] | None) -> list
     with_errors = observation.reference is not None
     skipped = {stage.number for stage in observation.skipped}
     ran = {stage.number: stage for stage in trace.stages}
-    header = ["after", "trained for", *(["rotation error", "translation error"] if with_errors else []), "moved by"]
+    for_ = "made for" if trace.method else "trained for"
+    header = ["after", for_, *(["rotation error", "translation error"] if with_errors else []), "moved by"]
     rows = [[observation.start, NOTHING, *_error(observation.error(trace.initial)), NOTHING]]
-    for number, range_ in enumerate(RANGES, start=1):
-        trained_for = f"±{range_.rotation_deg:g}° / {range_.translation_m:g} m"
+    for number in sorted(skipped | set(ran)):
         if number in ran:
             stage = ran[number]
             motion = pose_error(stage.after, stage.before)
@@ -100,11 +100,15 @@ def _stages(observation: Observation, path: Callable[[str], str] | None) -> list
             name = f"stage {number}"
             if path is not None:
                 name = f"[{name}](recording://{path(entities.overlay_stage(number))})"
-            rows.append([name, trained_for, *_error(observation.error(stage.after)), change])
-        elif number in skipped:
+            rows.append([name, _range(stage.range), *_error(observation.error(stage.after)), change])
+        else:
             empty = [NOTHING, NOTHING] if with_errors else []
-            rows.append([f"stage {number}", trained_for, *empty, "skipped"])
+            rows.append([f"stage {number}", _range(RANGES[number - 1]), *empty, "skipped"])
     return markdown(header, rows)
+
+
+def _range(range_: MiscalibrationRange) -> str:
+    return f"±{range_.rotation_deg:g}° / {range_.translation_m:g} m"
 
 
 def _axes(observation: Observation) -> list[str]:

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from calibnet.conformance import check_dataset, check_head, check_method
 from calibnet.datasets.frame import Frame
+from calibnet.exhibit import Curve, Exhibit
 from calibnet.geometry import RANGES, invert, transform
 from calibnet.geometry.types import Extrinsic
 from calibnet.network.pose import Pose, RegressionHead
@@ -105,7 +106,8 @@ class Method:
             after = correction @ initial
         if "elsewhere" in self.broken:
             after = initial
-        stage = StageTrace(1, RANGES[2], frame.camera, initial, after, correction, **self.broken.get("fields", {}))
+        number = self.broken.get("number", 1)
+        stage = StageTrace(number, RANGES[2], frame.camera, initial, after, correction, **self.broken.get("fields", {}))
         return CascadeTrace(np.eye(4) if "starts" in self.broken else initial, (stage,))
 
 
@@ -120,6 +122,10 @@ class Method:
         ({"elsewhere": True}, "after is not correction @ before"),
         ({"fields": {"information": -np.eye(6)}}, "not positive definite"),
         ({"fields": {"milliseconds": {"all": -1.0}}}, "less than no time"),
+        ({"number": 6}, "numbers rise, from 1 to 5"),
+        ({"fields": {"exhibits": (Exhibit("Map", np.zeros((2, 2), int)),)}}, "'Map' is neither [H, W] float32"),
+        ({"fields": {"exhibits": (Exhibit("", np.zeros((2, 2), np.float32)),)}}, "What stage 1 shows is called ['']"),
+        ({"fields": {"curves": (Curve("Score", np.array([np.nan])),)}}, "'Score' is no curve of finite numbers"),
     ],
 )
 def test_what_a_method_does_wrong_is_named(broken: dict[str, Any], sentence: str) -> None:

@@ -31,8 +31,8 @@ def start(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("command", "names"),
     [
-        ("evaluate", ("folder|broken|toy", "edge-alignment|broken|nothing")),
-        ("folder", ("folder|broken|toy",)),
+        ("evaluate", ("folder|broken|toy", "edge-alignment|", "|broken|nothing")),
+        ("folder", ("folder|broken|toy", "cascade|edge-alignment|", "|broken|nothing")),
         ("export", ("kitti|ros|opencv|json|yaml|urdf|autoware|koide3|broken|csv",)),
         ("train", ("geometric|regression|broken|still",)),
     ],

@@ -95,4 +95,9 @@ def full_layout() -> Layout:
     from inspector.record.contents import Detail
     from inspector.record.observation import Grid, StageLayout
 
-    return Layout((StageLayout(3, "5/0.5", (Grid(8, 20, 64),)),), True, Contents.of(Detail.FULL), with_drive=True)
+    return Layout(
+        (StageLayout(3, "5/0.5", (Grid(8, 20, 64),), ("Masks",), ("Score",)),),
+        True,
+        Contents.of(Detail.FULL),
+        with_drive=True,
+    )

@@ -1,0 +1,70 @@
+"""A method under its name, for whoever shows or stores results: nothing it finds is accepted.
+
+A verdict is fitted to what one method leaves wrong, and that was done for the cascade alone. So whatever another method
+says of itself, it cannot be told whether its result is good; only that it is bad is believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from calibnet.datasets.frame import Frame, Frames
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator, MethodCard, card_of, drives_only
+from calibnet.trace import CascadeTrace, DriveEstimate
+from calibnet.verdict import CANNOT_TELL, REJECTED, Verdict, moved
+
+
+def unjudged(name: str, calibrator: Calibrator) -> Calibrator:
+    """The same method with its name in every trace, and with the verdict that nobody can tell."""
+    return UnjudgedDrive(name, calibrator) if isinstance(calibrator, DriveCalibrator) else Unjudged(name, calibrator)
+
+
+class Unjudged:
+    """A method for single frames, see `unjudged`."""
+
+    def __init__(self, name: str, calibrator: Calibrator) -> None:
+        """Put ``name`` on what ``calibrator`` finds."""
+        self.name, self.calibrator = name, calibrator
+
+    @property
+    def card(self) -> MethodCard:
+        """Of the method itself."""
+        return card_of(self.calibrator)
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """As the method does, with another verdict."""
+        trace = self.calibrator.calibrate(frame, initial, detail)
+        return replace(trace, method=self.name, verdict=self._verdict(initial, trace.arrived, trace.verdict))
+
+    def _verdict(self, initial: Extrinsic, found: Extrinsic, own: Verdict | None) -> Verdict:
+        if own is not None and own.word == REJECTED:
+            return own
+        reason = f"{self.name} finds an extrinsic and does not judge it: only results of the cascade can be accepted."
+        stated = None if own is None else own.covariance
+        return Verdict(CANNOT_TELL, reason, found, moved(initial, found), covariance=stated)
+
+
+class UnjudgedDrive(Unjudged):
+    """A method that also solves drives."""
+
+    calibrator: DriveCalibrator
+
+    @property
+    def drives_only(self) -> bool:
+        """As the method says."""
+        return drives_only(self.calibrator)
+
+    def calibrate_drive(
+        self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
+    ) -> DriveEstimate:
+        """As the method does, with another verdict."""
+        estimate = self.calibrator.calibrate_drive(frames, initial, observer)
+        verdict = self._verdict(initial, estimate.camera_from_lidar, estimate.verdict)
+        used = replace(verdict, covariance=estimate.covariance, used=estimate.frames, skipped=estimate.skipped)
+        traces = {
+            frame: replace(trace, method=self.name, verdict=self._verdict(initial, trace.arrived, trace.verdict))
+            for frame, trace in estimate.traces.items()
+        }
+        return replace(estimate, verdict=used, traces=traces)
