@@ -97,6 +97,11 @@ class NetworkConfig:
                 raise ConfigError(f"Preset {self.name!r}: {message}.")
 
     @property
+    def trains_features(self) -> bool:
+        """Whether some batches train the features alone: not where the pose's losses are all there is."""
+        return self.hybrid_loss
+
+    @property
     def volume_scales(self) -> tuple[int, ...]:
         """Strides at which volumes are built: only the finest without multi-scale volumes."""
         return self.scales if self.multi_scale_volumes else self.scales[:1]

@@ -12,6 +12,11 @@ from calibnet.cascade.stage import Stage
 from calibnet.datasets import Sequence
 from calibnet.errors import ConfigError
 from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.networks import NETWORKS, method_network
+from calibnet.methods.learned.stage import MethodStage
+from calibnet.methods.learned.weights import load_method_network, method_settings
+from calibnet.network.ablations import ablated
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training.data import Source, training_sources, validation_sequences
@@ -23,6 +28,7 @@ from calibnet.training.packed import packed_residuals, read_packed
 from calibnet.training.recipe import RECIPE, OptimizerRecipe, Recipe
 from calibnet.training.residuals import residual_errors, stages_before
 from calibnet.training.samples import TrainingSamples
+from calibnet.training.trained import TrainedNetwork, TrainedStage
 from calibnet.training.validation import Validation
 from calibnet.weights import load_network
 from calibnet.weights.manifest import load_manifest
@@ -44,7 +50,7 @@ class Training:
     options: TrainingOptions
     recipe: Recipe
     fabric: Fabric
-    stage: Stage
+    stage: TrainedStage
     samples: TrainingSamples
     validation: Validation | None
 
@@ -78,11 +84,15 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
     )
 
 
-def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> CalibrationNetwork:
-    """The preset's network; what is pretrained of it is filled, and its first levels are frozen."""
+def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNetwork:
+    """The network of a method, or the preset's; what is pretrained of that is filled, and its first levels frozen."""
+    if options.preset in NETWORKS:
+        return method_network(MethodConfig(options.preset), MiscalibrationRange.parse(options.range))
     config = load_preset(options.preset)
     if options.head:
         config = replace(config, head=options.head)
+    if options.ablation:
+        config = ablated(config, options.ablation)
     network = CalibrationNetwork(config, MiscalibrationRange.parse(options.range))
     network.features.load_pretrained()
     for parameter in network.features.pretrained_levels()[: recipe.frozen_levels].parameters():
@@ -90,7 +100,7 @@ def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> Calibrati
     return network
 
 
-def initialize(network: CalibrationNetwork, options: TrainingOptions) -> CalibrationNetwork | None:
+def initialize(network: TrainedNetwork, options: TrainingOptions) -> TrainedNetwork | None:
     """Give the network the weights of ``options.initialize``; a head of another kind starts anew.
 
     Returns:
@@ -98,6 +108,14 @@ def initialize(network: CalibrationNetwork, options: TrainingOptions) -> Calibra
     """
     if not options.initialize:
         return None
+    if isinstance(network, MethodNetwork):
+        other = load_method_network(Path(options.initialize))
+        if type(other) is not type(network):
+            raise ConfigError(
+                f"{options.initialize} is of {other.NAME}, not of {network.NAME}; start from its weights."
+            )
+        network.load_state_dict(other.state_dict())
+        return other
     start = load_network(Path(options.initialize))
     given = start.state_dict()
     if start.config.head != network.config.head:
@@ -116,10 +134,12 @@ def initialize(network: CalibrationNetwork, options: TrainingOptions) -> Calibra
     return start
 
 
-def open_stage(network: CalibrationNetwork, options: TrainingOptions) -> Stage:
+def open_stage(network: TrainedNetwork, options: TrainingOptions) -> TrainedStage:
     """The stage of the network, used as the manifest in the output folder says."""
     number = RANGES.index(network.range) + 1 if network.range in RANGES else 0
     manifest = load_manifest(options.preset, Path(options.output))
+    if isinstance(network, MethodNetwork):
+        return MethodStage(number, network.range, network, method_settings(manifest, network.range))
     return Stage(number, network.range, network, manifest.settings(network.range))
 
 
@@ -132,7 +152,7 @@ def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]
     return read_packed(Path(options.packed)), validation_sequences(options)
 
 
-def open_frames(sources: list[Source], recipe: Recipe, stage: Stage, options: TrainingOptions) -> TrainingFrames:
+def open_frames(sources: list[Source], recipe: Recipe, stage: TrainedStage, options: TrainingOptions) -> TrainingFrames:
     """Frames at the size of the stage's image, or cuttings of it where that is larger than the preset's input."""
     config, size = stage.network.config, stage.settings.image_size
     area = config.input_height * config.input_width * min(size, 1.0) ** 2
@@ -140,13 +160,15 @@ def open_frames(sources: list[Source], recipe: Recipe, stage: Stage, options: Tr
 
 
 def open_draws(
-    options: TrainingOptions, recipe: Recipe, frames: TrainingFrames, stage: Stage, start: CalibrationNetwork | None
+    options: TrainingOptions, recipe: Recipe, frames: TrainingFrames, stage: TrainedStage, start: TrainedNetwork | None
 ) -> Draws:
     """The miscalibrations: with ``options.after`` many are what the stages there leave, and what the first look does.
 
     The first look is that of the stage as it starts, if it starts from itself and looks more than once: a neighbour's
     would leave what this stage never sees, and a stage that looks once needs no practice in looking again.
     """
+    if options.uniform or isinstance(stage, MethodStage):
+        return Draws(stage.range, recipe.draws)
     drawn = recipe.draws.of(stage.range)
     if options.packed and (travelled := packed_residuals(Path(options.packed), stage.range)):
         return Draws(drawn.range, recipe.draws, travelled, drawn.residual_share)
@@ -154,7 +176,7 @@ def open_draws(
         return Draws(drawn.range, recipe.draws)
     before = stages_before(options.preset, stage.range, Path(options.after))
     again = None
-    if start is not None and start.range == stage.range and stage.settings.looks > 1:
+    if isinstance(start, CalibrationNetwork) and start.range == stage.range and stage.settings.looks > 1:
         again = replace(stage, network=start)
     residuals = residual_errors(before, frames, stage.range, recipe.draws, again) if before or again else []
     share = drawn.residual_share if before else recipe.draws.own_residual_share

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import torch
+from torch import Tensor, nn
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training.recipe import OptimizerRecipe
+from calibnet.training.trained import TrainedNetwork
+
+Tensors: TypeAlias = tuple[Tensor, ...] | list[Tensor]
 
 
-def make_optimizer(network: CalibrationNetwork, peak: float, recipe: OptimizerRecipe) -> torch.optim.AdamW:
+def make_optimizer(network: TrainedNetwork, peak: float, recipe: OptimizerRecipe) -> torch.optim.AdamW:
     """AdamW for all that is not frozen; ``peak`` is the learning rate at its highest."""
-    pretrained = set(network.features.pretrained_levels().parameters())
+    pretrained: set[nn.Parameter] = set()
+    if isinstance(network, CalibrationNetwork):
+        pretrained |= set(network.features.pretrained_levels().parameters())
     trained = [parameter for parameter in network.parameters() if parameter.requires_grad]
     groups = (
         {"params": [p for p in trained if p not in pretrained], "relative": 1.0},
@@ -30,6 +37,16 @@ def set_learning_rate(optimizer: torch.optim.Optimizer, peak: float, share: floa
         group["lr"] = group["relative"] * rate * (recipe.final_rate + (1 - recipe.final_rate) * cosine)
 
 
-def averaged(network: CalibrationNetwork, recipe: OptimizerRecipe) -> AveragedModel:
-    """A copy whose weights are the exponential moving average of the network's."""
-    return AveragedModel(network, multi_avg_fn=get_ema_multi_avg_fn(recipe.average_decay))
+def averaged(network: TrainedNetwork, recipe: OptimizerRecipe) -> AveragedModel:
+    """A copy whose weights are the exponential moving average of the network's.
+
+    The average is over the last tenth of the steps at most: in a run of some hundred steps it would otherwise be
+    mostly of what the network was before it had learned anything.
+    """
+
+    @torch.no_grad()
+    def average(averages: Tensors, current: Tensors, steps: Tensor | int) -> None:
+        early = (1 + int(steps)) / (10 + int(steps))
+        get_ema_multi_avg_fn(min(recipe.average_decay, early))(averages, current, steps)
+
+    return AveragedModel(network, multi_avg_fn=average)

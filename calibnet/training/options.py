@@ -15,7 +15,7 @@ class TrainingOptions:
     """
 
     preset: str
-    """Name of the network's preset."""
+    """Name of the network: a preset of ours, or a method of `calibnet.methods.learned.networks.NETWORKS`."""
     range: str
     """Stage to train, as degrees and metres: ``5/0.5``."""
     output: str
@@ -53,5 +53,10 @@ class TrainingOptions:
     """Folder of the rendered scenes; by default one in the temporary folder."""
     head: Head | None = None
     """Pose head, instead of the preset's."""
+    ablation: str | None = None
+    """Row of the paper's ablation, see `calibnet.network.ablations`: the preset without one of its modules."""
+    uniform: bool = False
+    """Whether miscalibrations are drawn from the range alone: no residuals, also if some travel with packed frames,
+    and no wider draws. For comparisons, in which all networks are to see the same."""
     warm_up: int | None = None
     """Samples that first train the features alone; by default the recipe's, and none for an initialised stage."""

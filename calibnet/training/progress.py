@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from calibnet.methods.learned.network import MethodLosses
 from calibnet.training.losses import Losses
 from calibnet.training.validation import ValidationFigures
 
@@ -38,7 +39,7 @@ class Means:
         self.sums: dict[str, float] = {}
         self.counts: dict[str, int] = {}
 
-    def add(self, losses: Losses) -> None:
+    def add(self, losses: Losses | MethodLosses) -> None:
         """Take one step's losses in; what it does not tell, as features alone have no pose, is left out."""
         for name, value in losses._asdict().items():
             number = float(value.detach())

@@ -7,12 +7,15 @@ least and the largest value of a uniform draw; a share of frames, scans or pictu
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calibnet.geometry import RANGES, MiscalibrationRange
-from calibnet.network.config import NetworkConfig
 from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe
 from calibnet.training.options import TrainingOptions
+
+if TYPE_CHECKING:
+    from calibnet.methods.learned.network import MethodConfig  # loads PyTorch
+    from calibnet.network.config import NetworkConfig
 
 WIDEST, WIDE, MIDDLE, NARROW, NARROWEST = RANGES
 
@@ -166,7 +169,7 @@ class PaceRecipe:
     report_seconds: float = 5.0
     """Seconds of training between lines of progress."""
     checkpoint_seconds: float = 30.0
-    """Seconds of training between checkpoints."""
+    """Seconds of training between checkpoints; infinite, there is none, not even at the end."""
     validation_seconds: float = 600.0
     """Seconds of training between validations."""
     validation_draws: int = 4
@@ -212,10 +215,10 @@ class Recipe:
     )
     """The steps of `train --all`, in order."""
 
-    def of_run(self, options: TrainingOptions, config: NetworkConfig) -> Recipe:
+    def of_run(self, options: TrainingOptions, config: NetworkConfig | MethodConfig) -> Recipe:
         """The recipe as it acts in one run: how long its warm-up is, and whether features train alone at all."""
         features = self.features
-        if not config.hybrid_loss:  # the paper's ablation: the pose's losses alone
+        if not config.trains_features:  # other networks, and the paper's ablation: the pose's losses alone
             return replace(self, features=replace(features, warm_up=0, every=0))
         wanted = options.warm_up if options.warm_up is not None else 0 if options.initialize else features.warm_up
         most = int(features.warm_up_most * options.samples) if options.samples else wanted

@@ -12,6 +12,7 @@ from typing import cast
 import torch
 
 from calibnet.errors import CalibrationError, ConfigError
+from calibnet.methods.learned.network import MethodLosses, MethodNetwork
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.interruption import StopRequest
@@ -23,6 +24,7 @@ from calibnet.training.losses import Losses, Target, feature_losses, hybrid_loss
 from calibnet.training.optimizer import averaged, make_optimizer, set_learning_rate
 from calibnet.training.progress import Every, Means, Observer, Progress
 from calibnet.training.record import manifest_with, training_record
+from calibnet.training.trained import TrainedNetwork
 from calibnet.training.validation import ValidationFigures
 from calibnet.weights import save_network, weights_path
 from calibnet.weights.manifest import manifest_path
@@ -47,7 +49,8 @@ class Trainer:
         self.average = averaged(self.network, self.recipe.optimizer)
         optimizer = make_optimizer(self.network, self.options.learning_rate, self.recipe.optimizer)
         self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
-        self.model.mark_forward_method("match")
+        if isinstance(self.network, CalibrationNetwork):
+            self.model.mark_forward_method("match")
         self.average.to(self.fabric.device)
         self.steps, self.seconds = 0, 0.0
         check_output(
@@ -127,7 +130,7 @@ class Trainer:
                 self._validate()
         return not stopping
 
-    def _step(self, inputs: NetworkInputs, target: Target) -> Losses:
+    def _step(self, inputs: NetworkInputs, target: Target) -> Losses | MethodLosses:
         recipe = self.recipe.optimizer
         set_learning_rate(self.optimizer.optimizer, self.options.learning_rate, self.share, recipe)
         losses = self._losses(inputs, target)
@@ -144,7 +147,9 @@ class Trainer:
         self.steps += 1
         return losses
 
-    def _losses(self, inputs: NetworkInputs, target: Target) -> Losses:
+    def _losses(self, inputs: NetworkInputs, target: Target) -> Losses | MethodLosses:
+        if isinstance(self.network, MethodNetwork):
+            return self.network.losses(self.model(inputs), inputs, target)
         config, features, recipe = self.network.config, self.recipe.features, self.recipe.losses
         if target.of_features:
             return feature_losses(self.model.match(inputs), inputs, target, config, recipe)
@@ -158,11 +163,13 @@ class Trainer:
     def _validate(self) -> ValidationFigures | None:
         if self.training.validation is None:
             return None
-        figures = self.training.validation(cast(CalibrationNetwork, self.average.module))
+        figures = self.training.validation(cast(TrainedNetwork, self.average.module))
         self.observer.validated(self._progress(0.0, {}), figures)
         return figures
 
     def _save_checkpoint(self) -> None:
+        if math.isinf(self.recipe.pace.checkpoint_seconds):
+            return
         state = {"steps": self.steps, "seconds": self.seconds, "options": asdict(self.options)}
         if self.fabric.is_global_zero:
             save_checkpoint(self.checkpoint, self.network, self.average, self.optimizer.optimizer, state)
@@ -170,8 +177,10 @@ class Trainer:
     def _resume(self) -> None:
         tensors, state = read_checkpoint(self.checkpoint)
         theirs, ours = state.options, asdict(self.options)
-        if any(theirs.get(key) != ours[key] for key in ("preset", "range", "head")):
-            raise ConfigError(f"{self.checkpoint} is of another preset, range or head; choose another --output folder.")
+        if any(theirs.get(key) != ours[key] for key in ("preset", "range", "head", "ablation")):
+            raise ConfigError(
+                f"{self.checkpoint} is of another preset, range, head or ablation; choose another --output folder."
+            )
         restore(tensors, self.network, self.average, self.optimizer.optimizer)
         self.steps, self.seconds = state.steps, state.seconds
 

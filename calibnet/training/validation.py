@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from calibnet.cascade.stage import Stage
 from calibnet.datasets import Frame, Sequence
 from calibnet.datasets.images import resize_image
 from calibnet.errors import CalibrationError
 from calibnet.geometry import pose_error, sample_miscalibration
 from calibnet.geometry.types import Extrinsic
-from calibnet.network.network import CalibrationNetwork
+from calibnet.training.trained import TrainedNetwork, TrainedStage
 
 
 class ValidationFigures(NamedTuple):
@@ -31,7 +30,7 @@ class ValidationFigures(NamedTuple):
 class Validation:
     """The held-out frames with their miscalibrations, prepared once."""
 
-    def __init__(self, sequences: list[Sequence], stage: Stage, repeats: int, seed: int) -> None:
+    def __init__(self, sequences: list[Sequence], stage: TrainedStage, repeats: int, seed: int) -> None:
         """Draw ``repeats`` miscalibrations of the stage's range for every frame."""
         generator = np.random.default_rng([seed, 3])
         self.stage = stage
@@ -43,9 +42,10 @@ class Validation:
                 deltas = [sample_miscalibration(stage.range, generator) for _ in range(repeats)]
                 self.cases += [(small, delta @ frame.camera_from_lidar) for delta in deltas]
 
-    def __call__(self, network: CalibrationNetwork) -> ValidationFigures:
+    def __call__(self, network: TrainedNetwork) -> ValidationFigures:
         """Look once at every frame with the stage's network as it is now, as the cascade does."""
-        stage = replace(self.stage, network=network)
+        changes: dict[str, Any] = {"network": network}  # of the stage's own kind
+        stage = replace(self.stage, **changes)
         before, after = [], []
         training = network.training
         network.eval()

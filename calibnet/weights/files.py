@@ -18,6 +18,7 @@ from calibnet.weights.manifest import PACKAGE, load_manifest
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from calibnet.methods.learned.network import MethodNetwork
     from calibnet.network.network import CalibrationNetwork
 
 LARGEST_BYTES = 1 << 30
@@ -32,7 +33,9 @@ def weights_path(preset: str, range_: MiscalibrationRange, folder: Path | None =
     return (folder or PACKAGE) / load_manifest(preset, folder).file(range_)
 
 
-def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tensor], record: dict[str, Any]) -> None:
+def save_network(
+    path: Path, network: CalibrationNetwork | MethodNetwork, state: dict[str, Tensor], record: dict[str, Any]
+) -> None:
     """Write ``state`` (half precision) with the network's config and the training record; atomic."""
     import torch
     from safetensors.torch import save_file
@@ -43,7 +46,10 @@ def save_network(path: Path, network: CalibrationNetwork, state: dict[str, Tenso
         "range": str(range_),
         "record": record,
     }
-    tensors = {name: tensor.detach().to("cpu", torch.float16).contiguous() for name, tensor in _unique(state).items()}
+    tensors = {
+        name: tensor.detach().to("cpu", torch.float16 if tensor.is_floating_point() else None).contiguous()
+        for name, tensor in _unique(state).items()
+    }
 
     def write(partial: Path) -> None:
         save_file(tensors, partial, metadata={HEADER: json.dumps(header)})

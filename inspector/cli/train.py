@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.methods.learned.networks import NETWORKS
+from calibnet.network.ablations import ABLATIONS, ablation_folder
 from calibnet.network.heads import HEADS
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE
@@ -24,6 +26,12 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network to train.")
+@click.option("--method", type=click.Choice(NETWORKS.names()), help="Network of another paper to train instead.")
+@click.option(
+    "--ablation",
+    type=click.Choice(list(ABLATIONS)),
+    help="Row of the paper's ablation: the preset without one of its modules, in a folder of its own within --output.",
+)
 @click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
 @click.option(
@@ -69,9 +77,7 @@ if TYPE_CHECKING:
 @click.option(
     "--learning-rate",
     type=NumberRange(0, min_open=True),
-    default=TrainingOptions.learning_rate,
-    show_default=True,
-    help="Peak of the cosine schedule.",
+    help=f"Peak of the cosine schedule.  [default: {TrainingOptions.learning_rate:g}, for --method its own]",
 )
 @click.option(
     "--warm-up",
@@ -85,6 +91,11 @@ if TYPE_CHECKING:
     default=TrainingOptions.workers,
     show_default=True,
     help="Processes that prepare samples.",
+)
+@click.option(
+    "--uniform",
+    is_flag=True,
+    help="Draw miscalibrations from the range alone, as comparisons need it. Always so for --method.",
 )
 @click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Of everything random.")
 @click.option(
@@ -117,6 +128,8 @@ if TYPE_CHECKING:
 @overwrite_option
 def train(
     preset: str,
+    method: str | None,
+    ablation: str | None,
     head: str | None,
     range_: MiscalibrationRange | None,
     every_stage: bool,
@@ -129,9 +142,10 @@ def train(
     minutes: float | None,
     samples: int | None,
     batch: int,
-    learning_rate: float,
+    learning_rate: float | None,
     warm_up: int | None,
     workers: int,
+    uniform: bool,
     seed: int,
     initialize: Path | None,
     train_image_branch: bool,
@@ -149,6 +163,7 @@ def train(
     calib-inspect train --range 5/0.5 --minutes 60 \\
       --data kitti-raw:KITTI/raw --data folder:RIGS --validate kitti-raw:KITTI/raw:2011_09_26/0048
     calib-inspect train --all --minutes 600 --resume --data kitti-raw:KITTI/raw --data folder:RIGS
+    calib-inspect train --method lccnet --range 5/0.5 --samples 10000 --batch 64 --packed PARTS --output METHODS
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
     if (minutes is None) == (samples is None):
         raise click.UsageError("Give either --minutes or --samples, the budget of the run.")
@@ -156,10 +171,22 @@ def train(
     if (range_ is not None) == every_stage:
         raise click.UsageError("Give either --range, the stage to train, or --all.")
 
+    if method and (every_stage or ablation or head):
+        raise click.UsageError(
+            "--method trains one network as its paper has it: leave out --all, --ablation and --head."
+        )
+    if ablation and every_stage:
+        raise click.UsageError("--ablation trains one stage: give --range instead of --all.")
+
     from calibnet.training.schedule import all_stages
 
+    if ablation:
+        output = ablation_folder(output, ablation)
+
     options = TrainingOptions(
-        preset=preset,
+        preset=method or preset,
+        ablation=ablation,
+        uniform=uniform,
         head=head,
         range=str(range_ or ""),
         output=str(output),
@@ -171,7 +198,7 @@ def train(
         minutes=minutes,
         samples=samples,
         batch=batch,
-        learning_rate=learning_rate,
+        learning_rate=learning_rate or usual_rate(method),
         warm_up=warm_up,
         seed=seed,
         workers=workers,
@@ -196,6 +223,11 @@ def train(
             markup=False,
             soft_wrap=True,
         )
+
+
+def usual_rate(method: str | None) -> float:
+    """The learning rate where none is given."""
+    return float(NETWORKS.load(method).LEARNING_RATE) if method else TrainingOptions.learning_rate
 
 
 def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:

@@ -1,0 +1,31 @@
+"""The networks by the name of their method."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from calibnet.runtime.plugins import Registry
+
+if TYPE_CHECKING:
+    from calibnet.geometry import MiscalibrationRange
+    from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+
+FOLDER = "calibnet.methods.learned"
+
+NETWORKS = Registry(
+    "networks",
+    "trained method",
+    {
+        "regnet": f"{FOLDER}.regnet:RegNet",
+        "calibnet": f"{FOLDER}.calibnet2018:CalibNet2018",
+        "lccnet": f"{FOLDER}.lccnet:LCCNet",
+        "calibformer": f"{FOLDER}.calibformer:CalibFormer",
+    },
+)
+"""Classes of `calibnet.methods.learned.network.MethodNetwork`; those of other packages register likewise."""
+
+
+def method_network(config: MethodConfig, range_: MiscalibrationRange) -> MethodNetwork:
+    """The network of a config, with random weights."""
+    network: MethodNetwork = NETWORKS.load(config.name)(config, range_)
+    return network

@@ -1,0 +1,103 @@
+"""One trained network of another paper's method, used on a frame as `calibnet.cascade.stage.Stage` is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+
+from calibnet.cascade.stage import FEWEST_CELLS, View
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import resize_image
+from calibnet.datasets.plausibility import suspicion
+from calibnet.errors import CalibrationError
+from calibnet.geometry import MiscalibrationRange, PinholeCamera, orthonormal, scaled
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.learned.network import MethodNetwork
+from calibnet.network.batch import lidar_input, make_batch
+from calibnet.runtime.clock import Clock
+from calibnet.runtime.precision import autocast
+from calibnet.trace import StageTrace
+from calibnet.weights.manifest import StageSettings
+
+
+@dataclass(frozen=True)
+class MethodStage:
+    """A network of a method.
+
+    Attributes:
+        number: 1 (coarsest) to 5 (finest), by its range.
+        range: what it was trained for.
+        network: in evaluation mode.
+        settings: looks and gain; the image always has the network's size.
+    """
+
+    number: int
+    range: MiscalibrationRange
+    network: MethodNetwork
+    settings: StageSettings = field(default_factory=StageSettings)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the network lies."""
+        return next(self.network.parameters()).device
+
+    def camera(self, frame: Frame) -> PinholeCamera:
+        """The camera of this stage's image of a frame: of the input's area, in the frame's aspect."""
+        config = self.network.config
+        return frame.camera.fitted(config.input_height, config.input_width, config.volume_scales[-1])
+
+    def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
+        """The frame's image as this stage sees it."""
+        image = torch.from_numpy(resize_image(frame.image, self.camera(frame))).permute(2, 0, 1)[None]
+        clock("resize")
+        return View(image.to(self.device), [])
+
+    def correct(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+        """Look at a frame, and again from where that arrives, as often as the method does.
+
+        Args:
+            frame: scan and camera; its own extrinsic is not looked at.
+            view: its image, as `view` gives it.
+            before: the extrinsic to correct.
+            detail: keep what the network has to show of the first look.
+
+        Raises:
+            CalibrationError: see `look`.
+        """
+        look = trace = self.look(frame, view, before, detail)
+        for _ in range(self.settings.looks - 1):
+            look = self.look(frame, view, look.after)
+            trace = trace.followed_by(look)
+        return trace
+
+    @torch.inference_mode()
+    def look(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
+        """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
+
+        Raises:
+            CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
+        """
+        clock, camera, name = Clock(self.device), self.camera(frame), self.network.NAME
+        lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
+        if lidar.occupied.sum() < FEWEST_CELLS:
+            why = suspicion(frame.remarks, "check that the extrinsic maps LiDAR points into the camera")
+            raise CalibrationError(
+                f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
+                f"{name}'s network of {self.range.label}; {why}."
+            )
+        clock("projection")
+        inputs = make_batch(view.image, [lidar], [camera.matrix])
+        with autocast(self.device):
+            output = self.network(inputs)
+        clock("network")
+        estimate = output.correction[0].double().cpu().numpy()
+        if not np.isfinite(estimate).all():
+            raise CalibrationError(
+                f"{name}'s network of {self.range.label} found no finite correction for frame {frame.index} "
+                f"({frame.source}); train it again if this happens on every frame."
+            )
+        correction = scaled(orthonormal(estimate), self.settings.gain)
+        return StageTrace(self.number, self.range, camera, before, correction @ before, correction, clock.parts)

@@ -1,0 +1,83 @@
+"""The weights of other papers' methods: in a folder with a manifest, as ours, and never in the package."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from safetensors.torch import load_file
+
+from calibnet.errors import ConfigError, WeightsError
+from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.networks import NETWORKS, method_network
+from calibnet.methods.learned.stage import MethodStage
+from calibnet.runtime.schema import validated
+from calibnet.weights.files import read_header, weights_path
+from calibnet.weights.manifest import Manifest, StageSettings, load_manifest
+
+REMEDY = "train it again with `calib-inspect train --method`"
+
+
+def load_method_network(path: Path) -> MethodNetwork:
+    """Build the network a weights file describes and fill it; in evaluation mode, single precision.
+
+    Raises:
+        WeightsError: the file is missing, cut short, foreign or does not fit its own config.
+    """
+    header = read_header(path)
+    if header.config.get("name") not in NETWORKS:
+        raise WeightsError(f"{path} holds no network of {', '.join(NETWORKS.names())}; {REMEDY}.")
+    config = validated(MethodConfig, header.config, f"The header of {path}", WeightsError, REMEDY)
+    try:
+        range_ = MiscalibrationRange.parse(header.range)
+    except ConfigError as error:
+        raise WeightsError(f"{path}: {error} Copy it again, or {REMEDY}.") from None
+    if (config.input_height, config.input_width) != (MethodConfig.input_height, MethodConfig.input_width):
+        raise WeightsError(f"{path} is of another size of input than this version's networks; {REMEDY}.")
+    with torch.device("meta"):  # its size costs no memory there
+        promised = method_network(config, range_).state_dict()
+    stored = load_file(path)
+    if {name: t.shape for name, t in promised.items()} != {name: t.shape for name, t in stored.items()}:
+        raise WeightsError(f"{path} does not fit the network of this version; {REMEDY}.")
+    if not all(torch.isfinite(tensor).all() for tensor in stored.values() if tensor.is_floating_point()):
+        raise WeightsError(f"{path} holds numbers that are not finite; copy it again, or {REMEDY}.")
+    network = method_network(config, range_)
+    network.load_state_dict(stored)
+    return network.eval()
+
+
+def method_settings(manifest: Manifest, range_: MiscalibrationRange) -> StageSettings:
+    """How a network is used: as the manifest says, or where that has none of this range, as its paper does."""
+    if any(entry.range == range_ for entry in manifest.stages):
+        return manifest.settings(range_)
+    return replace(StageSettings(), looks=NETWORKS.load(manifest.preset).LOOKS)
+
+
+def load_method_stage(name: str, range_: MiscalibrationRange, folder: Path) -> MethodStage | None:
+    """The network of a method and range, ready to run; None where the folder has none.
+
+    Raises:
+        WeightsError: the file cannot be used, or is of another method or range.
+    """
+    path = weights_path(name, range_, folder)
+    if not os.path.lexists(path):
+        return None
+    network = load_method_network(path)
+    if name != network.NAME or network.range != range_:
+        raise WeightsError(f"{path} holds the weights of {network.NAME}, {network.range}; give it its own name back.")
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    settings = method_settings(load_manifest(name, folder), range_)
+    return MethodStage(RANGES.index(range_) + 1 if range_ in RANGES else 0, range_, network.to(device), settings)
+
+
+def missing(name: str, range_: MiscalibrationRange, folder: Path | None) -> WeightsError:
+    """That a method has not been trained, with the command that does it."""
+    where = f"no weights for {range_.label} in {folder}" if folder else "no weights in the package"
+    return WeightsError(
+        f"Method {name} has {where}: make them with `calib-inspect train --method {name} --range {range_} "
+        f"--samples 10000 --packed DIR --output {folder or 'WEIGHTS'}` (--data instead of --packed trains on frames "
+        f"of datasets) and name their folder with --weights."
+    )

@@ -1,0 +1,15 @@
+"""What can be trained: a stage of ours, or one of another paper's method; both are used alike."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+from calibnet.cascade.stage import Stage
+from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.stage import MethodStage
+from calibnet.network.config import NetworkConfig
+from calibnet.network.network import CalibrationNetwork
+
+TrainedNetwork: TypeAlias = CalibrationNetwork | MethodNetwork
+TrainedStage: TypeAlias = Stage | MethodStage
+TrainedConfig: TypeAlias = NetworkConfig | MethodConfig
