@@ -151,10 +151,10 @@ def test_a_checkpoint_of_something_else_is_refused(tiny_world: Scenes, tmp_path:
     with pytest.raises(WeightsError, match="not a training checkpoint"):
         trainer_of(options(tmp_path), resume=True)
     (tmp_path / "tiny-2deg-0.2m.checkpoint").write_bytes(original)
-    with pytest.raises(ConfigError, match="another preset, range or head"):
+    with pytest.raises(ConfigError, match="another preset, range, head or ablation"):
         trainer_of(options(tmp_path, range="2/0.2"), resume=True)
     checkpoint.write_bytes(original)
-    with pytest.raises(ConfigError, match="another preset, range or head"):
+    with pytest.raises(ConfigError, match="another preset, range, head or ablation"):
         trainer_of(options(tmp_path, head="regression"), resume=True)
 
 
