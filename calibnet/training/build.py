@@ -12,7 +12,8 @@ from calibnet.cascade.stage import Stage
 from calibnet.datasets import Sequence
 from calibnet.errors import ConfigError
 from calibnet.geometry import RANGES, MiscalibrationRange
-from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.config import MethodConfig
+from calibnet.methods.learned.network import MethodNetwork
 from calibnet.methods.learned.networks import NETWORKS, method_network
 from calibnet.methods.learned.stage import MethodStage
 from calibnet.methods.learned.weights import load_method_network, method_settings

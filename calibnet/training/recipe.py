@@ -7,15 +7,13 @@ least and the largest value of a uniform draw; a share of frames, scans or pictu
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from calibnet.geometry import RANGES, MiscalibrationRange
+from calibnet.methods.learned.config import MethodConfig
+from calibnet.network.config import NetworkConfig
 from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe
 from calibnet.training.options import TrainingOptions
-
-if TYPE_CHECKING:
-    from calibnet.methods.learned.network import MethodConfig  # loads PyTorch
-    from calibnet.network.config import NetworkConfig
 
 WIDEST, WIDE, MIDDLE, NARROW, NARROWEST = RANGES
 

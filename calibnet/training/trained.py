@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TypeAlias
 
 from calibnet.cascade.stage import Stage
-from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.config import MethodConfig
+from calibnet.methods.learned.network import MethodNetwork
 from calibnet.methods.learned.stage import MethodStage
 from calibnet.network.config import NetworkConfig
 from calibnet.network.network import CalibrationNetwork

@@ -17,15 +17,9 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.losses import angles, smooth_offset, told
-from calibnet.methods.learned.network import (
-    MethodConfig,
-    MethodLosses,
-    MethodNetwork,
-    MethodOutput,
-    output_layer,
-    scaled_pose,
-)
+from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer, scaled_pose
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.cost_volume import correlate

@@ -19,8 +19,9 @@ import torch
 from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.losses import chamfer_distance, photometric_error, told
-from calibnet.methods.learned.network import MethodConfig, MethodLosses, MethodNetwork, MethodOutput, output_layer
+from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rigid, rotation_from_vector

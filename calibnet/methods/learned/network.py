@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import torch
@@ -10,32 +9,11 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.methods.learned.config import MethodConfig
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.features import image_channels
 from calibnet.network.pose import rigid, rotation_from_quaternion
 from calibnet.training.losses import Target
-
-
-@dataclass(frozen=True)
-class MethodConfig:
-    """What a weights file says of such a network.
-
-    Attributes:
-        name: of the method, see `calibnet.methods.learned.networks.NETWORKS`.
-        input_height: rows of its input; scans are projected at a size of the same area and the frame's own aspect.
-        input_width: columns.
-    """
-
-    name: str
-    input_height: int = 256
-    input_width: int = 512
-
-    volume_scales: ClassVar[tuple[int, ...]] = (8, 16, 32)
-    """Strides of the cells whose points losses are about."""
-    trains_features: ClassVar[bool] = False
-    """Whether batches are made that train features alone; it is our network that needs them."""
-    image_encoder: ClassVar[str] = "own"
-    share_image_branch: ClassVar[bool] = False
 
 
 class MethodOutput(NamedTuple):

@@ -8,7 +8,8 @@ from calibnet.runtime.plugins import Registry
 
 if TYPE_CHECKING:
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+    from calibnet.methods.learned.config import MethodConfig
+    from calibnet.methods.learned.network import MethodNetwork
 
 FOLDER = "calibnet.methods.learned"
 

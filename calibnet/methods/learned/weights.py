@@ -11,7 +11,8 @@ from safetensors.torch import load_file
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange
-from calibnet.methods.learned.network import MethodConfig, MethodNetwork
+from calibnet.methods.learned.config import MethodConfig
+from calibnet.methods.learned.network import MethodNetwork
 from calibnet.methods.learned.networks import NETWORKS, method_network
 from calibnet.methods.learned.stage import MethodStage
 from calibnet.runtime.schema import validated

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from calibnet.geometry import RANGES, transform
 from calibnet.geometry.se3 import rotation_from_vector
+from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.losses import (
     angles,
     chamfer_distance,
@@ -19,7 +20,7 @@ from calibnet.methods.learned.losses import (
     smooth_offset,
     splat,
 )
-from calibnet.methods.learned.network import MethodConfig, MethodOutput, scaled_pose
+from calibnet.methods.learned.network import MethodOutput, scaled_pose
 from calibnet.methods.learned.regnet import RegNet, quaternion_of
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rotation_from_quaternion

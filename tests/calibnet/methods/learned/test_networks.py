@@ -10,7 +10,8 @@ from torch import Tensor
 from torch.utils.flop_counter import FlopCounterMode
 
 from calibnet.geometry import RANGES, miscalibration
-from calibnet.methods.learned.network import MethodConfig, MethodNetwork, fitted_depth, fitted_image
+from calibnet.methods.learned.config import MethodConfig
+from calibnet.methods.learned.network import MethodNetwork, fitted_depth, fitted_image
 from calibnet.methods.learned.networks import NETWORKS, method_network
 from calibnet.network.batch import NetworkInputs
 from calibnet.training.losses import Target

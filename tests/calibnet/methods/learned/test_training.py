@@ -11,7 +11,7 @@ import torch
 from calibnet.cascade.stage import Stage
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import RANGES
-from calibnet.methods.learned.network import MethodConfig
+from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.learned.weights import load_method_network, load_method_stage
 from calibnet.network.ablations import ABLATIONS
