@@ -67,11 +67,11 @@ class PictureRecipe:
     """Share of the others whose colours are changed."""
     tint: tuple[float, float] = (0.8, 1.2)
     """Factor on each of their three colours."""
-    log_gamma: tuple[float, float] = (-0.5, 0.5)
+    log_gamma: tuple[float, float] = (-0.6, 0.7)
     """Logarithm of the power that all values are raised to."""
-    contrast: tuple[float, float] = (0.6, 1.4)
+    contrast: tuple[float, float] = (0.6, 1.8)
     """Factor on the distance from 0.5."""
-    brightness: tuple[float, float] = (-0.15, 0.15)
+    brightness: tuple[float, float] = (-0.2, 0.15)
     """What is added."""
     blurred: float = 0.2
     """Share of the pictures that are blurred."""

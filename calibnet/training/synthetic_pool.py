@@ -14,12 +14,12 @@ from calibnet.datasets import Frame
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.writing import write_whole
 
-HALL_EVERY = 4
-"""One of so many scenes is a hall instead of a road."""
+ROBOT_EVERY = 4
+"""One of so many scenes is a robot's, mostly in a hall, instead of a car's."""
 
 
 class SyntheticPool:
-    """A ``Sequence`` of unrelated synthetic scenes, roads and halls, each rendered once and then read from disk."""
+    """A ``Sequence`` of unrelated synthetic scenes, cars' and robots', each rendered once and then read from disk."""
 
     def __init__(self, size: int, seed: int, folder: Path | None = None) -> None:
         self.size, self.seed = size, seed
@@ -34,16 +34,16 @@ class SyntheticPool:
 
     def __getitem__(self, position: int) -> Frame:
         """Scene ``position``; rendered if no earlier run left it in the folder."""
-        hall = position % HALL_EVERY == HALL_EVERY - 1
-        path = self.folder / f"{self.seed}-{position:06d}{'-hall' if hall else ''}.npz"
+        robot = position % ROBOT_EVERY == ROBOT_EVERY - 1
+        path = self.folder / f"{self.seed}-{position:06d}{'-robot' if robot else ''}.npz"
         if path.exists():
             try:
                 return _unpack(path)
             except (ValueError, OSError, KeyError, EOFError, BadZipFile):  # cut short: draw it again
                 path.unlink(missing_ok=True)
-        from calibnet.datasets.synthetic import sample_frame, sample_indoor_frame
+        from calibnet.datasets.synthetic import sample_frame, sample_robot_frame
 
-        frame = (sample_indoor_frame if hall else sample_frame)(self.seed * 1_000_000 + position)
+        frame = (sample_robot_frame if robot else sample_frame)(self.seed * 1_000_000 + position)
         write_whole(path, _pack(frame))  # several processes may draw the same scene
         return frame
 

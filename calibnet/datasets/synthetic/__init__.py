@@ -2,7 +2,7 @@
 
 from calibnet.datasets.synthetic.hall import Hall, sample_hall
 from calibnet.datasets.synthetic.kitti_export import write_kitti_odometry
-from calibnet.datasets.synthetic.render import render_frame, sample_frame, sample_indoor_frame
+from calibnet.datasets.synthetic.render import render_frame, sample_frame, sample_robot_frame
 from calibnet.datasets.synthetic.rig import KITTI_LIKE, Lidar, Rig, sample_rig
 from calibnet.datasets.synthetic.scene import Scene, sample_scene
 from calibnet.datasets.synthetic.sequence import SyntheticSequence
@@ -19,7 +19,7 @@ __all__ = [
     "render_frame",
     "sample_frame",
     "sample_hall",
-    "sample_indoor_frame",
+    "sample_robot_frame",
     "sample_rig",
     "sample_scene",
     "write_kitti_odometry",

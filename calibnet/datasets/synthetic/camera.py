@@ -60,10 +60,10 @@ def sample_exposure(generator: Generator) -> Exposure:
 
 
 def sample_indoor_exposure(generator: Generator) -> Exposure:
-    """Draw how a camera exposes where light is scarce: darker, and with more noise."""
+    """Draw how a camera exposes lamps and dark corners: far too dark or washed out, and with more noise."""
     usual = sample_exposure(generator)
-    level, noise = float(np.exp(generator.uniform(np.log(0.015), np.log(0.25)))), float(generator.uniform(0.0, 0.05))
-    return replace(usual, level=level, noise=noise)
+    level, noise = float(np.exp(generator.uniform(np.log(0.025), np.log(0.5)))), float(generator.uniform(0.0, 0.05))
+    return replace(usual, level=level, noise=noise, contrast=float(generator.uniform(0.8, 1.7)))
 
 
 def pixel_rays(camera: PinholeCamera) -> NDArray[np.float32]:

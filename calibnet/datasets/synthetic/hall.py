@@ -1,4 +1,4 @@
-"""Indoors: garages and warehouses, low or high, lit by lamps, with walls, pillars and a ceiling all around.
+"""Indoors: rooms, garages and warehouses, low or high, lit by lamps, with walls, pillars and a ceiling all around.
 
 Almost all that a scanner on a car meets lies below it or far away; one indoors has returns above its horizon, within
 metres.
@@ -13,18 +13,16 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibnet.datasets.synthetic import library
+from calibnet.datasets.synthetic.hall_contents import BAY, boards, material, parked, people_and_things, racks
 from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, cylinder, patches, quads, rectangle
 from calibnet.datasets.synthetic.textures import atlas
 from calibnet.datasets.synthetic.weather import Weather
 from calibnet.geometry import rotation_from_euler_xyz, transform
 from calibnet.geometry.types import Floats, Transform
 
-GARAGE, WAREHOUSE = "garage", "warehouse"
+ROOM, GARAGE, WAREHOUSE = "room", "garage", "warehouse"
 _PANEL = 1.5
 """Side of the panels of walls, floor and ceiling, metres; each has its own light."""
-_BAY = (2.5, 5.0)
-"""Width and depth of a place to park, metres."""
 _BULB_HEIGHT = 0.08
 """Metres by which lamps hang below the ceiling."""
 
@@ -34,7 +32,7 @@ class Hall:
     """One hall: what stands in it, its light, and where a vehicle stands.
 
     Attributes:
-        kind: `GARAGE` or `WAREHOUSE`.
+        kind: `ROOM`, `GARAGE` or `WAREHOUSE`.
         weather: its light; no sun, and nobody sees the sky.
         place: ``world_from_vehicle``, 4x4.
         everything: its triangles.
@@ -52,31 +50,29 @@ class Hall:
 
 def sample_hall(generator: Generator) -> Hall:
     """Draw a hall with all that stands in it."""
-    kind = GARAGE if generator.random() < 0.6 else WAREHOUSE
-    low = kind == GARAGE
-    height = generator.uniform(2.3, 3.6) if low else generator.uniform(4.0, 9.0)
+    kind = str(generator.choice([ROOM, GARAGE, WAREHOUSE], p=[0.3, 0.45, 0.25]))
+    height = generator.uniform(4.0, 9.0) if kind == WAREHOUSE else generator.uniform(2.3, 3.6)
     aisle = generator.uniform(5.0, 7.5)
-    rows = 1 if generator.random() < 0.5 else 2
-    size = np.array([generator.uniform(18.0, 60.0), rows * (aisle + 2 * _BAY[1]), height])
+    rows = 1 if kind == ROOM or generator.random() < 0.5 else 2
+    size = np.array([generator.uniform(18.0, 60.0), rows * (aisle + 2 * BAY[1]), height])
+    if kind == ROOM:
+        size[:2] = generator.uniform(7.0, 18.0, 2)
+        aisle = size[1] - 3.0
     lamps = _lamps(generator, size)
-    middles = [0.0] if rows == 1 else [-0.5 * aisle - _BAY[1], 0.5 * aisle + _BAY[1]]
+    middles = [0.0] if rows == 1 else [-0.5 * aisle - BAY[1], 0.5 * aisle + BAY[1]]
     aisles = [(middle, aisle) for middle in middles]
     parts = [*_shell(generator, size), *_overhead(generator, size, lamps)]
     for middle, width in aisles:
         for side in (-1.0, 1.0):
             edge = middle + side * 0.5 * width
-            parts += _pillars(generator, size, edge)
-            parts += _parked(generator, size, edge, side) if low else _racks(generator, size, edge, side)
+            if kind != ROOM:
+                parts += _pillars(generator, size, edge)
+            parts += parked(generator, size, edge, side) if kind == GARAGE else racks(generator, size, edge, side)
     place = _place(generator, size, aisles)
-    parts += _people_and_things(generator, size, aisles, place)
+    parts += boards(generator, place)
+    parts += people_and_things(generator, size, aisles, place)
     everything = _lit(concatenate(parts), lamps, generator)
     return Hall(kind, _light(generator), place, everything)
-
-
-def _material(generator: Generator, *groups: str, dark: float = 0.35, bright: float = 1.1) -> Material:
-    value = float(generator.uniform(dark, bright))
-    tint = value * np.exp(generator.normal(0.0, 0.05, 3))
-    return Material(atlas().pick(str(generator.choice(groups)), generator), (tint[0], tint[1], tint[2]))
 
 
 def _sheet(corner: Floats, along: Floats, up: Floats, material: Material) -> Mesh:
@@ -94,10 +90,11 @@ def _shell(generator: Generator, size: Floats) -> Iterator[Mesh]:
     height = size[2]
     x, y, z = np.diag(size)
     corner = -0.5 * (x + y)
-    yield _sheet(corner, x, y, _material(generator, "concrete", "concrete", "asphalt", "paint", dark=0.25))
-    yield _sheet(corner + z, x, y, _material(generator, "concrete", "plaster", "metal"))
-    wall = _material(generator, "concrete", "plaster", "brick", "metal", dark=0.3)
-    skirt = replace(_material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.8, 3)))
+    floor = material(generator, "concrete", "concrete", "asphalt", "paint", dark=0.25)
+    yield _sheet(corner, x, y, replace(floor, gloss=float(generator.choice([0.0, 0.0, 0.25, 0.5]))))
+    yield _sheet(corner + z, x, y, material(generator, "concrete", "plaster", "metal"))
+    wall = material(generator, "concrete", "plaster", "brick", "metal", dark=0.3)
+    skirt = replace(material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.8, 3)))
     painted, breast = generator.random() < 0.4, generator.uniform(0.8, 1.4)
     for start, along in ((corner, x), (corner + x, y), (corner + x + y, -x), (corner + y, -y)):
         yield _sheet(start, along, z, wall)
@@ -123,10 +120,10 @@ def _on_wall(generator: Generator, foot: Floats, run: Floats, height: float) -> 
         side = generator.uniform(0.4, 1.2)
         yield rectangle(foot + generator.uniform(1.0, height - side) * up, side * run, side * up, face, unit_uv=True)
     elif kind == 2:
-        yield box(foot, (0.5, 0.5, generator.uniform(0.8, 1.9)), _material(generator, "plain", "metal", dark=0.1))
+        yield box(foot, (0.5, 0.5, generator.uniform(0.8, 1.9)), material(generator, "plain", "metal", dark=0.1))
     else:
         yield cylinder(
-            foot, foot + height * up, generator.uniform(0.04, 0.12), _material(generator, "metal", "plain"), 6
+            foot, foot + height * up, generator.uniform(0.04, 0.12), material(generator, "metal", "plain"), 6
         )
 
 
@@ -142,13 +139,13 @@ def _lamps(generator: Generator, size: Floats) -> Floats:
 def _overhead(generator: Generator, size: Floats, lamps: Floats) -> Iterator[Mesh]:
     """Beams, pipes, ducts and lamps under the ceiling."""
     length, width, height = size
-    beam = _material(generator, "concrete", "metal")
+    beam = material(generator, "concrete", "metal")
     deep, wide = generator.uniform(0.15, 0.5), generator.uniform(0.15, 0.5)
     for x in np.arange(-0.5 * length + 1.0, 0.5 * length, generator.uniform(2.5, 8.0)):
         yield box((x, 0.0, height - deep), (wide, width, deep), beam)
     for _ in range(int(generator.integers(1, 6))):
         y, down = generator.uniform(-0.45, 0.45) * width, deep + generator.uniform(0.05, 0.3)
-        pipe = _material(generator, "metal", "plain", dark=0.1)
+        pipe = material(generator, "metal", "plain", dark=0.1)
         ends = (-0.5 * length, y, height - down), (0.5 * length, y, height - down)
         if generator.random() < 0.3:
             yield box((0.0, y, height - down - 0.2), (length, generator.uniform(0.3, 0.9), 0.3), pipe)
@@ -164,10 +161,10 @@ def _pillars(generator: Generator, size: Floats, edge: float) -> Iterator[Mesh]:
     """A row of pillars along an aisle, banded at times."""
     if generator.random() < 0.15:
         return
-    body, thick = _material(generator, "concrete", "plaster", "metal"), generator.uniform(0.25, 0.7)
-    band = replace(_material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.9, 3)))
+    body, thick = material(generator, "concrete", "plaster", "metal"), generator.uniform(0.25, 0.7)
+    band = replace(material(generator, "paint"), tint=tuple(generator.uniform(0.05, 0.9, 3)))
     banded, round_ = generator.random() < 0.5, generator.random() < 0.3
-    for x in np.arange(-0.5 * size[0] + 2.0, 0.5 * size[0] - 1.0, 2 * _BAY[0] * int(generator.integers(1, 3))):
+    for x in np.arange(-0.5 * size[0] + 2.0, 0.5 * size[0] - 1.0, 2 * BAY[0] * int(generator.integers(1, 3))):
         if round_:
             yield cylinder((x, edge, 0.0), (x, edge, size[2]), 0.5 * thick, body, 12)
         else:
@@ -176,72 +173,16 @@ def _pillars(generator: Generator, size: Floats, edge: float) -> Iterator[Mesh]:
             yield box((x, edge, 0.4), (thick + 0.02, thick + 0.02, generator.uniform(0.3, 1.0)), band)
 
 
-def _parked(generator: Generator, size: Floats, edge: float, side: float) -> Iterator[Mesh]:
-    """Lines of places to park at right angles to the aisle, and vehicles in some of them."""
-    width, depth = _BAY
-    paint = replace(_material(generator, "paint", dark=0.6), reflectance=1.0)
-    share = generator.uniform(0.1, 0.9)
-    for x in np.arange(-0.5 * size[0] + 0.6, 0.5 * size[0] - width, width):
-        yield rectangle((x, edge, 0.008), (0.1, 0.0, 0.0), (0.0, side * depth, 0.0), paint)
-        if generator.random() < share:
-            mesh, colour = library.pick_vehicle(
-                "van" if size[2] > 2.9 and generator.random() < 0.1 else "car", generator
-            )
-            turn = 0.5 * np.pi * (1 if generator.random() < 0.5 else -1) + generator.normal(0.0, 0.03)
-            at = (
-                x + 0.5 * width + generator.normal(0.0, 0.1),
-                edge + side * (0.5 * depth + generator.normal(0, 0.2)),
-                0.0,
-            )
-            yield mesh.placed(at, turn, colour=colour)
-
-
-def _racks(generator: Generator, size: Floats, edge: float, side: float) -> Iterator[Mesh]:
-    """Shelves with boxes, or boxes on the floor."""
-    steel = Material(atlas().pick("metal", generator), tuple(generator.uniform(0.05, 0.7, 3)))
-    levels = int(generator.integers(1, max(2, int(size[2] // 1.6))))
-    for x in np.arange(-0.5 * size[0] + 1.0, 0.5 * size[0] - 3.0, generator.uniform(2.8, 3.6)):
-        if generator.random() < 0.25:
-            continue
-        middle = edge + side * 1.4
-        for level in range(levels):
-            shelf = 1.5 * level + 0.1
-            yield box((x + 1.3, middle, shelf - 0.1), (2.7, 1.1, 0.1), steel)
-            for place in (0.45, 1.3, 2.15):
-                if generator.random() < 0.7:
-                    bulk = generator.uniform((0.4, 0.5, 0.3), (0.8, 1.0, 1.2))
-                    material = _material(generator, "planks", "cloth", "plain", "art", dark=0.1)
-                    yield box((x + place, middle + generator.normal(0, 0.08), shelf), tuple(bulk), material)
-        for post in (0.0, 2.65):
-            yield box((x + post, middle - side * 0.55, 0.0), (0.08, 0.08, 1.5 * levels + 0.3), steel)
-
-
 def _place(generator: Generator, size: Floats, aisles: list[tuple[float, float]]) -> Transform:
     """``world_from_vehicle`` in an aisle, looking along it or, more rarely, anywhere."""
     middle, width = aisles[int(generator.integers(len(aisles)))]
-    x = generator.uniform(-0.5, 0.2) * (size[0] - 8.0)
+    x = generator.uniform(-0.5, 0.2) * (size[0] - min(8.0, 0.6 * size[0]))
     yaw = generator.normal(0.0, 0.15) if generator.random() < 0.7 else generator.uniform(-1.2, 1.2)
     position = [x, middle + generator.uniform(-0.25, 0.25) * width, 0.0]
     turned = rotation_from_euler_xyz([0.0, 0.0, yaw])
     if generator.random() < 0.5:
         turned, position[0] = rotation_from_euler_xyz([0.0, 0.0, yaw + np.pi]), -x
     return transform(turned, position)
-
-
-def _people_and_things(
-    generator: Generator, size: Floats, aisles: list[tuple[float, float]], place: Transform
-) -> Iterator[Mesh]:
-    """People, bins, cones and crates in the aisles, none within two metres of the vehicle."""
-    for middle, width in aisles:
-        for _ in range(int(generator.integers(2, 9))):
-            at = np.array(
-                [generator.uniform(-0.45, 0.45) * size[0], middle + generator.uniform(-0.45, 0.45) * width, 0.0]
-            )
-            name = str(generator.choice(["person", "bin", "bollard", "person"]))
-            shape, turn = library.pick(name, generator), generator.uniform(0.0, 6.3)
-            colour = generator.uniform(0.03, 0.7, 3)
-            if np.linalg.norm(at - place[:3, 3]) > 2.0:
-                yield shape.placed(at, turn, colour=colour)
 
 
 def _lit(mesh: Mesh, lamps: Floats, generator: Generator) -> Mesh:

@@ -12,7 +12,7 @@ from calibnet.datasets.synthetic.camera import Exposure, photograph, sample_expo
 from calibnet.datasets.synthetic.hall import sample_hall
 from calibnet.datasets.synthetic.lidar import scan
 from calibnet.datasets.synthetic.mesh import Mesh
-from calibnet.datasets.synthetic.rig import Rig, sample_indoor_rig, sample_rig
+from calibnet.datasets.synthetic.rig import Rig, sample_rig, sample_robot_rig
 from calibnet.datasets.synthetic.scene import sample_scene
 from calibnet.datasets.synthetic.shading import caster
 from calibnet.datasets.synthetic.weather import Weather
@@ -22,6 +22,8 @@ from calibnet.geometry.types import Transform
 
 TRAINING_SECTOR = float(np.radians(65.0))
 """Half the azimuth around the camera's axis that training frames scan."""
+INDOORS = 2 / 3
+"""Share of the robots' frames that are taken in halls."""
 
 
 class Surroundings(Protocol):
@@ -65,6 +67,8 @@ def render_frame(
     world_from_camera = world_from_lidar @ invert(rig.camera_from_lidar)
     axis = rig.camera_from_lidar[2, :3]  # the camera's optical axis in the LiDAR frame
     facing = float(np.arctan2(axis[1], axis[0]))
+    if abs(axis[2]) > np.hypot(axis[0], axis[1]):  # the scanner's axis points where the camera looks
+        sector = float(np.pi)
     mesh = world.mesh(world_from_vehicle, timestamp, *_reach(facing, sector))
     rays = caster(mesh)
     points = scan(rays, mesh, rig.lidar, world_from_lidar, facing, sector, generator)
@@ -91,10 +95,17 @@ def sample_frame(seed: int) -> Frame:
     return render_frame(World(scene), rig, pose, generator, sector=TRAINING_SECTOR, source=f"synthetic seed {seed}")
 
 
-def sample_indoor_frame(seed: int) -> Frame:
-    """One random hall seen by one random rig, small enough to be drawn during training."""
+def sample_robot_frame(seed: int) -> Frame:
+    """One random hall, or one time in three a road, seen by a random `sample_robot_rig`; small, as for training."""
     generator = np.random.default_rng([seed, 1])
-    hall = sample_hall(generator)
-    rig, exposure = sample_indoor_rig(generator), sample_indoor_exposure(generator)
-    source = f"synthetic hall, seed {seed}"
-    return render_frame(hall, rig, hall.place, generator, sector=TRAINING_SECTOR, exposure=exposure, source=source)
+    rig, exposure = sample_robot_rig(generator), sample_indoor_exposure(generator)
+    world: Surroundings
+    if generator.random() < INDOORS:
+        hall = sample_hall(generator)
+        world, pose = hall, hall.place
+    else:
+        scene = sample_scene(generator)
+        world, pose = World(scene), scene.pose(generator.uniform(50.0, 350.0), yaw=generator.normal(0.0, 0.2))
+    return render_frame(
+        world, rig, pose, generator, sector=TRAINING_SECTOR, exposure=exposure, source=f"synthetic robot, seed {seed}"
+    )

@@ -12,6 +12,8 @@ from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector3
 
 CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Rotation from a LiDAR's axes (x forward, y left, z up) to a camera's (x right, y down, z forward)."""
+DOME_AXES = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""Rotation from a dome LiDAR's axes, of which z points forward and x down, to those of one that stands upright."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,34 +197,37 @@ KITTI_LIKE = Rig(
 """A rig like the one of KITTI's cars: a wide colour image and a 64-beam scanner on the roof."""
 
 
-def sample_indoor_rig(generator: Generator, pixels: int = 128_000, maximum_width: int = 520) -> Rig:
-    """Draw a robot's or a slow car's rig: a scanner that looks up as far as down, a squarer and often wider picture."""
+def sample_robot_rig(generator: Generator, pixels: int = 128_000, maximum_width: int = 520) -> Rig:
+    """Draw a robot's or a slow car's rig: a scanner that looks up as far as down, a squarer and often wider picture.
+
+    One scanner of five is a dome whose rings run around the view, see `DOME_AXES`.
+    """
     beams = int(generator.choice([16, 32, 64, 128], p=[0.25, 0.3, 0.3, 0.15]))
-    up = float(generator.choice([15.0, 22.5, 45.0, 52.0]))
-    degrees = np.linspace(up, -generator.uniform(0.5, 1.0) * up, beams)
+    up, dome = float(generator.choice([15.0, 22.5, 45.0, 52.0])), bool(generator.random() < 0.2)
+    degrees = np.linspace(88.0, 25.0, beams) if dome else np.linspace(up, -generator.uniform(0.5, 1.0) * up, beams)
     lidar = replace(
         sample_lidar(generator),
-        name=f"indoor-{beams}",
+        name=f"{'dome' if dome else 'indoor'}-{beams}",
         elevation=np.radians(degrees),
         azimuth_shift=np.zeros(beams),
         azimuth_step=float(np.radians(generator.uniform(0.25, 0.5))),
         minimum_range=float(generator.uniform(0.3, 1.0)),
     )
-    aspect = float(generator.choice([1.333, 1.333, 1.6, 1.78]))
+    aspect = float(generator.choice([1.0, 1.333, 1.333, 1.6, 1.78]))
     width = int(min(maximum_width, np.sqrt(pixels * aspect)))
     height = round(width / aspect)
-    focal = 0.5 * width / np.tan(0.5 * np.radians(generator.triangular(50.0, 85.0, 112.0)))
+    focal = 0.5 * width / np.tan(0.5 * np.radians(generator.triangular(50.0, 85.0, 122.0)))
     center = np.array([0.5 * width - 0.5, 0.5 * height - 0.5]) + generator.normal(0.0, 0.02, 2) * width
     matrix = np.array([[focal, 0.0, center[0]], [0.0, focal, center[1]], [0.0, 0.0, 1.0]])
     position = np.clip(generator.normal([0.05, 0.0, -0.1], [0.15, 0.2, 0.12]), -0.6, 0.6)
     yaw, pitch, roll = (float(angle) for angle in generator.normal(0.0, np.radians([4.0, 4.0, 1.5])))
     tilt = generator.normal(0.0, np.radians(1.0), 2)
+    turned = transform(DOME_AXES if dome else np.eye(3), [0.0, 0.0, 0.0])
+    mount = transform(rotation_from_euler_xyz([tilt[0], tilt[1], 0.0]), [0.0, 0.0, generator.uniform(0.7, 1.8)])
     return Rig(
         name=f"synthetic {lidar.name}, {width}x{height}",
         camera=PinholeCamera(width, height, matrix),
-        camera_from_lidar=camera_pose(yaw, pitch, roll, position),
-        vehicle_from_lidar=transform(
-            rotation_from_euler_xyz([tilt[0], tilt[1], 0.0]), [0.0, 0.0, generator.uniform(0.7, 1.8)]
-        ),
+        camera_from_lidar=camera_pose(yaw, pitch, roll, position) @ turned,
+        vehicle_from_lidar=mount @ turned,
         lidar=lidar,
     )

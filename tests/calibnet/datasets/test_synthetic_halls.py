@@ -6,12 +6,12 @@ import numpy as np
 import open3d as o3d
 import pytest
 
-from calibnet.datasets.synthetic import Hall, sample_hall, sample_indoor_frame
+from calibnet.datasets.synthetic import Hall, sample_hall, sample_robot_frame
 from calibnet.geometry import project
 
 
 def test_one_seed_gives_one_frame_and_another_gives_another() -> None:
-    first, again, other = sample_indoor_frame(3), sample_indoor_frame(3), sample_indoor_frame(4)
+    first, again, other = sample_robot_frame(3), sample_robot_frame(3), sample_robot_frame(4)
     assert np.array_equal(first.image, again.image) and np.array_equal(first.points, again.points)
     assert not np.array_equal(first.camera_from_lidar, other.camera_from_lidar)
 
@@ -37,8 +37,8 @@ def test_nothing_is_seen_through_the_walls(seed: int) -> None:
 
 def test_frames_are_whole_and_look_up_as_well_as_down() -> None:
     above, dark = [], []
-    for seed in range(12):
-        frame = sample_indoor_frame(seed)
+    for seed in range(16):
+        frame = sample_robot_frame(seed)
         assert frame.image.shape == (frame.camera.height, frame.camera.width, 3) and frame.camera.width <= 520
         assert np.isfinite(frame.points).all() and 0.0 <= frame.points[:, 3].min() <= frame.points[:, 3].max() <= 1.0
         seen = project(frame.points, frame.camera_from_lidar, frame.camera)
@@ -46,11 +46,11 @@ def test_frames_are_whole_and_look_up_as_well_as_down() -> None:
         above.append((frame.points[seen.index, 2] > 0.0).mean())
         dark.append(frame.image.mean() < 60)
     assert np.median(above) > 0.2  # of roads' frames almost none
-    assert 0 < sum(dark) < 12
+    assert 0 < sum(dark) < 16
 
 
 def test_there_are_garages_and_warehouses_high_and_low() -> None:
-    halls: list[Hall] = [sample_hall(np.random.default_rng(seed)) for seed in range(20)]
+    halls: list[Hall] = [sample_hall(np.random.default_rng(seed)) for seed in range(30)]
     heights = [hall.everything.corners[..., 2].max() for hall in halls]
-    assert {hall.kind for hall in halls} == {"garage", "warehouse"}
+    assert {hall.kind for hall in halls} == {"room", "garage", "warehouse"}
     assert min(heights) < 3.0 and max(heights) > 5.0

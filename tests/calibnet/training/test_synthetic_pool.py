@@ -40,12 +40,12 @@ def test_a_scene_cut_short_is_drawn_again(tmp_path: Path, monkeypatch: pytest.Mo
     assert np.array_equal(pool[0].points, expected)
 
 
-def test_one_scene_of_four_is_a_hall(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_scene_of_four_is_a_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from calibnet.datasets import synthetic
 
     drawn: list[tuple[str, int]] = []
-    for name in ("sample_frame", "sample_indoor_frame"):
+    for name in ("sample_frame", "sample_robot_frame"):
         monkeypatch.setattr(synthetic, name, lambda seed, name=name: drawn.append((name, seed)) or make_frame(1))
     list(SyntheticPool(8, 2, tmp_path))
-    assert [seed for name, seed in drawn if name == "sample_indoor_frame"] == [2_000_003, 2_000_007]
+    assert [seed for name, seed in drawn if name == "sample_robot_frame"] == [2_000_003, 2_000_007]
     assert len(drawn) == 8
