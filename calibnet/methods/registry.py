@@ -17,7 +17,17 @@ from calibnet.runtime.plugins import Registry
 
 CASCADE = "cascade"
 """Name of our own, which is opened by `calibnet.cascade.Cascade.load`."""
-METHODS = Registry("methods", "method", {"edge-alignment": "calibnet.methods.edge_alignment:EdgeAlignment"})
+METHODS = Registry(
+    "methods",
+    "method",
+    {
+        "edge-alignment": "calibnet.methods.edge_alignment:EdgeAlignment",
+        "regnet": "calibnet.methods.learned.method:RegNetMethod",
+        "calibnet": "calibnet.methods.learned.method:CalibNetMethod",
+        "lccnet": "calibnet.methods.learned.method:LCCNetMethod",
+        "calibformer": "calibnet.methods.learned.method:CalibFormerMethod",
+    },
+)
 
 
 def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calibrator:

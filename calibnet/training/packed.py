@@ -9,6 +9,7 @@ them takes longer than a short training has.
 
 from __future__ import annotations
 
+import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -61,11 +62,17 @@ def unpack_scan(data: bytes) -> NDArray[np.float32]:
     return points
 
 
+def rig_of(name: str) -> str:
+    """The rig of a packed source, as far as its name tells: of KITTI's drives the day, which names their rig."""
+    day = re.search(r"kitti.*(\d{4}_\d\d_\d\d)", name)
+    return f"KITTI {day[1]}" if day else name
+
+
 class PackedSequence:
     """The packed frames of one source, in all parts that are there."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.rig = name, name
+        self.name, self.rig = name, rig_of(name)
         self._frames: list[tuple[Part, int]] = []
 
     def take(self, part: Part, position: int) -> None:

@@ -33,6 +33,7 @@ def training_record(
         "options": {key: value for key, value in described.items() if value is not None},
         "recipe": _changes(training),
         "samples": samples,
+        "rigs": sorted({source.sequence.rig for source in training.samples.frames.sources if not source.synthetic}),
         "minutes": round(minutes, 1),
         "device": training.fabric.device.type,
         "torch": torch.__version__,

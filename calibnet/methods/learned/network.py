@@ -75,7 +75,8 @@ class MethodNetwork(nn.Module):
         depth = fitted_depth(inputs, *size)
         if self.POOLING > 1:
             depth = F.max_pool2d(depth, self.POOLING, 1, self.POOLING // 2)
-        return self.estimate(fitted_image(inputs, *size), depth)
+        output = self.estimate(fitted_image(inputs, *size), depth)
+        return output._replace(shown={"Inverse depth, as the network sees it": depth[:, 0], **output.shown})
 
     def estimate(self, image: Tensor, depth: Tensor) -> MethodOutput:
         """From a picture ``[B, 3, H, W]``, about zero mean and unit variance, and inverse depth ``[B, 1, H, W]``."""

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from calibnet.cascade.stage import FEWEST_CELLS, View
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
+from calibnet.exhibit import Exhibit
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, orthonormal, scaled
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.learned.network import MethodNetwork
@@ -100,4 +102,10 @@ class MethodStage:
                 f"({frame.source}); train it again if this happens on every frame."
             )
         correction = scaled(orthonormal(estimate), self.settings.gain)
-        return StageTrace(self.number, self.range, camera, before, correction @ before, correction, clock.parts)
+        trace = StageTrace(self.number, self.range, camera, before, correction @ before, correction, clock.parts)
+        return replace(trace, exhibits=exhibits(output.shown)) if detail else trace
+
+
+def exhibits(shown: dict[str, Tensor]) -> tuple[Exhibit, ...]:
+    """What a network has to show of a batch of one."""
+    return tuple(Exhibit(name, maps[0].float().cpu().numpy()) for name, maps in shown.items())

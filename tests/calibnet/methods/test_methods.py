@@ -9,16 +9,22 @@ import pytest
 from calibnet.conformance import check_method
 from calibnet.geometry import RANGES
 from calibnet.methods.calibrator import DriveCalibrator
+from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.registry import METHODS, open_method
 from tests.calibnet.cascade.test_cascade import cascade
 from tests.support.boxes import boxes
+from tests.support.methods import save_random
 from tests.support.scene import make_frame
 from tests.support.toy_package import install_toys
 
 
 @pytest.mark.parametrize("name", METHODS.own)
-def test_methods_keep_their_promises(name: str) -> None:
-    check_method(open_method(name, RANGES[4]), boxes())
+def test_methods_keep_their_promises(name: str, tmp_path: Path) -> None:
+    if name in NETWORKS:
+        save_random(name, RANGES[4], tmp_path)
+        check_method(open_method(name, RANGES[4], weights=tmp_path), boxes())
+    else:
+        check_method(open_method(name, RANGES[4]), boxes())
 
 
 def test_the_cascade_keeps_them_too_and_those_of_drives() -> None:

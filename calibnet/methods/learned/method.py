@@ -1,0 +1,92 @@
+"""Methods that were trained: networks of another paper, one after the other from wide to narrow, as `Calibrator`."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import MethodCard
+from calibnet.methods.learned.counting import multiply_adds
+from calibnet.methods.learned.networks import NETWORKS
+from calibnet.methods.learned.stage import MethodStage
+from calibnet.methods.learned.weights import load_method_stage, missing
+from calibnet.runtime.clock import Clock
+from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.weights.files import read_record, weights_path
+
+
+class LearnedMethod:
+    """A method that needs weights; subclasses say which."""
+
+    NAME: ClassVar[str]
+
+    def __init__(self, range_: MiscalibrationRange, weights: Path | None = None) -> None:
+        """Load the networks for miscalibrations within ``range_``.
+
+        A method whose paper runs several networks one after the other runs those that ``weights`` has, from the one
+        for ``range_`` to the narrowest; any other runs that one alone.
+
+        Raises:
+            WeightsError: ``weights`` is not given or has no network for the range; the sentence says how to make one.
+        """
+        self.range = range_
+        numbers = stages_within(range_)
+        if weights is None:
+            raise missing(self.NAME, RANGES[numbers[0] - 1], None)
+        wanted = numbers if NETWORKS.load(self.NAME).CASCADED else numbers[:1]
+        found = [load_method_stage(self.NAME, RANGES[number - 1], weights) for number in wanted]
+        if found[0] is None:
+            raise missing(self.NAME, RANGES[wanted[0] - 1], weights)
+        self.stages: list[MethodStage] = [stage for stage in found if stage is not None]
+        self.weights = weights
+
+    @cached_property
+    def card(self) -> MethodCard:
+        """What its networks cost and were trained with."""
+        networks = [stage.network for stage in self.stages]
+        paths = [weights_path(self.NAME, stage.range, self.weights) for stage in self.stages]
+        records = [read_record(path) for path in paths]
+        return MethodCard(
+            parameters=sum(parameter.numel() for network in networks for parameter in network.parameters()),
+            multiply_adds=sum(stage.settings.looks * multiply_adds(stage.network) for stage in self.stages),
+            samples_trained=sum(int(record.get("samples", 0)) for record in records),
+            trained_on=tuple(dict.fromkeys(rig for record in records for rig in record.get("rigs", ()))),
+        )
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """See `calibnet.methods.calibrator.Calibrator.calibrate`; with ``detail``, what the networks have to show."""
+        clock = Clock(self.stages[0].device)
+        view = self.stages[0].view(frame, clock)
+        traces: list[StageTrace] = []
+        for stage in self.stages:
+            before = traces[-1].after if traces else initial
+            traces.append(stage.correct(frame, view, before, detail))
+        return CascadeTrace(initial, tuple(traces), clock.parts)
+
+
+class RegNetMethod(LearnedMethod):
+    """RegNet (2017)."""
+
+    NAME = "regnet"
+
+
+class CalibNetMethod(LearnedMethod):
+    """CalibNet (2018)."""
+
+    NAME = "calibnet"
+
+
+class LCCNetMethod(LearnedMethod):
+    """LCCNet (2021)."""
+
+    NAME = "lccnet"
+
+
+class CalibFormerMethod(LearnedMethod):
+    """After CalibFormer (2024)."""
+
+    NAME = "calibformer"
