@@ -14,7 +14,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 DEMO_ARGS ?=
 PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile
 
-PICTURES := overview cascade-all-stages cost-volumes-stage-3-which hourglass-stage-3 3d-side-by-side whole-drive
+PICTURES := overview cascade-all-stages cost-volumes-stage-3-which hourglass-stage-3-where 3d-side-by-side whole-drive
 
 .PHONY: demo test lint pictures clean libraries viewer-libraries
 

@@ -14,8 +14,10 @@ FRAME = "frame"
 TIME = "time"
 """Timeline: seconds since the sequence's first frame."""
 STEP = "step"
-"""Timeline: ``frame * 6 + stage``; stage 0 is the miscalibrated frame, 5 the last stage."""
-STEPS_PER_FRAME = 6
+"""Timeline: ``frame * 8 + stage``; stage 0 is the miscalibrated frame, 1 to 5 are after a stage, then come
+`STEP_REFERENCE` and `STEP_RESULT`."""
+STEPS_PER_FRAME, STEP_REFERENCE, STEP_RESULT = 8, 6, 7
+"""Of each frame; the truth, where it is known; and what is believed in the end, with its verdict."""
 
 RUN = "run"
 """Property: the options that identify the run."""
@@ -39,6 +41,8 @@ TABLE = "table"
 OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
 OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
+OVERLAY_CURRENT = "overlay/current"
+"""On `STEP` one after the other: start, every stage, reference, result; on the other timelines the result."""
 OVERLAY_DRIVE = "overlay/drive"
 """Points under the extrinsic that all frames agree on."""
 DRIVE_TEXT = "drive/verdict"
@@ -64,6 +68,9 @@ LEGEND_DECIDED = "legend/decided"
 """What the brightness of maps of how far cells have decided stands for."""
 LEGEND_CERTAINTY = "legend/certainty"
 """What the brightness of probabilities and confidences stands for."""
+
+PICTURE = "picture"
+"""Of a scale: what its stage saw, under the maps; see `of_scale`."""
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"

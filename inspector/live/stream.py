@@ -1,4 +1,4 @@
-"""Every try as data for the viewer, on one timeline, ``try``: ``number * 6 + stage``, as `entities.STEP` has frames.
+"""Every try as data for the viewer, on one timeline, ``try``: ``number * 8 + stage``, as `entities.STEP` has frames.
 
 What the viewer gets are pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection: no
 other port is open. All of them are kept in a file, for windows that are opened later.

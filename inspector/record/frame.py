@@ -13,6 +13,7 @@ from calibnet.verdict import Verdict
 from inspector import entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Observation
+from inspector.record.pictures.underlay import log_underlays
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.table import stage_table
 
@@ -28,6 +29,7 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
     rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
     if observation.trace.verdict is not None:
         rec.log(entities.VERDICT_FRAME, verdict_values(observation.trace.verdict))
+    log_underlays(rec, observation, contents)
     _log_extrinsics(rec, observation)
     _log_camera(rec, observation)
 

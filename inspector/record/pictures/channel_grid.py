@@ -5,20 +5,20 @@ from __future__ import annotations
 import io
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from inspector.colors import EMPTY, VIRIDIS
+from inspector.record.pictures.lettering import font
 
 CHANNELS: Final = 8
 """Channels shown at most: those that vary most."""
 COLUMNS: Final = 4
-TILE_WIDTH: Final = 64
-"""Least width of a tile in pixels: coarse maps are magnified to it."""
-HEADER: Final = 9
-"""Height of a channel's number above its tile."""
+TILE_WIDTH: Final = 176
+"""Width of a tile in pixels, or a little less: maps are magnified to it, so that the letters above them are sharp."""
+HEADER: Final = 16
+"""Height of the words above a tile, and of those above all of them."""
 GAP, TEXT = 0, 255
 """Palette entries that are no level."""
 LOWEST, HIGHEST = 1, 254
@@ -36,7 +36,7 @@ def liveliest_channels(activations: NDArray[np.floating]) -> NDArray[np.intp]:
 def channel_grid(
     activations: NDArray[np.floating], low: float, high: float, numbers: NDArray[np.integer]
 ) -> NDArray[np.uint8]:
-    """Lay out ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each.
+    """Lay out ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each, above all the scale.
 
     Args:
         activations: maps of any size.
@@ -51,10 +51,11 @@ def channel_grid(
     tiles = levels(activations, low, high).repeat(scale, axis=1).repeat(scale, axis=2)
     _, height, width = tiles.shape
     rows = -(-len(tiles) // COLUMNS)
-    grid = np.full((rows * (height + HEADER), COLUMNS * (width + 2) - 2), GAP, dtype=np.uint8)
+    grid = np.full((HEADER + rows * (height + HEADER), COLUMNS * (width + 2) - 2), GAP, dtype=np.uint8)
+    grid[:HEADER][_words(f"dark {low:.2f}, bright {high:.2f}", grid.shape[1])] = TEXT
     for position, (channel, tile) in enumerate(zip(numbers.tolist(), tiles, strict=True)):
-        top, left = (position // COLUMNS) * (height + HEADER), (position % COLUMNS) * (width + 2)
-        grid[top : top + HEADER, left : left + width][_number(channel, width)] = TEXT
+        top, left = HEADER + (position // COLUMNS) * (height + HEADER), (position % COLUMNS) * (width + 2)
+        grid[top : top + HEADER, left : left + width][_words(f"channel {channel}", width)] = TEXT
         grid[top + HEADER : top + HEADER + height, left : left + width] = tile
     return grid
 
@@ -72,11 +73,11 @@ def slice_grid(volume: NDArray[np.floating], occupied: NDArray[np.bool_], high: 
     return grid
 
 
-def _number(value: int, width: int) -> NDArray[np.bool_]:
-    """A number's pixels ``[HEADER, width]``; not drawn in place, as OpenCV blends its edges with other entries."""
-    drawn = np.zeros((HEADER, width), dtype=np.uint8)
-    cv2.putText(drawn, str(value), (1, HEADER - 2), cv2.FONT_HERSHEY_PLAIN, 0.6, 255)
-    return np.asarray(drawn > 110)
+def _words(text: str, width: int) -> NDArray[np.bool_]:
+    """The pixels ``[HEADER, width]`` of a few words, without half-tones, for which the palette has no entries."""
+    drawn = Image.new("1", (width, HEADER))
+    ImageDraw.Draw(drawn).text((2, HEADER / 2), text, 1, font(HEADER - 4), anchor="lm")
+    return np.asarray(drawn)
 
 
 def levels(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ from functools import lru_cache
 import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
+from calibnet.verdict import REJECTED
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Observation
@@ -48,6 +49,13 @@ class FrameOverlays:
         """Log the points under the reference, whose caption is its name alone."""
         rec.log(entity, self._under(reference).archetype())
         self._log_caption(rec, entity, "reference")
+
+    def log_result(self, rec: Subtree, entity: str) -> None:
+        """Log the points under what is believed in the end, and the verdict on it above."""
+        trace = self._observation.trace
+        word = "" if trace.verdict is None else trace.verdict.word
+        name = f"{REJECTED}, left as it was" if trace.rejected else ", ".join(filter(None, ["corrected", word]))
+        self.log(rec, entity, name, trace.corrected, colors.VERDICTS.get(word, colors.LETTERS))
 
     def _under(self, camera_from_lidar: Extrinsic) -> Overlay:
         key = camera_from_lidar.tobytes()

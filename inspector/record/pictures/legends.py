@@ -43,14 +43,16 @@ def log_map_legends(rec: Subtree) -> None:
     _log_bar(rec, entities.LEGEND_CERTAINTY, bar, CERTAINTY_BAR_HEIGHT)
 
 
-def log_decided_legend(rec: Subtree) -> None:
-    """What the brightness of maps of how far cells have decided stands for, at `entities.LEGEND_DECIDED`."""
+def log_decided_legend(rec: Subtree, with_truth: bool) -> None:
+    """What the brightness of maps of where probability lies stands for, at `entities.LEGEND_DECIDED`."""
     strip = colors.map_colors(np.linspace(0.0, 1.0, BAR_WIDTH), 0.0, 1.0)
+    low, high = "undecided: all displacements alike", "decided: one has all probability"
     labels = {
-        0.0: "undecided: all displacements alike",
-        0.5: "after the hourglass cells should be brighter",
+        0.0: f"{low}; none on the truth" if with_truth else low,
+        0.5: "the hourglass should brighten",
+        1.0: f"{high}; all on the truth" if with_truth else high,
     }
-    bar = Bar(strip, labels | {1.0: "decided: one displacement has all probability"})
+    bar = Bar(strip, labels)
     _log_bar(rec, entities.LEGEND_DECIDED, bar, POINT_BAR_HEIGHT)
 
 

@@ -1,7 +1,11 @@
-"""Maps over the cells of a cost volume: displacements in flow colours, certainties from dark to bright."""
+"""Maps over the cells of a cost volume: displacements in flow colours, certainties from dark to bright.
+
+They let the picture under them through, and show nothing else of it where a cell holds no LiDAR point.
+"""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
@@ -9,30 +13,40 @@ from numpy.typing import NDArray
 from calibnet.trace import ScaleTrace
 from inspector import colors
 
+OPACITY = 0.62
+"""Of a cell that holds a point."""
 TEMPERATURE = 14.0
 """By which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
 
 
 def flow_image(
     displacement: NDArray[np.floating] | NDArray[np.integer], reach: float, seen: NDArray[np.bool_]
-) -> rr.Image:
+) -> rr.EncodedImage:
     """Displacements ``[h, w, 2]`` in flow colours.
 
     Args:
         displacement: ``(dx, dy)`` in pixels.
         reach: length in pixels that is fully saturated.
-        seen: ``[h, w]``, the cells that hold a LiDAR point; the others are painted in `colors.EMPTY`.
+        seen: ``[h, w]``, the cells that hold a LiDAR point; the others are left out.
     """
-    picture = colors.flow_colors(displacement, reach)
-    picture[~seen] = colors.EMPTY
-    return rr.Image(picture)
+    return _image(colors.flow_colors(displacement, reach), seen)
 
 
-def certainty_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr.Image:
-    """Probabilities or confidences ``[h, w]``, 0 dark to 1 bright; cells that are not ``seen`` are empty."""
-    picture = colors.certainty_colors(values)
-    picture[~seen] = colors.EMPTY
-    return rr.Image(picture)
+def certainty_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr.EncodedImage:
+    """Probabilities or confidences ``[h, w]``, 0 dark to 1 bright; cells that are not ``seen`` are left out."""
+    return _image(colors.certainty_colors(values), seen)
+
+
+def share_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr.EncodedImage:
+    """Shares ``[h, w]`` of a whole, 0 dark to 1 bright in even steps; cells that are not ``seen`` are left out."""
+    return _image(colors.map_colors(values, 0.0, 1.0), seen)
+
+
+def _image(picture: NDArray[np.uint8], seen: NDArray[np.bool_]) -> rr.EncodedImage:
+    """As PNG, a third of the bytes. The viewer heeds pixels' opacity only in images that are not opaque as a whole."""
+    done, encoded = cv2.imencode(".png", np.dstack([picture[..., ::-1], 255 * seen.astype(np.uint8)]))
+    assert done, "maps are small"
+    return rr.EncodedImage(contents=encoded.tobytes(), media_type="image/png", opacity=OPACITY)
 
 
 def decidedness(probability: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -44,6 +58,20 @@ def decidedness(probability: NDArray[np.floating]) -> NDArray[np.float32]:
     entropy = -(p * np.log(p)).sum(axis=0)
     decided: NDArray[np.float32] = np.clip(1.0 - entropy / np.log(len(p)), 0.0, 1.0).astype(np.float32)
     return decided
+
+
+def mass_on_truth(probability: NDArray[np.floating], true: NDArray[np.floating]) -> NDArray[np.float32]:
+    """``[h, w]`` float32: the share of each window's probability that lies within a cell of the true displacement.
+
+    Args:
+        probability: ``[Dy, Dx, h, w]``.
+        true: ``[h, w, 2]`` displacement ``(dx, dy)`` in cells; where it lies beyond the window the share is 0.
+    """
+    down, across = probability.shape[:2]
+    dy, dx = np.mgrid[:down, :across].astype(np.float32) - np.array([down // 2, across // 2], np.float32)[:, None, None]
+    near = np.maximum(abs(dx[..., None, None] - true[..., 0]), abs(dy[..., None, None] - true[..., 1])) <= 1.0
+    mass: NDArray[np.float32] = np.where(near, probability.astype(np.float32), np.float32(0)).sum(axis=(0, 1))
+    return np.clip(mass, 0.0, 1.0)
 
 
 def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:

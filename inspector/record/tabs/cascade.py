@@ -20,8 +20,8 @@ from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import (
     View,
-    image_view,
     map_legends,
+    map_view,
     overlay_view,
     point_legend,
     uncapitalized,
@@ -30,8 +30,6 @@ from inspector.record.tabs.views import (
 
 NAME = "Cascade"
 
-OVERLAY_CURRENT = "overlay/current"
-"""Points over the image, one row a stage on `entities.STEP`; on the other timelines the last stage's."""
 ARROW_SPACING = (2, 3)
 """Fewest and most cells between two arrows of the displacement field: long arrows stand farther apart."""
 ARROW_COLOR = (20, 20, 20)
@@ -85,7 +83,9 @@ def view(layout: Layout) -> View:
         ]
         columns = 2 if len(overlays) > 1 else 1
         current = overlay_view(
-            "Choose the timeline “step” below and play: start, then every stage", OVERLAY_CURRENT, layout.image
+            "Choose the timeline “step” below and play: start, every stage, truth, result",
+            entities.OVERLAY_CURRENT,
+            layout.image,
         )
         pages = [
             with_legend(rrb.Grid(*overlays, grid_columns=columns), point_legend(layout), "All stages"),
@@ -100,12 +100,13 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
     """Overlays before and after one stage, its displacements and its confidences."""
     grid = stage.grids[0]
     maps = [
-        image_view(
+        map_view(
             f"Displacement found: colour and arrow point to where the image fits (cells of {grid.stride} px)",
             displacement(stage.number),
+            stage.number,
             grid,
         ),
-        image_view("Confidence, 0 unsure to 1 a pixel or better", confidence(stage.number), grid),
+        map_view("Confidence, 0 unsure to 1 a pixel or better", confidence(stage.number), stage.number, grid),
     ]
     rows: list[View] = [rrb.Horizontal(*maps)]
     if Part.OVERLAYS in layout.contents.parts:
@@ -120,13 +121,19 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
 def _log_overlays(rec: Subtree, observation: Observation, contents: Contents) -> None:
     frame, trace = observation.frame, observation.trace
     overlays = frame_overlays(observation, contents)
-    overlays.log(rec, OVERLAY_CURRENT, observation.start, trace.initial)
+    overlays.log(rec, entities.OVERLAY_CURRENT, observation.start, trace.initial)
     for stage in trace.stages:
         name = f"after stage {stage.number}"
         overlays.log(rec, entities.overlay_stage(stage.number), name, stage.after)
         rec.set_step(frame.index, stage.number)
-        overlays.log(rec, OVERLAY_CURRENT, name, stage.after)
+        overlays.log(rec, entities.OVERLAY_CURRENT, name, stage.after)
         rec.set_step(frame.index, 0)
+    if observation.reference is not None:
+        rec.set_step(frame.index, entities.STEP_REFERENCE)
+        overlays.log_reference(rec, entities.OVERLAY_CURRENT, observation.reference)
+    rec.set_step(frame.index, entities.STEP_RESULT)  # last, since the other timelines show what was logged last
+    overlays.log_result(rec, entities.OVERLAY_CURRENT)
+    rec.set_step(frame.index, 0)
 
 
 def _log_displacement(rec: Subtree, number: int, results: StageDetail) -> None:

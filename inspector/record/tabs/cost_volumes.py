@@ -21,7 +21,7 @@ from inspector.record.pictures.matches import StartingPoints, chosen_match, matc
 from inspector.record.pictures.search_window import SearchWindow
 from inspector.record.pictures.slices import slice_marks, slices_picture
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, image_view, legend, map_legends, tensor_view, with_legend
+from inspector.record.tabs.views import View, image_view, legend, map_legends, map_view, tensor_view, with_legend
 
 NAME = "Cost volumes"
 
@@ -111,11 +111,11 @@ def _map_row(number: int, grid: Grid, layout: Layout) -> View:
         return entities.of_scale(number, grid.stride, name)
 
     scale, cell = f"1/{grid.stride}", path(CHOSEN_CELL)
-    views: list[View] = [image_view(f"{scale}: displacement that won", path(BEST_MATCH), grid, cell)]
+    views: list[View] = [map_view(f"{scale}: displacement that won", path(BEST_MATCH), number, grid, cell)]
     if layout.has_reference:
-        views.append(image_view(f"{scale}: true displacement", path(TRUE_MATCH), grid, cell))
+        views.append(map_view(f"{scale}: true displacement", path(TRUE_MATCH), number, grid, cell))
     views += [
-        image_view(f"{scale}: how surely (peak probability)", path(PEAK_PROBABILITY), grid, cell),
+        map_view(f"{scale}: how surely (peak probability)", path(PEAK_PROBABILITY), number, grid, cell),
         image_view(f"{scale}: window of the pink cell", path(WINDOW)),
     ]
     return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])

@@ -1,7 +1,9 @@
-"""Tab *Hourglass*: how far each cell has decided before and after aggregation, and the activations behind that.
+"""Tab *Hourglass*: where the probability of each cell's window lies before and after aggregation, and the activations.
 
-Decided means that the probability of the search window lies on one displacement. Before aggregation it is that of the
-matching scores alone; the channels below are the same ones on both sides, each side on a colour scale of its own.
+A cell has decided when all probability of its search window lies on one displacement; where the truth is known, a map
+says how much of it lies on that. Before aggregation it is the probability that the matching scores alone would give.
+The channels behind that are the same ones on both sides. What leaves the hourglass is some ten times as large as what
+enters it, so that each side has a scale of its own, which stands above it.
 """
 
 from __future__ import annotations
@@ -10,15 +12,16 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from calibnet.trace import ScaleTrace
+from calibnet.trace import ScaleTrace, StageTrace
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Grid, Layout, Observation, StageLayout
 from inspector.record.pictures.channel_grid import channel_grid, liveliest_channels, palette_png
 from inspector.record.pictures.legends import log_decided_legend
-from inspector.record.pictures.maps import decidedness, matching_probability
+from inspector.record.pictures.maps import decidedness, mass_on_truth, matching_probability, share_image
+from inspector.record.pictures.matches import StartingPoints
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, image_view, legend, with_legend
+from inspector.record.tabs.views import View, image_view, legend, map_view, with_legend
 
 NAME = "Hourglass"
 
@@ -27,6 +30,10 @@ DECIDED_BEFORE = "decided_before"
 """How far the matching scores alone decide each cell."""
 DECIDED_AFTER = "decided_after"
 """How far the aggregated volume does."""
+TRUTH_BEFORE = "on_truth_before"
+"""The share of a window's probability within a cell of the true displacement, by the matching scores alone."""
+TRUTH_AFTER = "on_truth_after"
+"""The same of the aggregated volume."""
 BEFORE = "hourglass_before"
 """Activations entering the hourglass, channels side by side."""
 AFTER = "hourglass_after"
@@ -40,7 +47,7 @@ def wanted(layout: Layout) -> bool:
 
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log what is bright."""
-    log_decided_legend(rec)
+    log_decided_legend(rec, layout.has_reference)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
@@ -48,41 +55,56 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     if Part.HOURGLASS not in contents.parts:
         return
     for stage in observation.trace.stages:
-        for scale in contents.scales(stage.detail):
-            _log_decided(rec, stage.number, scale)
-            _log_activations(rec, stage.number, scale)
+        if stage.detail is not None:
+            points = StartingPoints.of(observation, stage)
+            for scale in contents.scales(stage.detail):
+                _log_probability(rec, stage, scale, points)
+                _log_activations(rec, stage.number, scale)
 
 
 def view(layout: Layout) -> View:
-    """A page for every stage, on it a row for every scale."""
-    return rrb.Tabs(*map(_stage_page, layout.stages_with_volumes), name=NAME)
+    """For every stage a page with its probabilities and one with its channels, a row for every scale."""
+    return rrb.Tabs(*(_stage_pages(stage, layout) for stage in layout.stages_with_volumes), name=NAME)
 
 
-def _stage_page(stage: StageLayout) -> View:
-    rows = rrb.Vertical(*(_row(stage.number, grid) for grid in stage.grids))
-    return with_legend(rows, legend("Decided", entities.LEGEND_DECIDED), stage.title)
+def _stage_pages(stage: StageLayout, layout: Layout) -> View:
+    probability = rrb.Vertical(*(_probability_row(stage.number, grid, layout) for grid in stage.grids))
+    channels = rrb.Vertical(*(_channels_row(stage.number, grid) for grid in stage.grids), name="Channels")
+    words = legend("Decided", entities.LEGEND_DECIDED)
+    return rrb.Tabs(with_legend(probability, words, "Where the probability went"), channels, name=stage.title)
 
 
-def _row(number: int, grid: Grid) -> View:
+def _probability_row(number: int, grid: Grid, layout: Layout) -> View:
     scale = f"1/{grid.stride}"
-
-    def path(name: str) -> str:
-        return entities.of_scale(number, grid.stride, name)
-
+    names = {DECIDED_BEFORE: "decided, before the hourglass", DECIDED_AFTER: "decided, after it"}
+    if layout.has_reference:
+        names |= {TRUTH_BEFORE: "share on the truth, before", TRUTH_AFTER: "share on the truth, after"}
     return rrb.Horizontal(
-        image_view(f"{scale}: decided, before the hourglass", path(DECIDED_BEFORE), grid),
-        image_view(f"{scale}: decided, after it", path(DECIDED_AFTER), grid),
-        image_view(f"{scale}: channels before", path(BEFORE)),
-        image_view(f"{scale}: the same channels after", path(AFTER)),
+        *(
+            map_view(f"{scale}: {name}", entities.of_scale(number, grid.stride, path), number, grid)
+            for path, name in names.items()
+        )
     )
 
 
-def _log_decided(rec: Subtree, number: int, scale: ScaleTrace) -> None:
-    before, after = decidedness(matching_probability(scale)), decidedness(scale.probability)
-    for name, decided in ((DECIDED_BEFORE, before), (DECIDED_AFTER, after)):
-        picture = colors.map_colors(decided, 0.0, 1.0)
-        picture[~scale.occupied] = colors.EMPTY
-        rec.log(entities.of_scale(number, scale.stride, name), rr.Image(picture))
+def _channels_row(number: int, grid: Grid) -> View:
+    scale = f"1/{grid.stride}"
+    return rrb.Horizontal(
+        image_view(f"{scale}: channels before the hourglass", entities.of_scale(number, grid.stride, BEFORE)),
+        image_view(f"{scale}: the same channels after it", entities.of_scale(number, grid.stride, AFTER)),
+    )
+
+
+def _log_probability(rec: Subtree, stage: StageTrace, scale: ScaleTrace, points: StartingPoints) -> None:
+    """How decided the windows are, and how much of them lies on the truth, before and after aggregation."""
+    before = matching_probability(scale)
+    maps = {DECIDED_BEFORE: decidedness(before), DECIDED_AFTER: decidedness(scale.probability)}
+    true = points.true_field(scale.stride)
+    if true is not None:
+        maps[TRUTH_BEFORE] = mass_on_truth(before, true / scale.stride)
+        maps[TRUTH_AFTER] = mass_on_truth(scale.probability, true / scale.stride)
+    for name, values in maps.items():
+        rec.log(entities.of_scale(stage.number, scale.stride, name), share_image(values, scale.occupied))
 
 
 def _log_activations(rec: Subtree, number: int, scale: ScaleTrace) -> None:

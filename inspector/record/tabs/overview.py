@@ -1,7 +1,8 @@
 """Tab *Overview*: the answer first, as one large picture and in words.
 
 The picture can be changed for that of the start, of the reference and, where all frames are solved as one, of a single
-frame's result; below it are the curves over the frames, and small pictures of start and reference.
+frame's result, which on the timeline `entities.STEP` walks from the start to the reference; below it are the curves
+over the frames, and small pictures of start and reference.
 Its overlays are in every recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
 """
 
@@ -12,8 +13,6 @@ import math
 import rerun as rr
 import rerun.blueprint as rrb
 
-from calibnet.trace import CascadeTrace
-from calibnet.verdict import REJECTED
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation
@@ -75,9 +74,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     trace, reference = observation.trace, observation.reference
     overlays = frame_overlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
-    word = "" if trace.verdict is None else trace.verdict.word
-    color = colors.VERDICTS.get(word, colors.LETTERS)
-    overlays.log(rec, entities.OVERLAY_CORRECTED, _result(trace), trace.corrected, color)
+    overlays.log_result(rec, entities.OVERLAY_CORRECTED)
     if reference is not None:
         overlays.log_reference(rec, entities.OVERLAY_REFERENCE, reference)
     if Part.CURVES in contents.parts:
@@ -85,16 +82,12 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
         _log_fit(rec, observation)
 
 
-def _result(trace: CascadeTrace) -> str:
-    """What the corrected overlay shows, with the verdict on it."""
-    if trace.rejected:
-        return f"{REJECTED}, left as it was"
-    return "corrected" if trace.verdict is None else f"corrected, {trace.verdict.word}"
-
-
 def view(layout: Layout) -> View:
     """The large picture above curves, and beside them what is to be said of it."""
-    names = {"Corrected": entities.OVERLAY_CORRECTED, layout.start: entities.OVERLAY_MISCALIBRATED}
+    corrected = {"Corrected": entities.OVERLAY_CORRECTED}
+    if layout.stages and Part.OVERLAYS in layout.contents.parts:
+        corrected = {"Corrected (on “step”: every stage)": entities.OVERLAY_CURRENT}
+    names = corrected | {layout.start: entities.OVERLAY_MISCALIBRATED}
     if layout.with_drive:
         names = {"Whole drive as one": entities.OVERLAY_DRIVE} | names
     if layout.has_reference:

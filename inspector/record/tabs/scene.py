@@ -36,7 +36,7 @@ LEGEND_CAMERAS = "legend/stages"
 
 SPARSE, DENSE = 5_000, 30_000
 """Points of the cloud at most."""
-POINT_SIZE = 1.6
+POINT_SIZE = 2.2
 FRUSTUM_LENGTH_M = 1.2
 BACKGROUND = (44, 47, 54)
 """Grey enough that dark points of the picture stay visible."""

@@ -52,8 +52,13 @@ def overlay_view(
     )
 
 
+def map_view(name: str, path: str, stage: int, grid: Grid, *marks: str) -> rrb.Spatial2DView:
+    """A map over the cells of a scale of a stage, over what that stage saw, and marks drawn on it."""
+    return image_view(name, path, grid, entities.of_scale(stage, grid.stride, entities.PICTURE), *marks)
+
+
 def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> rrb.Spatial2DView:
-    """A map and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
+    """An image and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
     if grid is None:
         return rrb.Spatial2DView(origin=f"/{path}", name=name, background=colors.GROUND)
     bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))

@@ -44,10 +44,10 @@ def test_tries_lie_one_after_the_other_with_their_stages(tmp_path: Path) -> None
     stream.close()
     for number in (0, 1):
         steps = [time for time, _ in rows(files[number], "overlay/current", "Points2D:positions")]
-        assert steps == [6 * number + stage for stage in (0, 3, 4, 5)]
-        (at, row), *_ = rows(files[number], "stage_5/scale_8/best_match", "Image:buffer")
-        assert at == 6 * number and row
+        assert steps == [8 * number + stage for stage in (0, 3, 4, 5, 6, 7)]
+        (at, row), *_ = rows(files[number], "stage_5/scale_8/best_match", "EncodedImage:blob")
+        assert at == 8 * number and row
     assert rows(files[2], "overlay/current", "Points2D:positions") == []
     before, after = (rows(file, "stage_3/scale_8/chosen_cell", "Boxes2D:centers") for file in files[1:])
-    assert [time for time, _ in after] == [6]
+    assert [time for time, _ in after] == [8]
     assert not np.allclose(before[0][1], after[0][1])

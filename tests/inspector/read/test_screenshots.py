@@ -37,7 +37,7 @@ def test_the_first_picture_of_the_demo_is_complete(record: Callable[..., Any], t
         assert (np.ptp(panel.astype(int), axis=2) > 60).mean() > 0.1
     stems = [file_stem(page) for page in pages]
     assert stems[0] == "overview"
-    assert {"cascade-all-stages", "hourglass-stage-3", "3d-side-by-side"} <= set(stems)
+    assert {"cascade-all-stages", "hourglass-stage-3-channels", "3d-side-by-side"} <= set(stems)
     assert len(set(stems)) == len(stems)
 
 

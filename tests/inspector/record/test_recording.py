@@ -46,24 +46,29 @@ def expected_streams() -> dict[str, str]:
         streams |= {
             f"overlay/stage_{stage}": points,
             f"world/camera/stage_{stage}": "Transform3D:translation",
-            f"stage_{stage}/displacement": image,
+            f"stage_{stage}/displacement": encoded,
             f"stage_{stage}/displacement/arrows": "Arrows2D:vectors",
-            f"stage_{stage}/confidence": image,
+            f"stage_{stage}/confidence": encoded,
         }
         for stride in STRIDES:
             scale = f"stage_{stage}/scale_{stride}"
             streams |= {
                 f"{scale}/cost_volume": "Tensor:data",
                 f"{scale}/probability": "Tensor:data",
-                f"{scale}/best_match": image,
-                f"{scale}/true_match": image,
-                f"{scale}/peak_probability": image,
+                f"{scale}/picture": encoded,
+                f"{scale}/best_match": encoded,
+                f"{scale}/true_match": encoded,
+                f"{scale}/peak_probability": encoded,
                 f"{scale}/slices": encoded,
                 f"{scale}/slices/marks": "Boxes2D:half_sizes",
                 f"{scale}/window": image,
                 f"{scale}/window/truth": points,
                 f"{scale}/hourglass_before": encoded,
                 f"{scale}/hourglass_after": encoded,
+                f"{scale}/decided_before": encoded,
+                f"{scale}/decided_after": encoded,
+                f"{scale}/on_truth_before": encoded,
+                f"{scale}/on_truth_after": encoded,
             }
     return streams
 
@@ -82,13 +87,18 @@ def test_timelines_are_frame_time_and_step_only(full_recording: Path) -> None:
 
 def test_current_overlay_walks_through_the_stages_on_step_and_ends_corrected(full_recording: Path, read: Read) -> None:
     steps = [step for step, _ in read(full_recording, "overlay/current", "Points2D:positions", "step")]
-    assert steps == [6 * frame + stage for frame in FRAMES for stage in (0, *STAGES)]
+    assert steps == [8 * frame + stage for frame in FRAMES for stage in (0, *STAGES, 6, 7)]
     for frame, (_, corrected) in zip(
         FRAMES, read(full_recording, "overlay/corrected", "Points2D:positions"), strict=True
     ):
         rows = dict(read(full_recording, "overlay/current", "Points2D:positions", "step"))
-        assert rows[6 * frame + 5] == corrected
-        assert rows[6 * frame] != corrected
+        assert rows[8 * frame + 5] == rows[8 * frame + 7] == corrected
+        assert rows[8 * frame] != corrected != rows[8 * frame + 6]
+    for component in ("overlay/{}", "Points2D:positions"), ("overlay/{}/caption", "EncodedImage:blob"):
+        current, corrected = (
+            dict(read(full_recording, component[0].format(name), component[1])) for name in ("current", "corrected")
+        )
+        assert current == corrected, "of a frame's rows the last is what other timelines show"
 
 
 def test_time_is_the_frames_timestamp(full_recording: Path, read: Read) -> None:
@@ -271,7 +281,7 @@ def test_other_strides_and_radii(record: Callable[..., Any], tmp_path: Path, rea
     record(file, length=1, strides=(4, 8, 16), radius=2, stages=(1, 2, 3, 4, 5), size=(256, 96))
     assert len(read(file, "stage_1/scale_4/window", "Image:buffer")) == 1
     steps = [step for step, _ in read(file, "overlay/current", "Points2D:positions", "step")]
-    assert steps == [0, 1, 2, 3, 4, 5]
+    assert steps == [0, 1, 2, 3, 4, 5, 6, 7]
 
 
 def test_recording_passes_verification(full_recording: Path) -> None:

@@ -57,6 +57,6 @@ def test_timelines(tmp_path: Path, read: Read) -> None:
         ]
         for timeline in ("step", "frame", "time")
     )
-    assert steps == [(42, [1.0]), (47, [2.0])]
+    assert steps == [(56, [1.0]), (61, [2.0])]
     assert [frame for frame, _ in frames] == [7, 7]
     assert [time.total_seconds() for time, _ in times] == [0.7, 0.7]

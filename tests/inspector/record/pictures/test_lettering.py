@@ -13,7 +13,13 @@ from calibnet.trace import ScaleTrace
 from inspector import colors
 from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.lettering import bar_png, font, letter_width, names_png, text_png
-from inspector.record.pictures.maps import TEMPERATURE, decidedness, matching_probability, subcell_match
+from inspector.record.pictures.maps import (
+    TEMPERATURE,
+    decidedness,
+    mass_on_truth,
+    matching_probability,
+    subcell_match,
+)
 
 
 def test_words_have_their_own_ground_and_fit() -> None:
@@ -72,6 +78,14 @@ def test_cells_are_decided_where_one_displacement_has_all_probability() -> None:
     sure[1, 2], half[0, :2] = 1.0, 0.5
     found = decidedness(np.stack([sure, half, none], axis=-1)[:, :, None])
     np.testing.assert_allclose(found, [[1.0, 1 - np.log(2) / np.log(12), 0.0]], atol=2e-3)
+
+
+def test_mass_on_the_truth_is_what_lies_within_a_cell_of_it() -> None:
+    probability = np.full((3, 5, 1, 4), 1 / 15, np.float16)
+    probability[..., 1] = 0.0
+    probability[0, 0, 0, 1], probability[2, 4, 0, 1] = 0.75, 0.25  # two corners of the window
+    true = np.array([[[0.0, 0.0], [1.5, 0.5], [-1.5, 0.0], [9.0, 0.0]]])  # on a cell, near a corner, between cells, out
+    np.testing.assert_allclose(mass_on_truth(probability, true), [[9 / 15, 0.25, 6 / 15, 0.0]], atol=2e-3)
 
 
 def test_before_aggregation_the_scores_are_weighed_as_the_network_does() -> None:

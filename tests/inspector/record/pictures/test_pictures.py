@@ -19,6 +19,7 @@ from inspector.record.pictures.channel_grid import (
     HEADER,
     HIGHEST,
     LOWEST,
+    TEXT,
     channel_grid,
     liveliest_channels,
     palette_png,
@@ -71,10 +72,11 @@ def test_channel_grid_numbers_the_liveliest_and_keeps_the_colour_scale_it_is_giv
     channels = liveliest_channels(maps)
     assert channels.tolist() == [7, 12]
     grid = channel_grid(maps[channels], 0.0, 9.0, channels)
-    assert grid.shape == (3 + HEADER, 4 * 66 - 2)
-    assert grid[HEADER, 0] == HIGHEST  # channel 7 comes first
-    assert grid[HEADER + 2, 66 + 4] == (LOWEST + HIGHEST) // 2  # half as bright as 9
-    assert grid[HEADER, 2 * 66] == GAP  # dead channels are left out
+    assert grid.shape == (2 * 3 + 2 * HEADER, 4 * 130 - 2)
+    assert grid[2 * HEADER, 0] == HIGHEST  # channel 7 comes first
+    assert grid[2 * HEADER + 4, 130 + 8] == (LOWEST + HIGHEST) // 2  # half as bright as 9
+    assert grid[2 * HEADER, 2 * 130] == GAP  # dead channels are left out
+    assert all((grid[row * HEADER : (row + 1) * HEADER, :128] == TEXT).any() for row in (0, 1)), "scale and number"
     decoded = Image.open(io.BytesIO(palette_png(grid)))
     assert decoded.size == grid.shape[::-1]
 

@@ -54,7 +54,8 @@ def test_every_stage_and_scale_has_its_views() -> None:
     views = names(make_blueprint(layout()))
     for stage in ("stage 3 (±5°/0.5 m)", "stage 5 (±1°/0.1 m)"):
         assert f"After {stage}" in views
-    for part in ("displacement that won", "true displacement", "how surely", "raw scores", "before the hourglass"):
+    won = ["displacement that won", "true displacement", "how surely", "raw scores"]
+    for part in (*won, "decided, before", "share on the truth, after", "channels before"):
         assert sum(part in name for name in views) == 4, part
 
 
@@ -101,7 +102,8 @@ def test_below_a_prefix_every_path_of_every_view_has_it() -> None:
         "- /car/left/error/rotation/corrected",
         "- /car/left/error/rotation/initial",
     ]
-    assert queries(moved, "Corrected") == ["/car/left/image", "/car/left/overlay/corrected/**"]
+    corrected = "Corrected (on “step”: every stage)"
+    assert queries(moved, corrected) == ["/car/left/image", "/car/left/overlay/current/**"]
     assert queries(moved, "Yaw off the reference [deg]") == ["$origin/**"]
 
 
