@@ -26,8 +26,8 @@ FALSE_ACCEPTS = 0.01
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
-OF_FRAMES = ("match_error", "misfit", "lens", "stated")
-"""Witnesses of a frame that are fitted: all eight accept a tenth fewer of the good ones on sequences left out.
+OF_FRAMES = ("match_error", "misfit", "lens", "stated", "alike")
+"""Witnesses of a frame that are fitted: all nine accept a tenth fewer of the good ones on sequences left out.
 How far a run went counts apart, in the ranges it is held to."""
 OF_DRIVES = ("match_error", "lens", "stated", "aligned")
 """Witnesses of a drive that are fitted: there are few drives, and on those left out all nine do worse than these."""

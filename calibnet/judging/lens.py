@@ -21,6 +21,8 @@ from calibnet.trace import Matches
 ITERATIONS = 12
 INDEPENDENT = 1 / 20
 """Share of matches that err independently: errors of neighbours are correlated over some twenty cells of a row."""
+LEAST_SCALE_PX = 0.1
+"""No match is known better than that, whatever the network expects."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def fit(
         prior: information ``[6, 6]`` of the guess.
         lens: what to fit besides the pose.
     """
-    points, scale = matches.points.astype(np.float64), np.maximum(matches.scale.astype(np.float64), 0.1)
+    points, scale = matches.points.astype(np.float64), np.maximum(matches.scale.astype(np.float64), LEAST_SCALE_PX)
     focal = np.array(camera.focal)
     target = points[:, :2] / points[:, 2:] + matches.displacement / focal  # in focal lengths from the principal point
     scale = scale / focal

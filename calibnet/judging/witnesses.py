@@ -13,6 +13,7 @@ import numpy as np
 
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.alike import alike_covariance
 from calibnet.judging.lens import LENSES, PINHOLE, Fit, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
@@ -67,6 +68,8 @@ class Witnesses:
         lens: logarithm of the least cost of its matches with another lens, relative to that with the pose alone;
             0 where no lens explains them better.
         stated: logarithm of the deviation of the translation, in centimetres, that its information states.
+        alike: logarithm of the deviation of the translation, in centimetres, if matches also err alike, see
+            `calibnet.judging.alike`.
         reach: how far the run went, in ranges searched.
         last_reach: how far the last stage went, in its own ranges.
         again_reach: how far it would have gone, had it been applied once more.
@@ -77,6 +80,7 @@ class Witnesses:
     misfit: float
     lens: float
     stated: float
+    alike: float
     reach: float
     last_reach: float
     again_reach: float
@@ -98,6 +102,7 @@ def witnesses(trace: CascadeTrace) -> Witnesses:
         misfit=math.log(max(alone, LEAST)),
         lens=math.log(max(min(bent, alone), LEAST) / max(alone, LEAST)),
         stated=_stated(asked),
+        alike=_alike(asked, trace.stages[0].range),
         reach=reach(trace.initial, last.after, trace.stages[0].range).share,
         last_reach=reach(last.before, last.after, last.range).share,
         again_reach=math.nan if again is None else reach(again.before, again.after, again.range).share,
@@ -127,6 +132,14 @@ def _stated(stage: StageTrace) -> float:
     if stage.information is None:
         return math.nan
     return math.log(100 * math.sqrt(np.trace(np.linalg.inv(stage.information)[:3, :3])))
+
+
+def _alike(stage: StageTrace, searched: MiscalibrationRange) -> float:
+    """Logarithm of the deviation of the translation, in centimetres, if a stage's matches also err alike."""
+    if stage.matches is None or not len(stage.matches.points):
+        return math.nan
+    covariance = alike_covariance(stage.matches, stage.camera, searched.information)
+    return math.log(100 * math.sqrt(np.trace(covariance[:3, :3])))
 
 
 def _fit(stage: StageTrace, lens: Lens) -> Fit:

@@ -92,7 +92,7 @@ def test_without_matches_the_witness_is_missing_and_doubt_is_not_a_number() -> N
     assert np.isnan(doubt(witnesses(trace)))
 
 
-NOTHING = Witnesses(*[0.0] * 8)
+NOTHING = Witnesses(*[0.0] * 9)
 
 
 def test_doubt_is_a_logistic_regression() -> None:
@@ -105,7 +105,7 @@ def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_doubt_wh
     assert coefficients.missing == "", "fit them again: calib-inspect fit-verdict"
     doubt = coefficients.doubt
     assert doubt is not None and 0 < doubt.accepted_below < doubt.rejected_above <= 1
-    good = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), -0.02, np.log(0.3), 0.6, 0.3, 0.1)
-    bad = Witnesses(1.6, 1.6, -3.5, -0.2, np.log(0.9), 1.1, 1.2, 1.0)
+    good = Witnesses(np.log(1.6), np.log(1.9), np.log(0.008), -0.02, np.log(0.3), np.log(2.0), 0.6, 0.3, 0.1)
+    bad = Witnesses(1.6, 1.6, -3.5, -0.2, np.log(0.9), np.log(5.0), 1.1, 1.2, 1.0)
     assert doubt(good) < doubt.accepted_below < doubt(bad)
     assert coefficients.fitted["frames"]["false_accept_rate"] <= 0.01

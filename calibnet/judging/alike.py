@@ -1,0 +1,49 @@
+"""The uncertainty of a pose whose matches err alike: what networks get wrong varies slowly over a picture.
+
+A thousand matches that share one error are no thousand witnesses. Here each match errs independently, and all of them
+by a polynomial of their place in the picture besides; what such a polynomial can imitate (a turn, mostly, and what a
+long lens or a bare road shows of a shift) is known only as well as the polynomial is small.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.types import Floats, Matrix6
+from calibnet.judging.lens import INDEPENDENT, LEAST_SCALE_PX, view
+from calibnet.trace import Matches
+
+DEGREE = 3
+"""Of the polynomial; place is counted in halves of the picture's width from its principal point."""
+SIGMA_PX = 1.0
+"""Standard deviation of each of its coefficients, pixels of the stage's camera."""
+
+
+def alike_covariance(matches: Matches, camera: PinholeCamera, prior: Matrix6) -> Matrix6:
+    """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` if matches err independently and alike.
+
+    Args:
+        matches: of a look.
+        camera: of the stage that looked.
+        prior: information ``[6, 6]`` of the pose without them.
+    """
+    focal = np.array(camera.focal)
+    scale = np.maximum(matches.scale.astype(np.float64), LEAST_SCALE_PX) / focal
+    place, jacobian, ahead = view(matches.points.astype(np.float64), np.zeros(4), equidistant=False)
+    weight = INDEPENDENT / scale**2 * ahead[:, None]
+    terms = monomials(place * focal / (0.5 * camera.width))
+    information = np.array(prior, np.float64)
+    for axis in (0, 1):  # the polynomials of x and of y have nothing in common
+        weighted = weight[:, axis, None] * jacobian[:, axis, :6]
+        information += weighted.T @ jacobian[:, axis, :6]
+        shared = terms.T @ (weight[:, axis, None] * terms) + np.eye(terms.shape[1]) * (focal[axis] / SIGMA_PX) ** 2
+        both = weighted.T @ terms
+        information -= both @ np.linalg.solve(shared, both.T)
+    return np.asarray(np.linalg.inv(information), np.float64)
+
+
+def monomials(place: Floats) -> Floats:
+    """All products ``[N, K]`` of powers of x and y up to `DEGREE`, at places ``[N, 2]``."""
+    x, y = place.T
+    return np.stack([x**i * y**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)], axis=1)
