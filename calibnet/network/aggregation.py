@@ -91,19 +91,19 @@ class Down(nn.Conv3d):
 
 
 @lru_cache(maxsize=8)
-def refinement(window: int) -> Tensor:
-    """The linear map ``[D, D]`` that samples a flattened window's centre at half-cell steps."""
+def refinement(window: int, device: torch.device) -> Tensor:
+    """The linear map ``[D, D]``, on a device, that samples a flattened window's centre at half-cell steps."""
     with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
         radius = window // 2
         position = torch.arange(-radius, radius + 1) / 2 + radius
         along = (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
-        return torch.kron(along, along)
+        return torch.kron(along, along).to(device)
 
 
 def refine_window(volume: Tensor) -> Tensor:
     """Interpolate the centre of a coarse window to the fine window; cells stay as they are."""
     rows = volume.flatten(3).flatten(1, 2)  # [B, D, hwC]
-    return (refinement(volume.shape[1]).to(rows) @ rows).view_as(volume)
+    return (refinement(volume.shape[1], rows.device).to(rows) @ rows).view_as(volume)
 
 
 def double(volume: Tensor) -> Tensor:

@@ -54,18 +54,18 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     rows = rows.unfold(2, window, 1).unfold(3, RUN + 2 * radius, RUN)  # [B*G, C/G, h, runs, Dy, R + 2r]
     cells = F.pad(lidar, [0, beyond]).unflatten(1, (groups, -1)).flatten(0, 1).unflatten(3, (runs, RUN))
     products = cells.permute(0, 2, 3, 4, 1) @ rows.permute(0, 2, 3, 1, 4, 5).flatten(4)
-    index = band_index(RUN, radius).to(lidar.device).expand(*products.shape[:4], -1)
+    index = band_index(RUN, radius, lidar.device).expand(*products.shape[:4], -1)
     volume = products.gather(4, index).flatten(2, 3)[:, :, :width]  # [B*G, h, w, D]
     return volume.unflatten(3, (window, window)).unflatten(0, (batch, groups)).permute(0, 4, 5, 2, 3, 1)
 
 
 @lru_cache(maxsize=32)
-def band_index(width: int, radius: int) -> Tensor:
+def band_index(width: int, radius: int, device: torch.device) -> Tensor:
     """``[w, D]``: where the window of cell ``x`` lies in ``Dy`` rows of ``w + 2r`` image cells laid end to end."""
     with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
-        offset = torch.arange(2 * radius + 1)
+        offset = torch.arange(2 * radius + 1, device=device)
         start = offset[:, None] * (width + 2 * radius) + offset  # [Dy, Dx]
-        return torch.arange(width)[:, None] + start.flatten()
+        return torch.arange(width, device=device)[:, None] + start.flatten()
 
 
 def pairs(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:

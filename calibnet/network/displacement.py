@@ -45,9 +45,9 @@ def expected_error(field: DisplacementField, cells: Tensor) -> Tensor:
     return (logarithms.sum((1, 2)) / occupied.sum((1, 2))).exp()
 
 
-def window_offsets(radius: int, stride: int) -> Tensor:
-    """Displacements ``[D, 2]`` as ``(dx, dy)`` in pixels of the flattened window."""
-    axis = torch.arange(-radius, radius + 1, dtype=torch.float32) * stride
+def window_offsets(radius: int, stride: int, device: torch.device) -> Tensor:
+    """Displacements ``[D, 2]``, on a device, as ``(dx, dy)`` in pixels of the flattened window."""
+    axis = torch.arange(-radius, radius + 1, dtype=torch.float32, device=device) * stride
     dy, dx = torch.meshgrid(axis, axis, indexing="ij")
     return torch.stack([dx, dy], dim=-1).reshape(-1, 2)
 
@@ -89,7 +89,7 @@ class DisplacementDecoder(nn.Module):
         expected, peaks = [], []
         probabilities = [scale_logits.float().softmax(1) for scale_logits in logits]
         for stride, weights in zip(self.scales, probabilities, strict=True):
-            offsets = window_offsets(self.config.radius, stride).to(weights.device)
+            offsets = window_offsets(self.config.radius, stride, weights.device)
             mean = torch.einsum("bdhw,dc->bchw", weights, offsets)
             peak = weights.amax(1, keepdim=True)
             if stride != self.scales[0]:

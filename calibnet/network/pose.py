@@ -73,8 +73,7 @@ def rotation_from_quaternion(quaternion: Tensor) -> Tensor:
 def rigid(rotation: Tensor, translation: Tensor) -> Tensor:
     """``[B, 3, 3]`` and ``[B, 3]`` to ``[B, 4, 4]``."""
     top = torch.cat([rotation, translation[..., None]], dim=-1)
-    bottom = top.new_tensor([0.0, 0.0, 0.0, 1.0]).expand(len(top), 1, 4)
-    return torch.cat([top, bottom], dim=1)
+    return torch.cat([top, torch.eye(4, device=top.device, dtype=top.dtype)[3:].expand(len(top), 1, 4)], dim=1)
 
 
 def project_points(points: Tensor, intrinsics: Tensor) -> Tensor:
@@ -130,10 +129,13 @@ class GeometricHead(nn.Module):
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
         """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""
         with torch.autocast(cells.device.type, enabled=False):
-            occupied = (cells[:, 2] > 0).any(0)  # in any frame of the batch; the others weigh nothing
+            flat = cells.flatten(2)
+            occupied: Tensor | slice = slice(None)  # those in no frame of the batch weigh nothing
+            if cells.device.type == "cpu":  # a GPU would have to wait until the host knows how many they are
+                occupied = (flat[:, 2] > 0).any(0)
 
             def picked(grid: Tensor) -> Tensor:
-                return grid.float()[:, :, occupied].transpose(1, 2)
+                return grid.float().flatten(2)[:, :, occupied].transpose(1, 2)
 
             points = picked(cells)
             target = project_points(points, intrinsics) + picked(field.displacement)
@@ -165,7 +167,8 @@ class GeometricHead(nn.Module):
             gradient = (weighted @ residual.flatten(1)[..., None])[..., 0]
             gradient = gradient - self.prior * torch.cat([translation, rotation_vector(rotation)], dim=-1)
             information = normal + prior
-            step = torch.linalg.solve(information, gradient)
+            # the prior keeps it regular; asking whether it was makes a GPU wait for the host
+            step = torch.linalg.solve_ex(information, gradient).result
             turn = rotation_from_vector(step[:, 3:])
             rotation = turn @ rotation
             translation = (turn @ translation[..., None])[..., 0] + step[:, :3]

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
-from typing import cast
+from collections.abc import Callable, Iterator
+from typing import TypeVar, cast
 
 import cv2
 from lightning_fabric import Fabric
-from torch.utils.data import DataLoader, Sampler
+from torch.utils.data import DataLoader, Dataset, Sampler
 
 from calibnet.errors import CalibnetError
 from calibnet.network.batch import NetworkInputs
 from calibnet.runtime.interruption import SIGNALS
 from calibnet.training.losses import Target
+from calibnet.training.on_device.batches import DeviceSamples
 from calibnet.training.samples import TrainingSamples, collate
 
+Part = TypeVar("Part")
+Whole = TypeVar("Whole")
 Batch = tuple[NetworkInputs, Target]
 
 
@@ -25,6 +28,11 @@ class BatchNumbers(Sampler[list[int]]):
     def __init__(self, first: int, batch: int, rank: int, world: int) -> None:
         self.first, self.batch, self.rank, self.world = first, batch, rank, world
 
+    @classmethod
+    def of(cls, fabric: Fabric, first: int, batch: int) -> BatchNumbers:
+        """Those of this process."""
+        return cls(first, batch, fabric.global_rank, fabric.world_size)
+
     def __iter__(self) -> Iterator[list[int]]:
         number = self.first * self.world + self.rank
         while True:
@@ -32,20 +40,36 @@ class BatchNumbers(Sampler[list[int]]):
             number += self.world
 
 
-def open_batches(fabric: Fabric, samples: TrainingSamples, first: int, batch: int, workers: int) -> Iterator[Batch]:
-    """All batches from number ``first`` on, prepared by so many other processes, on the fabric's device."""
+def open_batches(
+    fabric: Fabric, samples: TrainingSamples | DeviceSamples, first: int, batch: int, workers: int
+) -> Iterator[Batch]:
+    """All batches from number ``first`` on, on the fabric's device; so many other processes prepare, or draw, them."""
+    if isinstance(samples, DeviceSamples):
+        drawn = samples.drawn
+        return samples.made(_load(fabric, drawn, drawn.collate, BatchNumbers.of(fabric, first, batch), workers))
+    return _load(fabric, samples, collate, BatchNumbers.of(fabric, first, batch), workers)
+
+
+def _load(
+    fabric: Fabric,
+    samples: Dataset[Part],
+    collate: Callable[[list[Part]], Whole],
+    numbers: BatchNumbers,
+    workers: int,
+) -> Iterator[Whole]:
+    """Collated samples, by their numbers, on the fabric's device."""
     # workers that have OpenCV's threads for all cores each hinder one another; told after the fork, they wait for ever
     cv2.setNumThreads(1)
     loader = DataLoader(
         samples,
-        batch_sampler=BatchNumbers(first, batch, fabric.global_rank, fabric.world_size),
+        batch_sampler=numbers,
         collate_fn=collate,
         num_workers=workers,
         worker_init_fn=leave_signals_to_main,
         prefetch_factor=4 if workers else None,
         pin_memory=fabric.device.type == "cuda",
     )
-    return cast(Iterator[Batch], iter(fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
+    return cast(Iterator[Whole], iter(fabric.setup_dataloaders(loader, use_distributed_sampler=False)))
 
 
 def next_batch(batches: Iterator[Batch]) -> Batch:

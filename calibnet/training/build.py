@@ -24,6 +24,8 @@ from calibnet.training.data import Source, training_sources, validation_sequence
 from calibnet.training.devices import launch
 from calibnet.training.draws import Draws
 from calibnet.training.frames import TrainingFrames
+from calibnet.training.on_device.batches import DeviceSamples
+from calibnet.training.on_device.store import FrameStore
 from calibnet.training.options import TrainingOptions
 from calibnet.training.packed import packed_residuals, read_packed
 from calibnet.training.recipe import RECIPE, OptimizerRecipe, Recipe
@@ -52,7 +54,7 @@ class Training:
     recipe: Recipe
     fabric: Fabric
     stage: TrainedStage
-    samples: TrainingSamples
+    samples: TrainingSamples | DeviceSamples
     validation: Validation | None
 
 
@@ -75,12 +77,15 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
     sources, held_out = open_sources(options)
     frames = open_frames(sources, recipe, stage, options)
     draws = open_draws(options, recipe, frames, stage, start.to(fabric.device) if start else None)
+    samples: TrainingSamples | DeviceSamples = TrainingSamples(frames, draws, network.config.volume_scales)
+    if options.on_device:
+        samples = DeviceSamples(samples, FrameStore.load(sources, fabric.device))
     return Training(
         options,
         recipe,
         fabric,
         stage,
-        TrainingSamples(frames, draws, network.config.volume_scales),
+        samples,
         Validation(held_out, stage, recipe.pace.validation_draws, options.seed) if held_out else None,
     )
 

@@ -55,7 +55,7 @@ class TrainingFrames:
             variety: probability that scan and picture are augmented, and that a draw of the synthetic world is kept.
             whole: leave the magnification out.
         """
-        source = self._draw_source(generator, variety)
+        source = self.draw_source(generator, variety)
         frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
         magnification = 1.0 if whole else self.magnification
         return augment(frame, *self.size(number), generator, self.recipe, variety, magnification)
@@ -74,7 +74,7 @@ class TrainingFrames:
             self.memory[source, position] = sequence[position]
         return self.memory[source, position]
 
-    def _draw_source(self, generator: np.random.Generator, variety: float) -> int:
+    def draw_source(self, generator: np.random.Generator, variety: float) -> int:
         """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the variety."""
         while True:
             source = int(generator.choice(len(self.sources), p=self.probability))

@@ -25,16 +25,14 @@ class Target(NamedTuple):
             train alone.
         visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
             inside the image).
+        of_features: whether the batch trains features alone: its LiDAR images are displaced, which no pose explains.
+            The host decides by it, and would wait for the device to look at ``shift``.
     """
 
     correction: Tensor
     shift: Tensor
     visible: list[Tensor]
-
-    @property
-    def of_features(self) -> bool:
-        """Whether the batch trains features alone: its LiDAR images are displaced, which no pose explains."""
-        return bool(self.shift.any())
+    of_features: bool = False
 
 
 class Losses(NamedTuple):
@@ -78,9 +76,11 @@ def balanced(depth: Tensor, counted: Tensor, recipe: LossRecipe, strength: float
     Returns:
         ``[...]`` weights: mean 1 over the cells that count, 0 for the others.
     """
-    band = torch.bucketize(depth.contiguous(), depth.new_tensor(recipe.depth_bands_m), right=True)
-    cells = torch.bincount(band[counted], minlength=len(recipe.depth_bands_m) + 1)
-    total = cells.sum().clamp(min=1)
+    # a handful of sums: what counts with masks or bins makes a GPU wait for the host
+    bands = [depth >= nearest for nearest in recipe.depth_bands_m]
+    band = sum((farther.long() for farther in bands), torch.zeros_like(depth, dtype=torch.long))
+    beyond = torch.stack([counted.sum(), *((counted & farther).sum() for farther in bands), counted.sum() * 0])
+    cells, total = -beyond.diff(), beyond[0].clamp(min=1)
     weight = counted / (cells / total).clamp(min=recipe.rarest_band)[band]
     weight = weight * (total / weight.sum().clamp(min=1e-6))
     return strength * weight + (1 - strength) * counted
@@ -187,7 +187,7 @@ def hybrid_loss(
     noise that keeps the features from learning to.
     """
     estimate, truth = output.pose.correction, target.correction
-    difference = estimate @ torch.linalg.inv(truth)
+    difference = estimate @ torch.linalg.inv_ex(truth).inverse
     angle = quaternion_angle(difference[:, :3, :3])
     offset = (estimate[:, :3, 3] - truth[:, :3, 3]).norm(dim=-1)
     zero = angle.new_zeros(())

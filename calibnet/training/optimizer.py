@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import torch
 from torch import Tensor, nn
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 
 from calibnet.network.network import CalibrationNetwork
 from calibnet.training.recipe import OptimizerRecipe
 from calibnet.training.trained import TrainedNetwork
 
-Tensors: TypeAlias = tuple[Tensor, ...] | list[Tensor]
 
+def make_optimizer(
+    network: TrainedNetwork, peak: float, recipe: OptimizerRecipe, fused: bool | None = None
+) -> torch.optim.AdamW:
+    """AdamW for all that is not frozen.
 
-def make_optimizer(network: TrainedNetwork, peak: float, recipe: OptimizerRecipe) -> torch.optim.AdamW:
-    """AdamW for all that is not frozen; ``peak`` is the learning rate at its highest."""
+    Args:
+        network: to be trained.
+        peak: the learning rate at its highest.
+        recipe: the rest.
+        fused: a step is one operation for all weights, where the device they will be on has it.
+    """
     pretrained: set[nn.Parameter] = set()
     if isinstance(network, CalibrationNetwork):
         pretrained |= set(network.features.pretrained_levels().parameters())
@@ -26,7 +32,8 @@ def make_optimizer(network: TrainedNetwork, peak: float, recipe: OptimizerRecipe
         {"params": [p for p in trained if p not in pretrained], "relative": 1.0},
         {"params": [p for p in trained if p in pretrained], "relative": recipe.pretrained_rate},
     )
-    return torch.optim.AdamW([group for group in groups if group["params"]], lr=peak, weight_decay=recipe.weight_decay)
+    given = [group for group in groups if group["params"]]
+    return torch.optim.AdamW(given, lr=peak, weight_decay=recipe.weight_decay, fused=fused)
 
 
 def set_learning_rate(optimizer: torch.optim.Optimizer, peak: float, share: float, recipe: OptimizerRecipe) -> None:
@@ -37,16 +44,22 @@ def set_learning_rate(optimizer: torch.optim.Optimizer, peak: float, share: floa
         group["lr"] = group["relative"] * rate * (recipe.final_rate + (1 - recipe.final_rate) * cosine)
 
 
-def averaged(network: TrainedNetwork, recipe: OptimizerRecipe) -> AveragedModel:
-    """A copy whose weights are the exponential moving average of the network's.
+@torch.no_grad()
+def update_average(average: AveragedModel, network: TrainedNetwork, steps: int, recipe: OptimizerRecipe) -> None:
+    """Move an exponential moving average towards the network's weights.
 
     The average is over the last tenth of the steps at most: in a run of some hundred steps it would otherwise be
-    mostly of what the network was before it had learned anything.
+    mostly of what the network was before it had learned anything. `AveragedModel` itself reads a counter on the device
+    for this, and waits for it.
+
+    Args:
+        average: of the network.
+        network: whose weights a step has just changed.
+        steps: before this one; after the first step the average is a copy.
+        recipe: how much of the average a step keeps.
     """
-
-    @torch.no_grad()
-    def average(averages: Tensors, current: Tensors, steps: Tensor | int) -> None:
-        early = (1 + int(steps)) / (10 + int(steps))
-        get_ema_multi_avg_fn(min(recipe.average_decay, early))(averages, current, steps)
-
-    return AveragedModel(network, multi_avg_fn=average)
+    kept = min(recipe.average_decay, (1 + steps) / (10 + steps)) if steps else 0.0
+    means, ours = list[Tensor](average.module.parameters()), list[Tensor](network.parameters())
+    torch._foreach_lerp_(means, ours, 1 - kept)
+    for mean, buffer in zip(average.module.buffers(), network.buffers(), strict=True):
+        mean.copy_(buffer)

@@ -24,6 +24,8 @@ class TrainingOptions:
     """Real frames to train on, each ``DATASET:FOLDER[:SEQUENCE]``."""
     packed: str | None = None
     """Folder of frames packed beforehand (`calibnet.training.packed`), instead of ``data`` and ``synthetic``."""
+    on_device: bool = False
+    """Whether samples are made on the device that trains (`calibnet.training.on_device`), where all frames then are."""
     validate: list[str] = field(default_factory=list)
     """Held-out frames of that form, never trained on."""
     synthetic: float = 0.4

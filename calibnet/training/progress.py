@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import torch
+from torch import Tensor
+
 from calibnet.methods.learned.network import MethodLosses
 from calibnet.training.losses import Losses
 from calibnet.training.validation import ValidationFigures
@@ -36,22 +39,24 @@ class Means:
     """Running means of the losses between two progress lines."""
 
     def __init__(self) -> None:
-        self.sums: dict[str, float] = {}
-        self.counts: dict[str, int] = {}
+        self.steps: list[Tensor] = []
+        self.names: tuple[str, ...] = ()
 
     def add(self, losses: Losses | MethodLosses) -> None:
-        """Take one step's losses in; what it does not tell, as features alone have no pose, is left out."""
-        for name, value in losses._asdict().items():
-            number = float(value.detach())
-            known = not math.isnan(number)
-            self.sums[name] = self.sums.get(name, 0.0) + (number if known else 0.0)
-            self.counts[name] = self.counts.get(name, 0) + known
+        """Take one step's losses in; they stay where they are, as reading them makes the host wait for the device."""
+        self.names = losses._fields
+        self.steps.append(torch.stack([value.detach().float() for value in losses]))
 
     def take(self) -> dict[str, float]:
-        """The means since the last call; NaN where no step told."""
-        means = {name: total / (self.counts[name] or math.nan) for name, total in self.sums.items()}
-        self.sums, self.counts = {}, {}
-        return means
+        """The means since the last call; what a step does not tell, as features alone have no pose, is left out.
+
+        NaN where no step told.
+        """
+        if not self.steps:
+            return dict.fromkeys(self.names, math.nan)
+        means = torch.stack(self.steps).double().nanmean(0)
+        self.steps = []
+        return dict(zip(self.names, means.tolist(), strict=True))
 
 
 class Every:

@@ -105,35 +105,22 @@ def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
     image = stack([sample.image for sample in samples]).permute(0, 3, 1, 2)
     inputs = make_batch(image, scans, [sample.intrinsics for sample in samples], cut)
     visible = zip(*(sample.visible for sample in samples), strict=True)
+    shift = stack([sample.shift for sample in samples])
     return inputs, Target(
         stack([sample.correction for sample in samples]),
-        stack([sample.shift for sample in samples]),
+        shift,
         [stack([cut.apply(mask) for mask in scale]) for scale in visible],
+        bool(shift.any()),
     )
 
 
-class TrainingSamples(Dataset[Sample]):
-    """An endless, random and repeatable stream: sample ``n`` depends on the frames' seed and on ``n`` alone."""
+class SampleNumbers:
+    """What a sample's number says of it; all else of an endless stream of samples is random."""
 
     def __init__(self, frames: TrainingFrames, draws: Draws, scales: tuple[int, ...]) -> None:
         """Samples of frames under miscalibrations; ``scales`` are the strides of the network's volumes."""
         self.frames, self.draws, self.scales = frames, draws, scales
         self.recipe, self.features = frames.recipe.sample, frames.recipe.features
-
-    def __getitem__(self, number: int) -> Sample:
-        """Draw sample ``number``."""
-        generator = np.random.default_rng([self.frames.seed, 2, number])
-        largest = self.largest_shift(number)
-        for _ in range(self.recipe.attempts):
-            frame = self.frames.draw(number, generator, self.variety(number))
-            shift = generator.uniform(-largest, largest, 2)
-            sample = make_sample(frame, self.draws.draw(generator), self.scales, self.recipe, shift)
-            if sample.visible[0].sum() >= self.recipe.fewest_visible_cells:
-                return sample
-        raise DatasetError(
-            f"None of {self.recipe.attempts} draws gave {self.recipe.fewest_visible_cells} cells with a visible LiDAR "
-            f"point, the last one from {frame.source}; check that the training data's calibration fits its scans."
-        )
 
     def variety(self, number: int) -> float:
         """How varied sample ``number`` may be, 0..1: ever more in the warm-up."""
@@ -146,3 +133,26 @@ class TrainingSamples(Dataset[Sample]):
             return self.features.warm_up_shift_px
         every = self.features.every
         return self.features.shift_px if every and number // self.frames.batch % every == every - 1 else 0.0
+
+    def too_few(self, source: str) -> DatasetError:
+        """What is wrong where no draw shows enough points; ``source`` names the last frame."""
+        return DatasetError(
+            f"None of {self.recipe.attempts} draws gave {self.recipe.fewest_visible_cells} cells with a visible LiDAR "
+            f"point, the last one from {source}; check that the training data's calibration fits its scans."
+        )
+
+
+class TrainingSamples(SampleNumbers, Dataset[Sample]):
+    """An endless, random and repeatable stream: sample ``n`` depends on the frames' seed and on ``n`` alone."""
+
+    def __getitem__(self, number: int) -> Sample:
+        """Draw sample ``number``."""
+        generator = np.random.default_rng([self.frames.seed, 2, number])
+        largest = self.largest_shift(number)
+        for _ in range(self.recipe.attempts):
+            frame = self.frames.draw(number, generator, self.variety(number))
+            shift = generator.uniform(-largest, largest, 2)
+            sample = make_sample(frame, self.draws.draw(generator), self.scales, self.recipe, shift)
+            if sample.visible[0].sum() >= self.recipe.fewest_visible_cells:
+                return sample
+        raise self.too_few(frame.source)

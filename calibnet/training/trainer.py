@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import cast
 
 import torch
+from torch.optim.swa_utils import AveragedModel
 
 from calibnet.errors import CalibrationError, ConfigError
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork
@@ -21,7 +22,7 @@ from calibnet.training.batches import Batch, next_batch, open_batches
 from calibnet.training.build import Training
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
 from calibnet.training.losses import Losses, Target, feature_losses, hybrid_loss
-from calibnet.training.optimizer import averaged, make_optimizer, set_learning_rate
+from calibnet.training.optimizer import make_optimizer, set_learning_rate, update_average
 from calibnet.training.progress import Every, Means, Observer, Progress
 from calibnet.training.record import manifest_with, training_record
 from calibnet.training.trained import TrainedNetwork
@@ -46,13 +47,15 @@ class Trainer:
         self.options, self.recipe, self.fabric = training.options, training.recipe, training.fabric
         self.range, self.network = training.stage.range, training.stage.network
         self.folder = Path(self.options.output)
-        self.average = averaged(self.network, self.recipe.optimizer)
-        optimizer = make_optimizer(self.network, self.options.learning_rate, self.recipe.optimizer)
+        self.average = AveragedModel(self.network)
+        fused = self.fabric.device.type == "cuda" or None
+        optimizer = make_optimizer(self.network, self.options.learning_rate, self.recipe.optimizer, fused)
         self.model, self.optimizer = self.fabric.setup(self.network, optimizer)
         if isinstance(self.network, CalibrationNetwork):
             self.model.mark_forward_method("match")
         self.average.to(self.fabric.device)
         self.steps, self.seconds = 0, 0.0
+        self.total = torch.zeros((), device=self.fabric.device)
         check_output(
             weights_path(self.options.preset, self.range, self.folder), Kind.WEIGHTS
         )  # now, not after the work
@@ -122,6 +125,7 @@ class Trainer:
             # all processes must take the same steps, at the same learning rate
             self.seconds, stopping = self.fabric.broadcast((started + time.monotonic(), stop.requested))
             if elapsed := report.due(self.seconds):
+                self._require_finite()
                 self.observer.progressed(self._progress((self.samples - reported) / elapsed, means.take()))
                 reported = self.samples
             if checkpoint.due(self.seconds):
@@ -134,18 +138,22 @@ class Trainer:
         recipe = self.recipe.optimizer
         set_learning_rate(self.optimizer.optimizer, self.options.learning_rate, self.share, recipe)
         losses = self._losses(inputs, target)
-        if not torch.isfinite(losses.total):
-            raise CalibrationError(
-                f"The loss became {losses.total.item()} after {self.samples} samples; resume from {self.checkpoint} "
-                "with a lower --learning-rate."
-            )
         self.optimizer.zero_grad(set_to_none=True)
         self.fabric.backward(losses.total)
-        self.fabric.clip_gradients(self.model, self.optimizer, max_norm=recipe.gradient_norm)
+        self.fabric.clip_gradients(self.model, self.optimizer, max_norm=recipe.gradient_norm, error_if_nonfinite=False)
         self.optimizer.step()
-        self.average.update_parameters(self.network)
+        update_average(self.average, self.network, self.steps, recipe)
         self.steps += 1
+        self.total += losses.total.detach()
         return losses
+
+    def _require_finite(self) -> None:
+        """Stop a run whose loss is no number any more; looked at now and then, as it makes the host wait."""
+        if not torch.isfinite(self.total):
+            raise CalibrationError(
+                f"The loss became {self.total.item()} within {self.samples} samples; resume from {self.checkpoint} "
+                "with a lower --learning-rate."
+            )
 
     def _losses(self, inputs: NetworkInputs, target: Target) -> Losses | MethodLosses:
         if isinstance(self.network, MethodNetwork):
@@ -168,6 +176,7 @@ class Trainer:
         return figures
 
     def _save_checkpoint(self) -> None:
+        self._require_finite()
         if math.isinf(self.recipe.pace.checkpoint_seconds):
             return
         state = {"steps": self.steps, "seconds": self.seconds, "options": asdict(self.options)}

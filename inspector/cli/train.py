@@ -49,6 +49,11 @@ if TYPE_CHECKING:
 )
 @click.option("--packed", type=FOLDER, help="Frames of pack-training, instead of --data and --synthetic.")
 @click.option(
+    "--on-device",
+    is_flag=True,
+    help="Make the samples on the GPU, in whose memory all frames must fit; --workers then only draw.",
+)
+@click.option(
     "--validate",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
@@ -135,6 +140,7 @@ def train(
     every_stage: bool,
     data: tuple[str, ...],
     packed: Path | None,
+    on_device: bool,
     validate: tuple[str, ...],
     synthetic: float,
     scenes: int,
@@ -192,6 +198,7 @@ def train(
         output=str(output),
         data=list(data),
         packed=str(packed) if packed else None,
+        on_device=on_device,
         validate=list(validate),
         synthetic=synthetic,
         scenes=scenes,

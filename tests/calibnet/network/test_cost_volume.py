@@ -68,7 +68,7 @@ def test_best_match_names_where_the_image_has_the_lidar_cell() -> None:
     dy, dx = -2, 1
     lidar = shifted(image, dy, dx)  # lidar cell (y, x) looks like image cell (y - 2, x + 1)
     score = correlate(lidar, image, 2, 4).sum(-1)[0, :, :, 4, 4]
-    assert window_offsets(2, 8)[score.argmax()].tolist() == [8 * dx, 8 * dy]
+    assert window_offsets(2, 8, score.device)[score.argmax()].tolist() == [8 * dx, 8 * dy]
 
 
 def test_pairs_equal_a_loop() -> None:

@@ -33,7 +33,7 @@ FEATURES, CELLS = torch.ones(1, CONFIG.feature_channels, *SIZES[0]), torch.ones(
 
 
 def test_offsets_run_row_by_row_in_pixels() -> None:
-    assert window_offsets(1, 16).tolist() == [
+    assert window_offsets(1, 16, torch.device("cpu")).tolist() == [
         [-16, -16], [0, -16], [16, -16], [-16, 0], [0, 0], [16, 0], [-16, 16], [0, 16], [16, 16],
     ]  # fmt: skip
 

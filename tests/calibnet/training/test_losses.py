@@ -231,12 +231,6 @@ def test_matching_and_displacement_hear_the_near_cell_as_loud_as_all_far_ones() 
     assert float(displacement_loss(said, still, ones, depth, WEIGHTS)) == pytest.approx(8.0 * (2 + 1) / 2 / 4)
 
 
-def test_a_displaced_batch_trains_features_alone() -> None:
-    _, target = inputs_and_target()
-    assert not target.of_features
-    assert target._replace(shift=torch.tensor([[0.0, -3.0]])).of_features
-
-
 def test_displacement_loss_rewards_honest_uncertainty() -> None:
     made = output(TRUTH)
 

@@ -95,6 +95,12 @@ def test_the_warm_up_and_every_third_batch_are_displaced() -> None:
     assert all(shift <= samples.largest_shift(number) for number, shift in enumerate(shifts))
 
 
+def test_a_displaced_batch_trains_features_alone() -> None:
+    displaced = make_sample(make_frame(), DELTA, SCALES, RECIPE.sample, (0.0, -3.0))
+    still = make_sample(make_frame(), DELTA, SCALES, RECIPE.sample)
+    assert [collate(batch)[1].of_features for batch in ([still, still], [still, displaced])] == [False, True]
+
+
 def test_no_batch_is_displaced_where_features_never_train_alone() -> None:
     samples = stream(every=0)
     assert [samples.largest_shift(number) for number in range(24)] == [0.0] * 24

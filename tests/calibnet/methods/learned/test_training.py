@@ -16,6 +16,7 @@ from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.learned.weights import load_method_network, load_method_stage
 from calibnet.network.ablations import ABLATIONS
 from calibnet.training.build import build
+from calibnet.training.optimizer import update_average
 from calibnet.training.recipe import RECIPE
 from calibnet.weights import load_network, read_record
 from calibnet.weights.manifest import load_manifest
@@ -115,5 +116,5 @@ def test_averaged_weights_follow_in_a_short_run(tiny_world: Scenes, tmp_path: Pa
     for step in range(100):
         with torch.no_grad():
             weight.fill_(float(step))
-        trainer.average.update_parameters(trainer.network)
+        update_average(trainer.average, trainer.network, step, RECIPE.optimizer)
     assert 80 < float(average[name].detach().flatten()[0]) < 99

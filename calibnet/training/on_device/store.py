@@ -1,0 +1,87 @@
+"""All frames of a run as tensors on one device."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import ConfigError
+from calibnet.geometry import PinholeCamera
+from calibnet.geometry.types import Extrinsic
+from calibnet.training.data import Source
+
+LARGEST_BYTES = 16 << 30
+"""Of all frames together, as they lie on the device."""
+
+
+@dataclass(frozen=True)
+class FrameStore:
+    """Pictures and scans on the device, what little else a frame has on the host.
+
+    Attributes:
+        pictures: ``[F, H, W, 3]`` uint8 RGB, H and W those of the largest, black where others end.
+        scans: ``[F, 4, N]`` float32, N the points of the largest: x, y, z in metres and intensity.
+        points: ``[F]`` how many of the columns of a scan are points.
+        cameras: of each frame.
+        extrinsics: ``[F, 4, 4]`` float64 camera_from_lidar.
+        first: number of the first frame of each source.
+    """
+
+    pictures: Tensor
+    scans: Tensor
+    points: Tensor
+    cameras: list[PinholeCamera]
+    extrinsics: list[Extrinsic]
+    first: list[int]
+
+    @property
+    def device(self) -> torch.device:
+        """Where pictures and scans are."""
+        return self.pictures.device
+
+    @classmethod
+    def load(cls, sources: Sequence[Source], device: torch.device) -> FrameStore:
+        """Read all frames of the sources, with as many threads as there are cores.
+
+        Raises:
+            ConfigError: they are too many.
+            DatasetError: one cannot be read.
+        """
+        places = [(source.sequence, position) for source in sources for position in range(len(source.sequence))]
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            frames = list(threads.map(lambda place: place[0][place[1]], places))
+        lengths = [len(source.sequence) for source in sources]
+        height, width = (max(frame.image.shape[side] for frame in frames) for side in (0, 1))
+        most = max(len(frame.points) for frame in frames)
+        size = len(frames) * (3 * height * width + 16 * most)
+        if size > LARGEST_BYTES:
+            raise ConfigError(
+                f"The {len(frames):,d} training frames would take {size / 2**30:.0f} GiB of the device's memory, more "
+                f"than {LARGEST_BYTES >> 30}; pack fewer, or train without --on-device."
+            )
+        pictures = torch.zeros(len(frames), height, width, 3, dtype=torch.uint8, device=device)
+        scans = torch.zeros(len(frames), 4, most, device=device)
+        for number, frame in enumerate(frames):
+            put(pictures[number], scans[number], frame)
+        return cls(
+            pictures,
+            scans,
+            torch.tensor([len(frame.points) for frame in frames], device=device),
+            [frame.camera for frame in frames],
+            [frame.camera_from_lidar for frame in frames],
+            [0, *np.cumsum(lengths)[:-1].tolist()],
+        )
+
+
+def put(picture: Tensor, scan: Tensor, frame: Frame) -> None:
+    """Copy a frame into its place ``[H, W, 3]`` and ``[4, N]``."""
+    height, width = frame.image.shape[:2]
+    picture[:height, :width] = torch.from_numpy(frame.image)
+    scan[:, : len(frame.points)] = torch.from_numpy(np.ascontiguousarray(frame.points.T))
