@@ -17,6 +17,8 @@ from calibnet.training.on_device.store import FrameStore
 from calibnet.training.samples import SampleNumbers
 
 Batch = tuple[NetworkInputs, Target]
+AT_ONCE = 16
+"""Pictures that are warped together: as they are stored and in single precision, they are large."""
 
 
 class Whole(NamedTuple):
@@ -70,11 +72,10 @@ class DeviceSamples(SampleNumbers):
         scans = rescanned(Scans(x, y, z, intensity, there), drawn.scanners, generator)
         where = drawn.initial, drawn.reference, drawn.correction, drawn.intrinsics, drawn.shift
         seen = see(scans, *where, drawn.size, self.scales, self.recipe)
-        pictures = store.pictures[drawn.frames]
         count = 2 if drawn.most_shrunk <= 2 else 3
-        image = exposed(
-            warped(pictures, drawn.to_picture, drawn.shrinking, drawn.size, count), drawn.exposures, generator
-        )
+        some = zip(*(part.split(AT_ONCE) for part in (drawn.frames, drawn.to_picture, drawn.shrinking)), strict=True)
+        pictures = [warped(store.pictures[frames], to, shrinking, drawn.size, count) for frames, to, shrinking in some]
+        image = exposed(torch.cat(pictures), drawn.exposures, generator)
         good = seen.visible[0].flatten(1).sum(1) >= self.recipe.fewest_visible_cells
         chosen = good_ones(good)
         seen = Cells(seen.image[chosen], *([scale[chosen] for scale in of] for of in seen[1:]))
