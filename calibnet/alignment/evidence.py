@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from calibnet.alignment.pull import Map
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
-from calibnet.geometry import PinholeCamera, project
+from calibnet.geometry import PinholeCamera, invert, project, transform
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector6
 
@@ -130,13 +130,50 @@ class Evidence:
         return value, gradient
 
 
+@dataclass(frozen=True)
+class Share:
+    """A share of some evidence."""
+
+    evidence: Term
+    share: float
+
+    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
+        """Value and gradient ``[6]`` for a correction, 4x4."""
+        value, gradient = self.evidence(correction)
+        return self.share * value, self.share * gradient
+
+
+@dataclass(frozen=True)
+class InRig:
+    """The evidence of a camera, for corrections of the rig it is on, or of the lens that it is a face of."""
+
+    evidence: Term
+    camera_from_rig: Transform
+
+    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
+        """Value and gradient ``[6]`` for a correction of the rig's pose, 4x4."""
+        rotation = self.camera_from_rig[:3, :3]
+        of_camera = self.camera_from_rig @ correction @ invert(self.camera_from_rig)
+        value, gradient = self.evidence(of_camera)
+        pivot = rotation @ correction[:3, 3] + self.camera_from_rig[:3, 3]  # that the rig turns about
+        torque = gradient[3:] + np.cross(of_camera[:3, 3] - pivot, gradient[:3])
+        return value, np.concatenate([rotation.T @ gradient[:3], rotation.T @ torque])
+
+
 def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
     """Find a frame's edges; a kind with too few points is left out, and reflectance where a scan has none.
+
+    Of a wide lens the faces are looked at, which count as one picture together.
 
     Args:
         frame: image, scan and camera; its own extrinsic is not looked at.
         camera_from_lidar: 4x4, that corrections will be relative to.
     """
+    if frame.faces:
+        turns = [transform(face.face_from_camera, np.zeros(3)) for face in frame.faces]
+        seen = zip(frame.faces, turns, strict=True)
+        found = [InRig(gather(frame.through(face), turn @ camera_from_lidar), turn) for face, turn in seen]
+        return Evidence(tuple(Share(term, 1 / len(found)) for term in found))
     camera = picture_camera(frame.camera)
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
     across, any_way = picture_edges(grey, camera)

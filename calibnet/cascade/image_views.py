@@ -18,12 +18,13 @@ class ImageViews:
     def __init__(self, frame: Frame, clock: Clock) -> None:
         """Of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
         self.frame, self.clock = frame, clock
-        self._views: dict[tuple[int, int, int], View] = {}
+        self._views: dict[tuple[int, ...], View] = {}
 
     def of(self, stage: Stage, branch: int) -> View:
         """The view of a stage, whose image branch is that of the stage at position ``branch``; see `image_branches`."""
-        camera = stage.camera(self.frame)
-        key = branch, camera.width, camera.height
+        seen = [self.frame.through(face) for face in self.frame.faces] or [self.frame]
+        cameras = map(stage.camera, seen)
+        key = branch, *(size for camera in cameras for size in (camera.width, camera.height))
         if key not in self._views:
             self.clock.skip()  # stages ran since the last view, and time themselves
             self._views[key] = stage.view(self.frame, self.clock)

@@ -14,12 +14,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from calibnet.cascade.faces import joined, seen_by_camera
 from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled, transform
 from calibnet.geometry.known import Held, inverse
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.judging.covariance import Spread
@@ -38,10 +39,14 @@ FEWEST_CELLS = 20
 
 
 class View(NamedTuple):
-    """A frame's image at the size a stage wants, ``[1, 3, H, W]``, and what its image branch makes of it."""
+    """A frame's image at the size a stage wants, ``[1, 3, H, W]``, and what its image branch makes of it.
+
+    Of a wide lens that of each face instead; its own are those of the first.
+    """
 
     image: Tensor
     features: list[Tensor]
+    faces: tuple[View, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,9 @@ class Stage:
     @torch.inference_mode()
     def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
         """The frame's image as this stage sees it; ``clock`` hears ``"resize"`` and ``"image_features"``."""
+        if frame.faces:
+            faces = tuple(self.view(frame.through(face), clock) for face in frame.faces)
+            return View(*faces[0][:2], faces)
         with autocast(self.device):
             image = torch.from_numpy(resize_image(frame.image, self.camera(frame)))
             image = image.permute(2, 0, 1)[None].to(self.device)
@@ -112,9 +120,33 @@ class Stage:
     ) -> StageTrace:
         """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
 
+        Through a wide lens each of its faces is looked at, and what they say is joined to one correction.
+
         Raises:
             CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
         """
+        if frame.faces:
+            trace = self._look_at_faces(frame, view, before, detail)
+        else:
+            trace = self._look(frame, view, before, detail)
+        return trace if held is None else holding(trace, held)
+
+    def _look_at_faces(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
+        """One look through each face that shows enough of the scan, as one."""
+        looks, failure = list[StageTrace](), None
+        for face, of_face in zip(frame.faces, view.faces, strict=True):
+            turn = transform(face.face_from_camera, np.zeros(3))
+            try:
+                look = self._look(frame.through(face), of_face, turn @ before, detail and not looks)
+            except CalibrationError as error:
+                failure = error
+                continue
+            looks.append(seen_by_camera(look, face.face_from_camera))
+        if not looks and failure is not None:
+            raise failure
+        return joined(looks, self.match_error_limit_px)
+
+    def _look(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         clock, camera = Clock(self.device), self.camera(frame)
         lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
         if lidar.occupied.sum() < FEWEST_CELLS:
@@ -139,7 +171,7 @@ class Stage:
                 "train its weights again if this happens on every frame."
             )
         information = None if output.pose.information is None else output.pose.information[0].double().cpu().numpy()
-        trace = StageTrace(
+        return StageTrace(
             self.number,
             self.range,
             camera,
@@ -152,7 +184,6 @@ class Stage:
             float(expected_error(output.field, inputs.cells[0])[0]),
             matches_of(output.field, inputs.cells[0]),
         )
-        return trace if held is None else holding(trace, held)
 
     def is_settled(self, correction: Transform) -> bool:
         """Whether the next stage can take over: what a look has corrected is within that stage's range."""

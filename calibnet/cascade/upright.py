@@ -78,7 +78,11 @@ class Upright:
         image, camera = turned_by_quarters(frame.image, frame.camera, self.quarters % 4)
         if self.rest:
             image, camera = turned(image, camera, rotation_from_vector([0.0, 0.0, self.rest]))
-        return replace(frame, image=image, camera=camera, camera_from_lidar=self.extrinsic(frame.camera_from_lidar))
+        faces = tuple(
+            face._replace(face_from_camera=face.face_from_camera @ self.rotation.T) for face in frame.faces
+        )  # which stand level as they are
+        extrinsic = self.extrinsic(frame.camera_from_lidar)
+        return replace(frame, image=image, camera=camera, camera_from_lidar=extrinsic, faces=faces)
 
     def undo(self, trace: CascadeTrace, initial: Extrinsic) -> CascadeTrace:
         """A run on the upright frame as one on the real frame, which started from ``initial``."""
@@ -123,7 +127,7 @@ class Upright:
             after=back @ stage.after,
             correction=back @ stage.correction @ back.T,
             information=None if stage.information is None else self._real_matrix(stage.information),
-            upright=self.rotation,
+            upright=self.rotation if stage.upright is None else stage.upright @ self.rotation,
             last_before=None if stage.last_before is None else back @ stage.last_before,
         )
 

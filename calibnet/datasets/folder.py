@@ -6,11 +6,14 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
-from calibnet.datasets.frame import Original
 from calibnet.datasets.images import read_image
-from calibnet.datasets.paired import FrameFiles, PairedSequence, Picture, files_by_stem, require_folder
+from calibnet.datasets.lens import LOOKED_AT, Lens, Picture
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
 from calibnet.datasets.scans import SCAN_SUFFIXES
@@ -18,13 +21,11 @@ from calibnet.datasets.selection import spread
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.known import Known, parse_angle, parse_axes, parse_length
-from calibnet.geometry.rectification import Rectification, central, said_of, without_black
+from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
-LOOKED_AT = 3
-"""Pictures of a drive that tell which part of them a fisheye fills."""
 PERIOD = 0.1
 """Seconds between two frames: a plain folder records no time."""
 LARGEST_NUMBER = 10**10
@@ -67,39 +68,33 @@ class Folder(PairedSequence):
         pairing = pair(images, scans, max_time_difference)
         self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
         assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None
-        self._rectification = rectification(self.calibration.camera, list(images.values()))
-        pinhole, extrinsic = self._rectification.pinhole, self.calibration.camera_from_lidar
-        remarks = [*of_lens(self.calibration.camera), *of_camera(pinhole), *of_extrinsic(extrinsic)]
+        real, extrinsic = self.calibration.camera, self.calibration.camera_from_lidar
+        remarks = [*of_lens(real), *of_camera(central(real).pinhole), *of_extrinsic(extrinsic)]
         refuse(remarks, f"Calibration {calibration_path(root)}")
+        self._lens = Lens.of(real, extrinsic, looked_at(list(images.values()), real))
         self.cloud_columns = self.calibration.cloud_columns
         self.known = known_of(self.calibration, calibration_path(root))
-        self._fixed = Calibration(pinhole.matrix, extrinsic)
+        self._fixed = Calibration(self._lens.pinhole.matrix, extrinsic)
         files = _frames(pairing.pairs)
         name = root.resolve().name
         super().__init__(f"folder/{name}", name, files)
-        self.notes = (*pairing.notes, *said_of(self._rectification))
+        self.notes = (*pairing.notes, *self._lens.notes)
 
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
 
     def _picture(self, files: FrameFiles) -> Picture:
-        path, camera = files.needed.image, self._rectification.camera
-        image = read_image(path, (camera.width, camera.height))
-        if camera.is_pinhole:
-            return Picture(image)
-        return Picture(self._rectification(image), Original(image, camera))
+        camera = self._lens.camera
+        return self._lens(read_image(files.needed.image, (camera.width, camera.height)))
 
 
-def rectification(camera: CameraModel, images: list[Path]) -> Rectification:
-    """How pictures of a camera are rectified; some of a fisheye's are looked at, which may fill a circle only."""
-    middle = central(camera)
-    if camera.model in ("plumb_bob", "rational_polynomial"):
-        return middle
-    pictures = []
-    for position in spread(len(images), LOOKED_AT):
+def looked_at(images: list[Path], camera: CameraModel) -> list[NDArray[np.uint8]]:
+    """Some pictures from all over a drive, of those that can be read; none of a pinhole's."""
+    pictures = list[NDArray[np.uint8]]()
+    for position in spread(len(images), 0 if camera.is_pinhole else LOOKED_AT):
         with suppress(DatasetError):
             pictures.append(read_image(images[position], (camera.width, camera.height)))
-    return without_black(middle, pictures) if pictures else middle
+    return pictures
 
 
 def calibration_path(root: Path) -> Path:

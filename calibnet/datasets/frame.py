@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.plausibility import Implausible
-from calibnet.geometry import PinholeCamera
+from calibnet.geometry import PinholeCamera, transform
 from calibnet.geometry.camera_model import CameraModel
-from calibnet.geometry.types import Extrinsic
+from calibnet.geometry.types import Extrinsic, Rotation
 
 
 class Original(NamedTuple):
@@ -20,6 +20,14 @@ class Original(NamedTuple):
 
     image: NDArray[np.uint8]
     camera: CameraModel
+
+
+class Face(NamedTuple):
+    """What a pinhole camera in the place of a wide lens sees: ``[H, W, 3]`` uint8 RGB, and how it is turned."""
+
+    image: NDArray[np.uint8]
+    camera: PinholeCamera
+    face_from_camera: Rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +45,7 @@ class Frame:
         source: the image's path (or a description), to name in messages.
         remarks: what is unlikely about it, though some sensor may be so: the first suspects when it does not fit.
         original: the picture before it was rectified; None where it was rectified already.
+        faces: of a lens that is wider than a pinhole, which are calibrated by instead of ``image``, its middle.
     """
 
     index: int
@@ -48,6 +57,20 @@ class Frame:
     source: str = ""
     remarks: tuple[Implausible, ...] = ()
     original: Original | None = field(default=None, repr=False)
+    faces: tuple[Face, ...] = field(default=(), repr=False)
+
+    def through(self, face: Face) -> Frame:
+        """What one of its faces sees, as a frame of its own."""
+        turned = transform(face.face_from_camera, (0.0, 0.0, 0.0)) @ self.camera_from_lidar
+        image, camera = face.image, face.camera
+        return replace(self, image=image, camera=camera, camera_from_lidar=turned, original=None, faces=())
+
+    def changed(self, change: Callable[[Frame], Frame]) -> Frame:
+        """A change of a frame, and the same change of the picture of each face."""
+        faces = [(face, change(self.through(face))) for face in self.faces]
+        return replace(
+            change(self), faces=tuple(face._replace(image=new.image, camera=new.camera) for face, new in faces)
+        )
 
     @property
     def as_taken(self) -> Original:

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.datasets.bin_clouds import KITTI
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.frame import Frame, Original
+from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import read_image
+from calibnet.datasets.lens import Picture
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
 from calibnet.datasets.scans import ending, full_scale_of, read_raw, read_scan
 from calibnet.datasets.selection import spread
@@ -60,13 +60,6 @@ class FrameFiles:
         raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
 
 
-class Picture(NamedTuple):
-    """A rectified image ``[H, W, 3]`` RGB, and the picture it was made from, if it was made from one."""
-
-    image: NDArray[np.uint8]
-    original: Original | None = None
-
-
 class PairedSequence(ABC):
     """A `calibnet.datasets.frame.Sequence` of image and scan files.
 
@@ -107,7 +100,7 @@ class PairedSequence(ABC):
         files = self.files[position]
         image_path, scan_path = files.needed
         calibration = self._calibration(files)
-        image, original = self._picture(files)
+        image, original, faces = self._picture(files)
         points = read_scan(scan_path, self.cloud_columns, self._full_scale)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
@@ -123,6 +116,7 @@ class PairedSequence(ABC):
             source=str(image_path),
             remarks=remarks,
             original=original,
+            faces=faces,
         )
 
     @cached_property

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from calibnet.alignment import gather
-from calibnet.alignment.evidence import Evidence, Term
+from calibnet.alignment.evidence import Evidence, InRig, Term
 from calibnet.alignment.solve import align
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.rig import RigCamera
@@ -26,26 +25,9 @@ from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
 from calibnet.geometry.known import Held, inverse
 from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
-from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
+from calibnet.geometry.types import Extrinsic, Matrix6, Vector6
 from calibnet.trace import DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import BadFrame
-
-
-@dataclass(frozen=True)
-class InRig:
-    """The evidence of a camera's frame, for corrections of the rig it is on; see `calibnet.alignment.Evidence`."""
-
-    evidence: Term
-    camera_from_rig: Transform
-
-    def __call__(self, correction: Transform) -> tuple[float, Vector6]:
-        """Value and gradient ``[6]`` for a correction of the rig's pose, 4x4."""
-        rotation = self.camera_from_rig[:3, :3]
-        of_camera = self.camera_from_rig @ correction @ invert(self.camera_from_rig)
-        value, gradient = self.evidence(of_camera)
-        pivot = rotation @ correction[:3, 3] + self.camera_from_rig[:3, 3]  # that the rig turns about
-        torque = gradient[3:] + np.cross(of_camera[:3, 3] - pivot, gradient[:3])
-        return value, np.concatenate([rotation.T @ gradient[:3], rotation.T @ torque])
 
 
 def joined(

@@ -34,7 +34,7 @@ class Altered:
 
     def __getitem__(self, position: int) -> Frame:
         """Read and alter one frame."""
-        return self.alter(self.sequence[position])
+        return self.sequence[position].changed(self.alter)
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[position] for position in range(len(self)))

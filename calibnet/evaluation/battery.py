@@ -160,7 +160,7 @@ def run_battery(
         for position in range(len(sequence)):
             frame = sequence[position]
             for corruption in [PLAIN, *faults(sequence, position)]:
-                altered = corruption.alter(frame)
+                altered = corruption.put(frame)
                 farther = MiscalibrationRange(
                     corruption.farther * range_.rotation_deg, corruption.farther * range_.translation_m
                 )

@@ -7,7 +7,7 @@ would start from, the guess, does not know of the fault.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,10 @@ class Corruption:
     alter: Alteration
     middle: bool = True
     farther: float = 1.0
+
+    def put(self, frame: Frame) -> Frame:
+        """A frame with the fault; of a wide lens the middle alone, as faults are of one picture."""
+        return self.alter(replace(frame, faces=()))
 
 
 def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame]) -> Iterator[Corruption]:

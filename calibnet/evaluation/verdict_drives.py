@@ -49,7 +49,7 @@ class Faulty:
             return frame
         for fault in self._faults(number):
             if (fault.name, fault.strength) == (self.fault.name, self.fault.strength):
-                return fault.alter(frame)
+                return fault.put(frame)
         raise DatasetError(f"Frame {position} of {self.sequence.name} cannot have the fault {self.fault.name}.")
 
     def _faults(self, number: int) -> Iterable[Corruption]:

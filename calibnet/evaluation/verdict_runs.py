@@ -125,7 +125,7 @@ class RunStream:
         frame, first = self.read(which, position), self.cascade.stages[0].range
         range_ = MiscalibrationRange(fault.farther * first.rotation_deg, fault.farther * first.translation_m)
         guess = sample_miscalibration(range_, generator) @ frame.camera_from_lidar
-        return Drawn(sequence.name, fault, fault.alter(frame), guess)
+        return Drawn(sequence.name, fault, fault.put(frame), guess)
 
     def _fault(self, which: int, position: int, generator: np.random.Generator) -> Corruption:
         """Any fault that this frame can have, each name as often as the others."""

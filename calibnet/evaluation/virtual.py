@@ -75,6 +75,7 @@ class VirtualRig:
             camera=small,
             camera_from_lidar=transform(rotation, np.zeros(3)) @ frame.camera_from_lidar,
             original=None,
+            faces=(),
         )
         return thinned(2)(seen) if self.thinned else seen
 

@@ -79,7 +79,7 @@ def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> t
         return np.inf if np.isnan(value) else value
 
     given = measured(frame)
-    tried = [(measured(attempt.undo(frame)), attempt) for attempt in search.attempts]
+    tried = [(measured(frame.changed(attempt.undo)), attempt) for attempt in search.attempts]
     least, best = min(tried, key=lambda pair: pair[0] * pair[1].handicap)
     if not least * best.handicap < search.share * given or not least < search.most:
         return ()

@@ -38,7 +38,7 @@ class Validation:
         for sequence in sequences:
             for frame in sequence:
                 camera = stage.camera(frame)  # kept at the size the stage wants, which is smaller
-                small = replace(frame, image=resize_image(frame.image, camera), camera=camera)
+                small = replace(frame, image=resize_image(frame.image, camera), camera=camera, faces=())
                 deltas = [sample_miscalibration(stage.range, generator) for _ in range(repeats)]
                 self.cases += [(small, delta @ frame.camera_from_lidar) for delta in deltas]
 

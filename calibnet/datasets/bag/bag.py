@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,14 +25,15 @@ from calibnet.datasets.bag.topics import found_topic, info_of
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
 from calibnet.datasets.calibration_files.frames import camera_from_lidar
 from calibnet.datasets.cloud_table import CloudError
-from calibnet.datasets.frame import Frame, Original
+from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import ImageError
+from calibnet.datasets.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
 from calibnet.datasets.scans import clean_points, full_scale_of, points_of
 from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
-from calibnet.geometry.rectification import central, said_of
+from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
 
 
@@ -99,20 +101,25 @@ class Bag:
                 f"Bag {self._bag} holds no CameraInfo of {self.image}; give the camera's calibration with --guess "
                 "FILE, or its topic with --info."
             )
-        self._rectification = central(camera)
         frames = FrameChoice(
             options.frames.camera or str(first_image.header.frame_id).lstrip("/"),
             options.frames.lidar or str(first_scan.header.frame_id).lstrip("/"),
         )
         extrinsic = None if guess is None else guess.camera_from_lidar
         self.camera_from_lidar = self._of_transforms(frames) if extrinsic is None else extrinsic
-        remarks = [*of_lens(camera), *of_camera(self._rectification.pinhole), *of_extrinsic(self.camera_from_lidar)]
+        remarks = [*of_lens(camera), *of_camera(central(camera).pinhole), *of_extrinsic(self.camera_from_lidar)]
         refuse(remarks, f"Calibration of {self.image} in {self._bag}")
+        looked_at = list[NDArray[np.uint8]]()
+        with suppress(ImageError):  # each frame says it of itself
+            looked_at = [picture_of(first_image)]
+        if camera.is_pinhole or any(one.shape[:2] != (camera.height, camera.width) for one in looked_at):
+            looked_at = []
+        self._lens = Lens.of(camera, self.camera_from_lidar, looked_at)
         self.name = f"bag/{Path(self._bag.paths[0]).stem}"
         self.rig = f"{self.image}, {self.points}"
         self._full_scale = full_scale_of(self._intensities(scans))
         self.moments, notes = self._moments(images, scans)
-        self.notes = (*notes, *said_of(self._rectification))
+        self.notes = (*notes, *self._lens.notes)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -130,7 +137,7 @@ class Bag:
             IndexError: there is no such position.
         """
         position = range(len(self))[position]
-        moment, camera = self.moments[position], self._rectification.camera
+        moment, camera = self.moments[position], self._lens.camera
         where = f"{self._bag}, {self.image} at {moment.image.seconds:.3f} s"
         try:
             taken = picture_of(self._bag.message(self.image, moment.image.recorded).content)
@@ -142,18 +149,19 @@ class Bag:
                 f"{camera.width}x{camera.height}; give the topic of the images as they are calibrated."
             )
         points = np.concatenate([self._scan(scan) for scan in moment.scans])
-        original = None if camera.is_pinhole else Original(taken, camera)
+        image, original, faces = self._lens(taken)
         remarks = refuse([bit_depth(taken)], f"Image of {where}") + refuse(of_scan(points), f"Scan of {where}")
         return Frame(
             index=position,
             timestamp=moment.image.seconds - self.moments[0].image.seconds,
-            image=taken if original is None else self._rectification(taken),
+            image=image,
             points=points,
-            camera=self._rectification.pinhole,
+            camera=self._lens.pinhole,
             camera_from_lidar=self.camera_from_lidar,
             source=where,
             remarks=remarks,
             original=original,
+            faces=faces,
         )
 
     def _scan(self, at: Stamped) -> NDArray[np.float32]:

@@ -31,14 +31,21 @@ def test_a_rectified_picture_is_the_picture_as_it_was_taken(write_layout):
     assert frame.as_taken.camera.is_pinhole
 
 
-def test_the_user_is_told_how_much_of_a_wide_lens_is_used(write_layout, write_calibration):
+def test_a_wide_lens_has_faces_and_the_user_is_told(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(**FISHEYE))
-    assert layout.open().notes == ()
+    narrow = layout.open()
+    assert narrow.notes == () and narrow[0].faces == ()
     matrix = [[20.0, 0, 31.5], [0, 20.0, 23.5], [0, 0, 1]]
     layout.calibration.write_text(write_calibration(**FISHEYE | {"camera_matrix": matrix, "distortion": [0.0] * 4}))
-    (note,) = layout.open().notes
-    assert note == "The lens sees 183° across; the middle 110° are used, and shown is the whole picture."
+    wide = layout.open()
+    (note,) = wide.notes
+    assert note.startswith("The lens is wide: it is looked through by 3 pinhole cameras in its place (")
+    frame = wide[0]
+    assert len(frame.faces) == 3
+    assert_array_equal(frame.as_taken.image, layout.pixels[0])
+    for face in frame.faces:
+        assert face.image.shape == (face.camera.height, face.camera.width, 3)
 
 
 def ros(layout) -> str:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from calibnet.alignment.evidence import InRig
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets.rig import RigCamera
 from calibnet.drive.consensus import Consensus
-from calibnet.drive.rig import InRig, joined
+from calibnet.drive.rig import joined
 from calibnet.geometry import RANGES, invert, miscalibration, pose_error, rotation_from_vector, transform
 from calibnet.geometry.known import Known, inverse
 from calibnet.geometry.se3 import adjoint, pose_from_vector, pose_vector
