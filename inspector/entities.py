@@ -71,6 +71,10 @@ LEGEND_CERTAINTY = "legend/certainty"
 
 PICTURE = "picture"
 """Of a scale: what its stage saw, under the maps; see `of_scale`."""
+RIG = "rig/solved"
+"""Recordings of several cameras: what was found of each."""
+RIG_JSON = "rig_json"
+"""Component of it: a JSON object as text, see `inspector.read.rig`."""
 
 TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"
@@ -79,6 +83,12 @@ VALIDATION = "validation"
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 """The error curves and their units."""
+
+
+def camera_of_rig(name: str) -> str:
+    """Prefix of what belongs to one of several cameras."""
+    escaped = "".join(one if one.isalnum() or one in "-_" else f"\\{one}" for one in name)
+    return f"cameras/{escaped}"
 
 
 def overlay_stage(number: int) -> str:

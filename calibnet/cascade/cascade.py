@@ -14,7 +14,7 @@ from calibnet.cascade.stage import Stage, load_stage
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.datasets.rig import RigCamera
-from calibnet.drive.rig import solve_rig
+from calibnet.drive.rig import RigEstimate, solve_rig
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
@@ -225,7 +225,8 @@ class Cascade:
         cameras: Sequence[RigCamera],
         initial: Extrinsic,
         observer: Callable[[int, int], None] | None = None,
-    ) -> DriveEstimate:
+        tolerance: Matrix6 | None = None,
+    ) -> RigEstimate:
         """Correct the one pose of a rig whose cameras are known relative to each other.
 
         See `calibnet.drive.rig.solve_rig`.
@@ -234,6 +235,8 @@ class Cascade:
             cameras: of the rig, each with its frames.
             initial: ``rig_from_lidar`` to start from, 4x4; what is known beforehand is known of it.
             observer: as of `calibrate_drive`.
+            tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, the same in all directions; None for a
+                rigid rig.
 
         Returns:
             The estimate; its ``camera_from_lidar`` is ``rig_from_lidar``, and its covariance in the rig's frame.
@@ -242,17 +245,24 @@ class Cascade:
             CalibrationError: no frame of any camera could be calibrated.
             DatasetError: none could be read.
         """
-        searched, prepared_cameras = self.stages[0].range, []
-        for camera in cameras:
-            upright = Upright.of(camera.camera_from_rig @ initial, searched)
-            frames, turned = PreparedFrames(camera.frames, upright), upright.extrinsic(camera.camera_from_rig)
-            prepared_cameras.append(RigCamera(camera.name, frames, turned))
+        searched = self.stages[0].range
+        upright = [Upright.of(camera.camera_from_rig @ initial, searched) for camera in cameras]
+        turned = [
+            RigCamera(one.name, PreparedFrames(one.frames, turn), turn.extrinsic(one.camera_from_rig))
+            for one, turn in zip(cameras, upright, strict=True)
+        ]
         held = self.known.about(initial) if self.known else None
-        estimate = solve_rig(self.stages, prepared_cameras, initial, self.common, observer, held)
+        estimate = solve_rig(self.stages, turned, initial, self.common, observer, held, tolerance)
         if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
             stages = [*wider, *self.stages]
-            estimate = solve_rig(stages, prepared_cameras, initial, self.common, observer, held)
-        verdict = judge_drive(estimate, initial, searched, self.coefficients.doubt_of(self.stages[-1].range))
+            estimate = solve_rig(stages, turned, initial, self.common, observer, held, tolerance)
+        widening = self.coefficients.widening
+        found = tuple(
+            turn.undo_camera(replace(one, covariance=widening * one.covariance))
+            for one, turn in zip(estimate.cameras, upright, strict=True)
+        )
+        estimate = replace(estimate, covariance=widening * estimate.covariance, cameras=found)
+        verdict = judge_drive(estimate, initial, searched, self.coefficients.drive_doubt_of(self.stages[-1].range))
         return replace(estimate, verdict=verdict)
 
     def _run(

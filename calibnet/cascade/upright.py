@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
+from calibnet.drive.rig import CameraEstimate
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
@@ -117,6 +118,19 @@ class Upright:
             verdict=verdict,
             looks=looks,
             looked_from=looked_from,
+        )
+
+    def undo_camera(self, found: CameraEstimate) -> CameraEstimate:
+        """What was found of the upright camera of a rig, of the real camera."""
+        if not self:
+            return found
+        alone = None if found.alone is None else np.kron(np.eye(2), self.rotation).T @ found.alone
+        return replace(
+            found,
+            camera_from_lidar=self._real_extrinsic(found.camera_from_lidar),
+            covariance=self._real_matrix(found.covariance),
+            alone=alone,
+            alone_covariance=None if found.alone_covariance is None else self._real_matrix(found.alone_covariance),
         )
 
     def _real_stage(self, stage: StageTrace) -> StageTrace:

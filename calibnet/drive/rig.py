@@ -2,13 +2,16 @@
 
 Every camera's frames agree on a correction of that camera, as those of a drive do. What they agree on, with its
 uncertainty and with what the networks get wrong in all frames of one camera alike, is one measurement of the rig's
-pose; their normal equations add up in the rig's frame. Edges of all cameras are aligned by that one pose in the end.
+pose (`calibnet.drive.rig_pose`); their normal equations add up in the rig's frame. Edges of all cameras are aligned by
+that one pose in the end.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,37 +23,49 @@ from calibnet.datasets.rig import RigCamera
 from calibnet.datasets.selection import spread
 from calibnet.drive.consensus import FARTHEST_ROTATION_DEG, FARTHEST_TRANSLATION_M, Consensus
 from calibnet.drive.convergence import Due
-from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, Looking, agree
+from calibnet.drive.rig_pose import Said, joined
+from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, Looking, agree, said
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
-from calibnet.geometry.known import Held, inverse
+from calibnet.geometry.known import Held
 from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
-from calibnet.geometry.types import Extrinsic, Matrix6, Vector6
-from calibnet.trace import DriveEstimate, Estimate, StageTrace
+from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
+from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
 
-def joined(
-    cameras: Sequence[RigCamera], agreed: Sequence[Consensus], common: Matrix6, held: Held | None, rig: Extrinsic
-) -> tuple[Vector6, Matrix6]:
-    """The correction of a rig's pose that its cameras agree on, and its covariance.
+@dataclass(frozen=True, eq=False)
+class CameraEstimate:
+    """What was found of one camera of a rig.
 
-    Args:
-        cameras: of the rig.
-        agreed: what the frames of each agree on, relative to where it is under ``rig``.
-        common: covariance of what the networks get wrong in all frames of one camera alike.
-        held: what is known of the rig's pose beforehand.
-        rig: ``rig_from_lidar`` that is corrected.
+    Attributes:
+        name: of the camera.
+        camera_from_lidar: 4x4.
+        covariance: ``[6, 6]`` of it, in the camera's frame.
+        frames: that went into it; without any it is where the rig says.
+        match_error_px: the median error that the last look expects of its matches; not a number without frames.
+        alone: ``[6]``, from there to where its own frames alone say that it is; None without frames.
+        alone_covariance: ``[6, 6]`` of what they say.
     """
-    information, moment = np.zeros((6, 6)), np.zeros(6)
-    for camera, consensus in zip(cameras, agreed, strict=True):
-        mean, covariance = consensus.agreed()
-        to_camera = adjoint(camera.camera_from_rig)
-        firm = to_camera.T @ inverse(covariance + common) @ to_camera
-        of_rig = invert(camera.camera_from_rig) @ pose_from_vector(mean) @ camera.camera_from_rig
-        information, moment = information + firm, moment + firm @ pose_vector(of_rig)
-    mean = np.asarray(np.linalg.solve(information, moment), np.float64)
-    return (mean, inverse(information)) if held is None else held.fused(mean, information, rig)
+
+    name: str
+    camera_from_lidar: Extrinsic = field(repr=False)
+    covariance: Matrix6 = field(repr=False)
+    frames: int
+    match_error_px: float = math.nan
+    alone: Vector6 | None = field(default=None, repr=False)
+    alone_covariance: Matrix6 | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class RigEstimate(DriveEstimate):
+    """The pose of a rig; its ``camera_from_lidar`` is ``rig_from_lidar``, and its covariance in the rig's frame.
+
+    Attributes:
+        cameras: of the rig, in their order.
+    """
+
+    cameras: tuple[CameraEstimate, ...] = field(repr=False, default=())
 
 
 def solve_rig(
@@ -60,7 +75,8 @@ def solve_rig(
     common: Matrix6,
     observer: Callable[[int, int], None] | None = None,
     held: Held | None = None,
-) -> DriveEstimate:
+    tolerance: Matrix6 | None = None,
+) -> RigEstimate:
     """Correct ``rig_from_lidar``, as `calibnet.drive.solve.solve_drive` does with one camera.
 
     A camera of whose frames none can be used is left out, and its frames count as skipped.
@@ -72,6 +88,7 @@ def solve_rig(
         common: covariance of what the networks get wrong in all frames of one camera alike.
         observer: called before each frame is read, with the number of frames read so far and to be read in all.
         held: what is known of the rig's pose beforehand.
+        tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for a rigid rig.
 
     Raises:
         CalibrationError: no frame of any camera could be calibrated.
@@ -80,14 +97,17 @@ def solve_rig(
     some = [spread(len(camera.frames), FRAMES_UNTIL_LAST_LOOK) for camera in cameras]
     everything = [list(range(len(camera.frames))) for camera in cameras]
     total, number = LOOKS * len(stages) * sum(map(len, some)) + sum(map(len, everything)), itertools.count()
-    skipped, terms = list[BadFrame](), list[Term]()
+    skipped, terms, looks = list[BadFrame](), list[Term](), list[DriveLook]()
+    of_camera: dict[str, list[DriveLook]] = {camera.name: [] for camera in cameras}
     rig = initial
+    places = {camera.name: camera.camera_from_rig for camera in cameras}
 
-    def look(stage: Looking, positions: list[list[int]], last: bool) -> tuple[list[RigCamera], list[Consensus]]:
-        """What the frames of each camera agree on, of those that have any that can be used."""
-        used, found = list[RigCamera](), list[Consensus]()
+    def look(stage: Looking, positions: list[list[int]], last: bool) -> list[Said]:
+        """What the frames of each camera say, of those that have any that can be used."""
+        found = list[Said]()
         failure: CalibnetError | None = None
         for camera, chosen in zip(cameras, positions, strict=True):
+            place = places[camera.name]
 
             def read(position: int, camera: RigCamera = camera) -> Frame:
                 if observer is not None:
@@ -99,47 +119,90 @@ def solve_rig(
             def taken_in(
                 position: int,
                 frame: Frame,
-                _: StageTrace,
+                trace: StageTrace,
                 consensus: Consensus,
                 camera: RigCamera = camera,
+                place: Transform = place,
                 due: Due = to_align,
             ) -> None:
+                one = said(frame, position, trace)
+                of_camera[camera.name].append(one)
+                looks.append(in_rig(one, place))
                 if aligns and due.reached(position):
-                    terms.append(InRig(gather(frame, consensus.before), camera.camera_from_rig))
+                    terms.append(InRig(gather(frame, consensus.before), place))
 
             try:
-                before = camera.camera_from_rig @ rig
-                consensus = agree(stage, read, chosen, before, taken_in if last else None, skipped if last else None)
+                consensus = agree(
+                    stage, read, chosen, place @ rig, taken_in if last else None, skipped if last else None
+                )
             except (CalibrationError, DatasetError) as error:
                 failure = error
                 continue
-            used.append(camera)
-            found.append(consensus)
-        if failure is not None and not used:
+            found.append(Said.of(camera, consensus, common))
+        if failure is not None and not found:
             raise failure
-        return used, found
+        return found
 
     aligns = is_finest(stages[-1].range)
     for stage in stages:
         for _ in range(LOOKS):
-            mean, _covariance = joined(*look(stage, some, last=False), common, held, rig)
-            rig = pose_from_vector(mean) @ rig
-    used, agreed = look(stages[-1], everything, last=True)
-    mean, covariance = joined(used, agreed, common, held, rig)
-    frames = sum(map(len, agreed))
-    of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, frames)
+            told = look(stage, some, last=False)
+            rig = pose_from_vector(joined(told, rig, held, tolerance)[0]) @ rig
+            places |= {one.camera.name: one.placed(rig, tolerance) for one in told}
+    told = look(stages[-1], everything, last=True)
+    mean, covariance = joined(told, rig, held, tolerance)
+    of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
     if aligns:
         too_far = (
             of_networks.rotation_deg > FARTHEST_ROTATION_DEG
             or of_networks.translation_cm > 100 * FARTHEST_TRANSLATION_M
         )
         mean, covariance = align(() if too_far else [Evidence((term,)) for term in terms], mean, covariance)
-    found = Estimate(pose_from_vector(mean) @ rig, covariance, frames)
-    return DriveEstimate(
+    found = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
+    return RigEstimate(
         found.camera_from_lidar,
         found.covariance,
-        frames,
-        ((frames, found),),
+        found.frames,
+        ((found.frames, found),),
         skipped=tuple(skipped),
         networks=of_networks if aligns else None,
+        looks=tuple(looks),
+        looked_from=rig,
+        cameras=tuple(_of_cameras(cameras, told, found, of_camera, tolerance)),
     )
+
+
+def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:
+    """What a camera's look says, of the rig that it is on."""
+    offset = pose_vector(invert(camera_from_rig) @ pose_from_vector(look.offset) @ camera_from_rig)
+    to_camera = adjoint(camera_from_rig)
+    information = None if look.information is None else to_camera.T @ look.information @ to_camera
+    return replace(look, offset=offset, information=information)
+
+
+def _of_cameras(
+    cameras: Sequence[RigCamera],
+    told: Sequence[Said],
+    rig: Estimate,
+    looks: dict[str, list[DriveLook]],
+    tolerance: Matrix6 | None,
+) -> Iterator[CameraEstimate]:
+    """What was found of each camera."""
+    said_by = {one.camera.name: one for one in told}
+    for camera in cameras:
+        one = said_by.get(camera.name)
+        if one is None:
+            to_camera, wide = adjoint(camera.camera_from_rig), 0.0 if tolerance is None else tolerance
+            there = camera.camera_from_rig @ rig.camera_from_lidar
+            yield CameraEstimate(camera.name, there, to_camera @ rig.covariance @ to_camera.T + wide, 0)
+            continue
+        there = one.placed(rig.camera_from_lidar, tolerance) @ rig.camera_from_lidar
+        yield CameraEstimate(
+            camera.name,
+            there,
+            one.spread(rig.covariance, tolerance),
+            len(looks[camera.name]),
+            float(np.median([look.match_error_px for look in looks[camera.name]])),
+            pose_vector(one.camera_from_lidar @ invert(there)),
+            one.covariance,
+        )

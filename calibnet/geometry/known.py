@@ -147,6 +147,39 @@ class Held:
         return np.concatenate([back @ delta[:3, 3], euler_xyz(back @ delta[:3, :3] @ back.T)])
 
 
+@dataclass(frozen=True)
+class Tolerance:
+    """How well a camera's place on its rig is known, one standard deviation an axis.
+
+    Attributes:
+        rotation_rad: about each axis.
+        translation_m: along each axis.
+    """
+
+    rotation_rad: float
+    translation_m: float
+
+    @property
+    def covariance(self) -> Matrix6:
+        """``[6, 6]`` of ``(translation m, rotation rad)``."""
+        return np.diag([self.translation_m**2] * 3 + [self.rotation_rad**2] * 3)
+
+    def __str__(self) -> str:
+        return f"{np.degrees(self.rotation_rad):.3g}° / {100 * self.translation_m:.3g} cm"
+
+
+def parse_tolerance(text: str) -> Tolerance:
+    """An angle and a length with a stroke between them, for instance ``0.5deg/2cm``.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    angle, stroke, length = text.partition("/")
+    if not stroke:
+        raise ConfigError(f"{text!r} is not an angle and a length with their units, for instance 0.5deg/2cm.")
+    return Tolerance(parse_angle(angle), parse_length(length))
+
+
 def inverse(matrix: Matrix6) -> Matrix6:
     """An information of a covariance, and the other way round."""
     return np.asarray(np.linalg.inv(matrix), np.float64)

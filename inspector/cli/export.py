@@ -13,12 +13,16 @@ from calibnet.runtime.writing import Kind
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
 from inspector.cli.output import overwrite_option, say, write
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
+from inspector.cli.recordings import RECORDING, open_run
 from inspector.export.registry import FORMATS, export_as
 
 if TYPE_CHECKING:
-    from inspector.export.exported import Exported
+    from inspector.export.exported import Exported, FrameNames
 
+SUFFIXES = {"json": "json", "koide3": "json", "urdf": "urdf"} | dict.fromkeys(
+    ("ros", "yaml", "opencv", "autoware"), "yaml"
+)
+"""Of the files of a rig's cameras, by format."""
 ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
 
@@ -30,7 +34,13 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default without a drive]")
 @click.option("--drive", is_flag=True, help="The extrinsic of the drive.  [default where it was solved]")
 @click.option("--force", is_flag=True, help="Write it although it is rejected.")
-@click.option("--output", type=OUTPUT_FILE, metavar="FILE", help="Where to write.  [default: stdout]")
+@click.option("--camera", metavar="NAME", help="The camera of a rig.  [default: all, into the folder --output]")
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Where to write; of all cameras of a rig a folder.  [default: stdout]",
+)
 @overwrite_option
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
 @click.option("--lidar-frame", default="lidar", show_default=True, help="ROS name of the LiDAR.")
@@ -49,6 +59,7 @@ def export(
     median: bool,
     drive: bool,
     force: bool,
+    camera: str | None,
     output: Path | None,
     camera_frame: str,
     lidar_frame: str,
@@ -62,6 +73,8 @@ def export(
 
     What is rejected is not written, and the exit code is 1, unless --force is given. What is rejected or cannot be told
     says so on stderr and in the file.
+
+    Of the recording of a rig, --output is a folder in which every camera gets a file of its name; --camera chooses one.
     """
     if (recording is None) == (folder is None):
         raise click.UsageError("Give a recording or --from FOLDER.")
@@ -75,18 +88,58 @@ def export(
             raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
 
     from inspector.export.exported import FrameNames
+    from inspector.read.rig import is_rig
 
     frames = FrameNames(camera_frame, lidar_frame, parent == "lidar")
+    if recording is not None and is_rig(recording):
+        if choices:
+            raise click.UsageError("--frame, --median and --drive are not for rigs: these have one result a camera.")
+        return export_rig(recording, camera, form, force, output, frames)
+    if camera is not None:
+        raise click.UsageError("--camera chooses from the recording of a rig; this has one camera.")
     exported = replace(chosen(recording, folder, frame, drive, median), frames=frames)
+    return put_out(exported, form, force, output)
+
+
+def put_out(exported: Exported, form: str, force: bool, output: Path | None) -> int:
+    """Write a calibration to a file or to stdout, unless it is rejected; returns the exit code."""
     if not may_be_written(exported, force):
         return ExitCode.CHECK_FAILED
     text = export_as(form, exported)
     if output is None:
         click.echo(text, nl=False)
+    elif output.is_dir():
+        raise click.UsageError(f"--output {output} is a folder; name a file.")
     else:
         write(output, text.encode(), Kind.JSON if text.startswith("{") else Kind.EXPORT)
         say(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
     return ExitCode.OK
+
+
+def export_rig(
+    recording: Path, camera: str | None, form: str, force: bool, output: Path | None, frames: FrameNames
+) -> int:
+    """Write one camera of a rig, or all into a folder; each camera's frame has its name. Returns the exit code."""
+    from inspector.read.rig import read_rig
+    from inspector.run.rig_solved import exported_camera
+
+    rig = read_rig(recording)
+    if camera is not None:
+        one = exported_camera(rig.camera(camera))
+        return put_out(replace(one, frames=frames), form, force, output)
+    if output is None:
+        names = ", ".join(one.name for one in rig.solved.cameras)
+        raise click.UsageError(f"Give a folder with --output for all cameras, or one with --camera: {names}.")
+    if output.exists() and not output.is_dir():
+        raise click.UsageError(f"--output {output} is no folder, and the rig has several cameras; or choose --camera.")
+    output.mkdir(parents=True, exist_ok=True)
+    codes = []
+    for solved in rig.solved.cameras:
+        said = re.sub(r"[^A-Za-z0-9_]", "_", solved.name)
+        named = replace(exported_camera(solved), frames=frames._replace(camera=f"{said}_{frames.camera}"))
+        file = output / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', solved.name)}.{SUFFIXES.get(form, 'txt')}"
+        codes.append(put_out(named, form, force, file))
+    return max(codes)
 
 
 def may_be_written(exported: Exported, force: bool) -> bool:

@@ -165,6 +165,7 @@ MISCALIBRATION = MiscalibrationType()
 AXES = QuantityType("AXIS,AXIS", "parse_axes")
 LENGTH = QuantityType("LENGTH", "parse_length")
 ANGLE = QuantityType("ANGLE", "parse_angle")
+TOLERANCE = QuantityType("ANGLE/LENGTH", "parse_tolerance")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""
 METHOD_OPTIONS = (

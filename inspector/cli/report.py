@@ -44,9 +44,14 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
 
 def write_report_of(recording: Path, out: Path, on_stderr: bool = False) -> None:
     """Make the report and say where it is."""
+    from inspector.read.rig import is_rig, read_rig
     from inspector.read.run import read_run
+    from inspector.report.rig import write_rig_report
     from inspector.report.write import write_report
 
+    if is_rig(recording):
+        say(f"Report: {write_rig_report(read_rig(recording), out)}", err=on_stderr)
+        return
     run = read_run(recording)
     if run.warning:
         say(run.warning, err=True)

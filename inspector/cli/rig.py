@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 from calibnet.geometry.types import Transform
 from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES
-from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES
-from inspector.cli.output import JSON_FILE, make_console, overwrite_option, prepare_json, say, write, write_json
+from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES, TOLERANCE
+from inspector.cli.output import JSON_FILE, make_console, prepare_json, say, write, write_json
+from inspector.cli.run import describe_provenance, recording_to
+from inspector.cli.viewing import next_lines, saved_lines, viewing_options
+
+if TYPE_CHECKING:
+    from calibnet.geometry.known import Tolerance
+    from inspector.cli.viewing import Viewing
 
 
 @click.command()
@@ -21,6 +29,12 @@ from inspector.cli.output import JSON_FILE, make_console, overwrite_option, prep
     is_flag=True,
     help="The cameras are known relative to each other, by rig_from_camera in their calibrations or else by the "
     "extrinsics given: one pose for all.",
+)
+@click.option(
+    "--tolerance",
+    type=TOLERANCE,
+    help="As --rigid, but each camera may be off its place on the rig by this, one standard deviation an axis; for "
+    "instance 0.5deg/2cm.",
 )
 @click.option(
     "--miscalibrate",
@@ -41,10 +55,11 @@ from inspector.cli.output import JSON_FILE, make_console, overwrite_option, prep
     metavar="DIR",
     help="Write a calibration.yaml with what was found for each camera there, NAME.yaml; not what is rejected.",
 )
-@overwrite_option
+@viewing_options
 def rig(
     folders: tuple[Path, ...],
     rigid: bool,
+    tolerance: Tolerance | None,
     miscalibration: Transform | None,
     fix: tuple[str, ...] | None,
     prior_translation: float | None,
@@ -54,12 +69,16 @@ def rig(
     weights: Path | None,
     json_file: str | None,
     output: Path | None,
+    viewing: Viewing,
 ) -> int:
     """Calibrate several cameras against one LiDAR.
 
     FOLDER holds cameras/NAME/ for each camera, with images/ and calibration.yaml, and clouds/ for those that have none
     themselves. Or give a plain folder for each camera. Without --rigid each camera is solved on its own, from all its
-    frames; with it all frames of all cameras say where the one rig is.
+    frames; with it all frames of all cameras say where the one rig is, and with --tolerance each camera's besides where
+    it is on the rig.
+
+    The recording shows all cameras side by side; `report` makes a page of it, and `export` files for other tools.
 
     Exits with 0 if everything is accepted, 1 if something is rejected, 4 if something cannot be told.
     """
@@ -67,33 +86,64 @@ def rig(
     from calibnet.geometry.known import Known
     from calibnet.runtime.interruption import StopRequest
     from inspector.export.registry import export_as
+    from inspector.record.recording import RunDescription
+    from inspector.record.rig import record_rig
     from inspector.run.rig import open_rig, solve
     from inspector.run.session import STOPPING, frame_progress
 
+    if rigid and tolerance is not None:
+        raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")
     prepare_json(json_file)
     cameras = open_rig(folders)
-    known = Known.of(fix or (), prior_translation, prior_rotation)
-    cascade = Cascade.load(preset, stages, weights, False, known)
-    with StopRequest(STOPPING) as stop, frame_progress(make_console()) as progress:
-
-        def observer(name: str) -> Callable[[int, int], None]:
-            task = progress.add_task(name, total=None)
-
-            def advance(read: int, total: int) -> None:
-                progress.update(task, completed=read, total=total)
-                if stop.requested:
-                    raise KeyboardInterrupt
-
-            return advance
-
-        solved = solve(cascade, cameras, rigid, miscalibration, observer)
+    name = f"rig/{folders[0].resolve().name}" if len(folders) == 1 else f"rig/{'+'.join(cameras)}"
+    outputs = viewing.outputs(name)
+    outputs.check()
     beside = json_file == "-"
-    for line in solved.lines():
-        say(line, err=beside)
-    write_json(json_file, solved.as_dict())
-    if output is not None:
-        output.mkdir(parents=True, exist_ok=True)
-        for name, exported in solved.exported().items():
-            write(output / f"{name}.yaml", export_as("yaml", exported).encode(), Kind.EXPORT)
-            say(f"Saved {output / f'{name}.yaml'}.", err=beside)
+    with recording_to(outputs):
+        known = Known.of(fix or (), prior_translation, prior_rotation)
+        cascade = Cascade.load(preset, stages, weights, False, known)
+        for camera, folder in cameras.items():
+            for note in folder.notes:
+                say(f"{camera}: {note}", err=True)
+        with StopRequest(STOPPING) as stop, frame_progress(make_console()) as progress:
+
+            def observer(name: str) -> Callable[[int, int], None]:
+                task = progress.add_task(name, total=None)
+
+                def advance(read: int, total: int) -> None:
+                    progress.update(task, completed=read, total=total)
+                    if stop.requested:
+                        raise KeyboardInterrupt
+
+                return advance
+
+            solved = solve(cascade, cameras, rigid, miscalibration, observer, tolerance)
+            options = {
+                "sequence": name,
+                "cameras": ", ".join(cameras),
+                "solved": solved.how,
+                "start": "as given" if miscalibration is None else np.array2string(miscalibration, precision=9),
+                "known": known.words,
+                "stages": ", ".join(map(str, stages)),
+                "preset": preset,
+            }
+            description = RunDescription(name, options, describe_provenance(preset, list(stages), weights))
+            shown = record_rig(outputs.open(), description, solved, cameras, observer("recording"))
+        outputs.complete()
+        *said, verdict = solved.lines()
+        for line in said:
+            say(line, err=beside)
+        write_json(json_file, solved.as_dict())
+        if output is not None:
+            output.mkdir(parents=True, exist_ok=True)
+            for camera, exported in solved.exported().items():
+                write(output / f"{camera}.yaml", export_as("yaml", exported).encode(), Kind.EXPORT)
+                say(f"Saved {output / f'{camera}.yaml'}.", err=beside)
+        if outputs.file is not None:
+            for line in [*saved_lines(outputs, shown), *next_lines(outputs.file, rig=True)]:
+                say(line, err=beside)
+        say(verdict, err=beside)
+        if outputs.page is not None:
+            say(f"Serving at {outputs.page} until Ctrl-C.", err=beside)
+            outputs.wait_while_serving()
     return VERDICT_CODES[solved.word]

@@ -78,11 +78,15 @@ def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return decorated
 
 
-def next_lines(file: Path) -> list[str]:
-    """What can be done with a recording."""
+def next_lines(file: Path, rig: bool = False) -> list[str]:
+    """What can be done with a recording, or with that of a rig."""
     quoted = shlex.quote(str(file))
+    page = f"A page of it: calib-inspect report {quoted} --out report/ --open"
+    if rig:
+        files = f"calib-inspect export {quoted} --format ros --output found/"
+        return [page, f"The result for other tools, a file a camera: {files}  (kitti, opencv, json, yaml)"]
     return [
-        f"A page of it: calib-inspect report {quoted} --out report/ --open",
+        page,
         f"The result for other tools: calib-inspect export {quoted} --format ros  (kitti, opencv, json, yaml)",
     ]
 

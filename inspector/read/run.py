@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.geometry import RANGES, CameraModel, MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
@@ -20,6 +19,7 @@ from calibnet.runtime.reading import parse_json
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
 from inspector.read.file import RecordingFile
+from inspector.read.pictures import OverlayPoints, RecordedPictures
 from inspector.read.understood import RecordingError, camera_of, extrinsic_of, understood
 from inspector.read.verdict import former_verdict, read_verdict
 from inspector.record.contents import Coloring
@@ -77,13 +77,6 @@ class RecordedFrame:
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""
         return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
-
-
-class OverlayPoints(NamedTuple):
-    """Points over an image: ``uv`` ``[N, 2]`` float32, pixel centres at integers; ``rgb`` ``[N, 3]`` uint8."""
-
-    uv: NDArray[np.float32]
-    rgb: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +144,7 @@ class RecordedRun:
 
     def image(self, index: int) -> bytes:
         """The frame's image as JPEG."""
-        with understood(self.path):
-            (blob,) = self._row(entities.IMAGE, index, "EncodedImage:blob")
-            return np.asarray(blob.values[0].values).tobytes()
+        return self._pictures.image(index)
 
     def overlay(self, entity: str, index: int) -> OverlayPoints:
         """The points drawn over the frame's image, far to near.
@@ -162,27 +153,15 @@ class RecordedRun:
             entity: `entities.OVERLAY_MISCALIBRATED`, ``_CORRECTED``, ``_REFERENCE`` or `entities.overlay_stage`.
             index: the frame's number.
         """
-        with understood(self.path):
-            positions, colors = self._row(entity, index, "Points2D:positions", "Points2D:colors")
-            rgba = np.asarray(colors.values).astype(np.uint32)
-            rgb = np.stack([rgba >> shift & 0xFF for shift in (24, 16, 8)], axis=-1).astype(np.uint8)
-            uv = np.asarray(positions.values.flatten()).reshape(-1, 2)
-            if len(uv) != len(rgb):
-                raise ValueError(f"{len(uv)} points of {len(rgb)} colours")
-            return OverlayPoints(uv - np.float32(0.5), rgb)  # Rerun's pixel centres are at x.5
+        return self._pictures.overlay(entity, index)
+
+    @property
+    def _pictures(self) -> RecordedPictures:
+        return RecordedPictures(self._file)
 
     def chunks(self, *paths: str) -> Iterator[Chunk]:
         """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
         return self._file.chunks(*paths)
-
-    def _row(self, entity: str, index: int, *components: str) -> list[Any]:
-        for chunk in self._file.chunks(entity):
-            batch = chunk.to_record_batch()
-            if set(components) <= set(batch.schema.names):
-                found = np.flatnonzero(np.asarray(batch[entities.FRAME]) == index)
-                if found.size:
-                    return [batch[component][int(found[-1])] for component in components]
-        raise RecordingError(f"{self.path} holds no {entity} of frame {index}; choose another frame, or record again.")
 
 
 def read_run(path: Path) -> RecordedRun:

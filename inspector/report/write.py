@@ -35,7 +35,7 @@ def check_folder(folder: Path) -> None:
         with tempfile.TemporaryFile(dir=folder / PICTURES):
             pass
     except OSError as error:
-        raise _cannot_write(error, folder) from None
+        raise cannot_write(error, folder) from None
 
 
 def write_report(run: RecordedRun, folder: Path) -> Path:
@@ -62,7 +62,7 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
         page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
         write_whole(folder / PAGE, page.encode(errors="backslashreplace"), Kind.PAGE)
     except OSError as error:
-        raise _cannot_write(error, folder) from None
+        raise cannot_write(error, folder) from None
     finally:
         claim.release()
     return folder / PAGE
@@ -111,7 +111,8 @@ def _overlays(has_reference: bool) -> Mapping[str, str]:
     }
 
 
-def _cannot_write(error: OSError, folder: Path) -> ConfigError:
+def cannot_write(error: OSError, folder: Path) -> ConfigError:
+    """What to say when a report's folder cannot be written."""
     reason = os.strerror(error.errno) if error.errno else str(error)
     return ConfigError(
         f"{error.filename or folder} cannot be written ({reason}); free some space or choose another folder."

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -11,15 +12,15 @@ import numpy as np
 
 from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
+from calibnet.drive.rig import CameraEstimate, RigEstimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import CameraModel, invert, pose_error
-from calibnet.geometry.se3 import adjoint
-from calibnet.geometry.types import Extrinsic, Transform
+from calibnet.geometry.known import Tolerance
+from calibnet.geometry.se3 import pose_from_vector
+from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.methods.calibrator import DriveCalibrator
-from calibnet.trace import DriveEstimate
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
-from inspector.export.exported import Exported
-from inspector.verdicts import explained
+from calibnet.verdict import REJECTED, Verdict, moved
+from inspector.run.rig_solved import Residual, Solved, SolvedCamera
 
 CAMERAS = "cameras"
 """Folder in which each camera of a rig has its own."""
@@ -33,73 +34,10 @@ class RigCalibrator(DriveCalibrator, Protocol):
         cameras: Sequence[RigCamera],
         initial: Extrinsic,
         observer: Callable[[int, int], None] | None = None,
-    ) -> DriveEstimate:
+        tolerance: Matrix6 | None = None,
+    ) -> RigEstimate:
         """Correct ``rig_from_lidar``."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class SolvedCamera:
-    """What was found of one camera.
-
-    Attributes:
-        name: of the camera.
-        camera: as it is, lens included.
-        verdict: on what was found, with the extrinsic.
-        reference: the true ``camera_from_lidar``, or None where nobody knows it.
-    """
-
-    name: str
-    camera: CameraModel
-    verdict: Verdict
-    reference: Extrinsic | None = field(default=None, repr=False)
-
-    def line(self) -> str:
-        """A sentence for the terminal."""
-        turned, shifted = self.verdict.moved
-        said = f"{self.name}: {self.verdict.word}, corrected by {turned:.2f}° / {shifted:.1f} cm"
-        if self.verdict.covariance is not None:
-            sigma = np.sqrt([np.trace(self.verdict.covariance[rows, rows]) for rows in (slice(3, 6), slice(3))])
-            said += f", sure to {np.degrees(sigma[0]):.2f}° / {100 * sigma[1]:.1f} cm"
-        if self.reference is not None:
-            error = pose_error(self.verdict.camera_from_lidar, self.reference)
-            said += f", off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
-        return f"{said}." if self.verdict.word == ACCEPTED else f"{said}. {explained(self.verdict)}"
-
-
-@dataclass(frozen=True)
-class Solved:
-    """What was found of all cameras of a rig."""
-
-    cameras: tuple[SolvedCamera, ...]
-    rigid: bool
-
-    @property
-    def word(self) -> Word:
-        """Accepted if all cameras are, rejected if one is."""
-        words = {camera.verdict.word for camera in self.cameras}
-        return REJECTED if REJECTED in words else CANNOT_TELL if CANNOT_TELL in words else ACCEPTED
-
-    def lines(self) -> Iterator[str]:
-        """Sentences for the terminal; the last one is the verdict on all."""
-        yield from (camera.line() for camera in self.cameras)
-        how = "as one rigid rig" if self.rigid else "each on its own"
-        yield f"Verdict: {self.word}, of {len(self.cameras)} cameras {how}."
-
-    def as_dict(self) -> dict[str, object]:
-        """The JSON object: ``cameras`` by name, each with what `Verdict.as_dict` says."""
-        cameras = {camera.name: camera.verdict.as_dict() for camera in self.cameras}
-        return {"verdict": self.word, "rigid": self.rigid, "cameras": cameras}
-
-    def exported(self) -> dict[str, Exported]:
-        """What is not rejected, by the camera's name."""
-        return {
-            one.name: Exported(
-                one.verdict.camera_from_lidar, one.camera, f"rig, camera {one.name}", verdict=one.verdict
-            )
-            for one in self.cameras
-            if one.verdict.word != REJECTED
-        }
 
 
 def open_rig(folders: Sequence[Path]) -> dict[str, Folder]:
@@ -162,6 +100,7 @@ def solve(
     rigid: bool,
     miscalibration: Transform | None = None,
     observer: Callable[[str], Callable[[int, int], None]] | None = None,
+    tolerance: Tolerance | None = None,
 ) -> Solved:
     """Calibrate all cameras.
 
@@ -171,40 +110,62 @@ def solve(
         rigid: as one rig, instead of each on its own.
         miscalibration: 4x4, put on the rig in the first camera's axes; what the folders say is the truth then.
         observer: makes what is told of the progress, by a name.
+        tolerance: within which each camera is known on the rig; with one they are solved as one rig, too.
 
     Raises:
         CalibrationError: nothing could be calibrated.
     """
-    camera_from_rig, start = poses(cameras, rigid)
-    references = {name: pose @ start for name, pose in camera_from_rig.items()} if miscalibration is not None else {}
-    start = start if miscalibration is None else miscalibration @ start
+    together = rigid or tolerance is not None
+    camera_from_rig, truth = poses(cameras, together)
+    references = {name: pose @ truth for name, pose in camera_from_rig.items()} if miscalibration is not None else {}
+    start = truth if miscalibration is None else miscalibration @ truth
     watch = observer or (lambda name: lambda read, total: None)
-    found: dict[str, Verdict] = {}
-    if rigid:
+    found: dict[str, tuple[Verdict, Residual]] = {}
+    if together:
         rig = [RigCamera(name, camera, camera_from_rig[name]) for name, camera in cameras.items()]
-        estimate = method.calibrate_rig(rig, start, watch("rig"))
+        allowed = None if tolerance is None else tolerance.covariance
+        estimate = method.calibrate_rig(rig, start, watch("rig"), allowed)
         assert estimate.verdict is not None, "the cascade judges what it finds"
-        found = {name: of_camera(estimate.verdict, pose) for name, pose in camera_from_rig.items()}
+        for one in estimate.cameras:
+            found[one.name] = of_camera(estimate.verdict, one, camera_from_rig[one.name] @ start)
     else:
         for name, camera in cameras.items():
-            initial = camera_from_rig[name] @ start
+            initial, residual = camera_from_rig[name] @ start, Residual()
             try:
-                verdict = method.calibrate_drive(camera, initial, watch(name)).verdict
+                alone = method.calibrate_drive(camera, initial, watch(name))
+                verdict = alone.verdict
+                errors = [look.match_error_px for look in alone.looks]
+                residual = Residual(float(np.median(errors)) if errors else math.nan)
             except (CalibrationError, DatasetError) as error:
                 verdict = Verdict(REJECTED, str(error), initial, used=0)
             assert verdict is not None, "the cascade judges what it finds"
-            found[name] = verdict
+            found[name] = verdict, residual
     solved = [
-        SolvedCamera(name, cameras[name][0].as_taken.camera, verdict, references.get(name))
-        for name, verdict in found.items()
+        SolvedCamera(
+            name, camera_of(cameras[name]), verdict, camera_from_rig[name] @ start, residual, references.get(name)
+        )
+        for name, (verdict, residual) in found.items()
     ]
-    return Solved(tuple(solved), rigid)
+    return Solved(tuple(solved), rigid, "" if tolerance is None else str(tolerance))
 
 
-def of_camera(rig: Verdict, camera_from_rig: Transform) -> Verdict:
-    """The verdict on a rig as one on a camera of it: its extrinsic, and its covariance in its own frame."""
-    covariance = rig.covariance
-    if covariance is not None:
-        to_camera = adjoint(camera_from_rig)
-        covariance = to_camera @ covariance @ to_camera.T
-    return replace(rig, camera_from_lidar=camera_from_rig @ rig.camera_from_lidar, covariance=covariance)
+def camera_of(folder: Folder) -> CameraModel:
+    """The camera of a folder, lens included."""
+    camera = folder.calibration.camera
+    assert camera is not None, "a folder without one is not opened"
+    return camera
+
+
+def of_camera(rig: Verdict, found: CameraEstimate, initial: Extrinsic) -> tuple[Verdict, Residual]:
+    """The verdict on a rig as one on a camera of it, which started from ``initial``, and what it leaves."""
+    verdict = replace(
+        rig,
+        camera_from_lidar=found.camera_from_lidar,
+        covariance=None if rig.covariance is None else found.covariance,
+        moved=moved(initial, found.camera_from_lidar),
+    )
+    residual = Residual(found.match_error_px)
+    if found.alone is not None:
+        off = pose_error(pose_from_vector(found.alone), np.eye(4))
+        residual = Residual(found.match_error_px, off.rotation_deg, off.translation_cm)
+    return verdict, residual

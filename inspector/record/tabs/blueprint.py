@@ -36,7 +36,7 @@ def make_blueprint(
     shown = wanted_tabs(layout) if tabs is None else tabs
     root = rrb.Tabs(*(tab.view(layout) for tab in shown), active_tab=0, name=prefix.strip("/") or None)
     if root.name:
-        _move_below(root, prefix)
+        move_below(root, prefix)
     return rrb.Blueprint(
         root,
         rrb.TimePanel(
@@ -52,11 +52,11 @@ def make_blueprint(
     )
 
 
-def _move_below(part: View, prefix: str) -> None:
+def move_below(part: View, prefix: str) -> None:
     """Put a prefix before every entity path in views that are not shown yet."""
     if isinstance(part, rrb.Container):
         for child in part.contents:
-            _move_below(child, prefix)
+            move_below(child, prefix)
         return
     part.origin = _absolute(prefix, str(part.origin))
     contents: Any = part.contents

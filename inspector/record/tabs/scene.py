@@ -79,7 +79,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     }
     rec.log(CLOUD, rr.DynamicArchetype(archetype=COLORS_THROUGH, components=through))
     for path, camera_from_lidar, color in extrinsics.values():
-        rec.log(path, *_frustum(camera_from_lidar, frame.camera, color))
+        rec.log(path, *frustum(camera_from_lidar, frame.camera, color))
 
 
 def view(layout: Layout) -> View:
@@ -105,7 +105,7 @@ def view(layout: Layout) -> View:
     return rrb.Tabs(side_by_side, *pages, name=NAME)
 
 
-def _frustum(
+def frustum(
     camera_from_lidar: Extrinsic, camera: PinholeCamera, color: colors.Rgb
 ) -> tuple[rr.Transform3D, rr.Pinhole]:
     """The camera's place in the LiDAR frame, and its field of view."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,7 +12,7 @@ from calibnet.alignment.evidence import InRig
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets.rig import RigCamera
 from calibnet.drive.consensus import Consensus
-from calibnet.drive.rig import joined
+from calibnet.drive.rig_pose import Said, joined
 from calibnet.geometry import RANGES, invert, miscalibration, pose_error, rotation_from_vector, transform
 from calibnet.geometry.known import Known, inverse
 from calibnet.geometry.se3 import adjoint, pose_from_vector, pose_vector
@@ -41,12 +43,16 @@ def saying(
     return consensus
 
 
+def say(cameras: list[RigCamera], agreed: list[Consensus], common: np.ndarray) -> list[Said]:
+    return [Said.of(camera, consensus, common) for camera, consensus in zip(cameras, agreed, strict=True)]
+
+
 def test_what_all_cameras_say_alike_is_the_rig_s_pose():
     truth = miscalibration([0.3, -0.4, 0.2], [0.03, -0.02, 0.01]) @ REFERENCE
     cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], SIDE)]
     firm = np.full(6, 1e-4)
     agreed = [saying(camera.camera_from_rig, REFERENCE, truth, firm) for camera in cameras]
-    mean, covariance = joined(cameras, agreed, 1e-10 * np.eye(6), None, REFERENCE)
+    mean, covariance = joined(say(cameras, agreed, 1e-10 * np.eye(6)), REFERENCE)
     found = pose_from_vector(mean) @ REFERENCE
     error = pose_error(found, truth)
     assert error.rotation_deg < 0.02 and error.translation_cm < 0.1
@@ -60,8 +66,8 @@ def test_one_camera_s_blind_axis_is_another_s_best():
     side = transform(rotation_from_vector([0.0, np.pi / 2, 0.0]), [0.0, 0.0, 0.0])
     cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], side)]
     agreed = [saying(camera.camera_from_rig, REFERENCE, truth, blind_ahead, 0.08) for camera in cameras]
-    alone, _ = joined(cameras[:1], agreed[:1], 1e-8 * np.eye(6), None, REFERENCE)
-    both, covariance = joined(cameras, agreed, 1e-8 * np.eye(6), None, REFERENCE)
+    alone, _ = joined(say(cameras[:1], agreed[:1], 1e-8 * np.eye(6)), REFERENCE)
+    both, covariance = joined(say(cameras, agreed, 1e-8 * np.eye(6)), REFERENCE)
     assert alone[2] == pytest.approx(0.13, abs=0.01)
     assert_allclose(both[:3], [0.04, 0.0, 0.05], atol=2e-3)
     assert np.sqrt(covariance[2, 2]) < 0.005
@@ -72,7 +78,7 @@ def test_more_cameras_are_surer():
         RigCamera(str(number), [], transform(rotation_from_vector([0, number, 0]), [0, 0, 0])) for number in range(4)
     ]
     agreed = [saying(camera.camera_from_rig, REFERENCE, REFERENCE, np.full(6, 0.01)) for camera in cameras]
-    one, four = (joined(cameras[:n], agreed[:n], COMMON, None, REFERENCE)[1] for n in (1, 4))
+    one, four = (joined(say(cameras[:n], agreed[:n], COMMON), REFERENCE)[1] for n in (1, 4))
     assert np.trace(four) == pytest.approx(np.trace(one) / 4, rel=0.01)
 
 
@@ -80,9 +86,60 @@ def test_what_is_known_of_the_rig_counts():
     cameras = [RigCamera("side", [], SIDE)]
     truth = miscalibration([0.3, -0.4, 0.2], [0.03, -0.02, 0.01]) @ REFERENCE
     agreed = [saying(SIDE, REFERENCE, truth, np.full(6, 1e-3))]
-    mean, _ = joined(cameras, agreed, COMMON, Known.of("xyz").about(REFERENCE), REFERENCE)
+    mean, _ = joined(say(cameras, agreed, COMMON), REFERENCE, Known.of("xyz").about(REFERENCE))
     assert_allclose(mean[:3], 0.0, atol=1e-6)
     assert np.abs(mean[3:]).max() > 1e-3
+
+
+def two_that_differ(off: np.ndarray) -> list[Said]:
+    """The first camera says that the rig is where it was, the second that it itself is off by so much."""
+    cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], SIDE)]
+    firm = np.full(6, 0.01)
+    agreed = [saying(camera.camera_from_rig, REFERENCE, REFERENCE, firm) for camera in cameras]
+    told = say(cameras, agreed, 1e-12 * np.eye(6))
+    return [told[0], replace(told[1], camera_from_lidar=pose_from_vector(off) @ told[1].camera_from_lidar)]
+
+
+def test_within_a_tolerance_cameras_end_as_all_that_is_known_makes_most_likely():
+    """Against the six poses and deviations solved by one dense system, with covariances."""
+    off = 1e-3 * np.array([4.0, -2.0, 3.0, 1.0, 2.0, -1.0])
+    told = two_that_differ(off)
+    tolerance = np.diag([0.02**2] * 3 + [0.005**2] * 3)
+    mean, covariance = joined(told, REFERENCE, tolerance=tolerance)
+    rig = pose_from_vector(mean) @ REFERENCE
+    # unknown: motion of the rig, and of each camera in its own frame; measured: the cameras; expected: on the rig
+    normal, right = np.zeros((18, 18)), np.zeros(18)
+    for position, one in enumerate(told):
+        own, to_camera = slice(6 + 6 * position, 12 + 6 * position), adjoint(one.camera.camera_from_rig)
+        measured = pose_vector(one.camera_from_lidar @ invert(one.camera.camera_from_rig @ REFERENCE))
+        firm, firm_place = inverse(one.covariance), inverse(tolerance)
+        normal[own, own] += firm + firm_place
+        right[own] += firm @ measured
+        normal[:6, :6] += to_camera.T @ firm_place @ to_camera
+        normal[:6, own] -= to_camera.T @ firm_place
+        normal[own, :6] -= firm_place @ to_camera
+    solution, spread = np.linalg.solve(normal, right), np.linalg.inv(normal)
+    assert_allclose(mean, solution[:6], atol=2e-5)
+    assert_allclose(covariance, spread[:6, :6], rtol=1e-6, atol=1e-12)
+    for position, one in enumerate(told):
+        own = slice(6 + 6 * position, 12 + 6 * position)
+        there = one.placed(rig, tolerance) @ rig
+        found = pose_vector(there @ invert(one.camera.camera_from_rig @ REFERENCE))
+        assert_allclose(found, solution[own], atol=2e-5)
+        assert_allclose(one.spread(covariance, tolerance), spread[own, own], rtol=1e-6, atol=1e-12)
+
+
+def test_no_tolerance_is_the_rigid_rig_and_an_endless_one_each_camera_on_its_own():
+    off = 1e-2 * np.array([4.0, -2.0, 3.0, 1.0, 2.0, -1.0])
+    told = two_that_differ(off)
+    rigid, of_rig = joined(told, REFERENCE)
+    none, _ = joined(told, REFERENCE, tolerance=1e-14 * np.eye(6))
+    assert_allclose(none, rigid, atol=1e-9)
+    rig = pose_from_vector(rigid) @ REFERENCE
+    assert_allclose(told[1].placed(rig, 1e-14 * np.eye(6)), SIDE, atol=1e-9)
+    assert_allclose(told[1].spread(of_rig, 1e-14 * np.eye(6)), told[1].spread(of_rig, None), atol=1e-9)
+    assert_allclose(told[1].placed(rig, 1e6 * np.eye(6)) @ rig, told[1].camera_from_lidar, atol=1e-6)
+    assert_allclose(told[1].spread(of_rig, 1e6 * np.eye(6)), told[1].covariance, atol=1e-7)
 
 
 def springs(correction: np.ndarray) -> tuple[float, np.ndarray]:
@@ -129,3 +186,14 @@ def test_a_rig_is_solved_with_all_its_cameras_and_told_about_bad_frames():
     assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
     assert estimate.verdict is not None and estimate.networks is not None
     assert inverse(estimate.covariance).shape == (6, 6)
+    assert len(estimate.looks) == 3
+    a, b, c = estimate.cameras
+    assert [one.frames for one in (a, b, c)] == [2, 1, 0]
+    for one in (a, b, c):
+        assert_allclose(one.camera_from_lidar, estimate.camera_from_lidar, atol=1e-9, err_msg="they are in one place")
+        assert_allclose(one.covariance, estimate.covariance, rtol=1e-6, atol=1e-15)
+    assert a.alone is not None and c.alone is None and a.match_error_px > 0
+    loose = Cascade(stages).calibrate_rig(cameras, REFERENCE, tolerance=1e4 * np.eye(6))
+    apart = pose_error(loose.cameras[0].camera_from_lidar, loose.cameras[1].camera_from_lidar)
+    assert apart.translation_cm > 0.1, "each camera may go where it wants"
+    assert_allclose(loose.cameras[0].alone, 0.0, atol=1e-4)

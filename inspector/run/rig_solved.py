@@ -1,0 +1,172 @@
+"""What was found of all cameras of a rig: for the terminal, the viewer, JSON, recordings and other tools."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from calibnet.geometry import CameraModel, pose_error
+from calibnet.geometry.types import Extrinsic
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
+from inspector.export.exported import Exported
+from inspector.verdicts import explained
+
+COLUMNS = ("camera", "verdict", "corrected by", "sure to", "off the reference", "matches off", "alone it says")
+"""Of a table with a row a camera."""
+
+
+class Residual(NamedTuple):
+    """What a camera leaves unexplained.
+
+    Attributes:
+        match_error_px: median error that its last look expects of its matches; not a number where nothing says.
+        rotation_deg: from what was found to where its frames alone say that it is; None where it was solved alone.
+        translation_cm: likewise.
+    """
+
+    match_error_px: float = math.nan
+    rotation_deg: float | None = None
+    translation_cm: float | None = None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """The form that JSON files hold."""
+        return self._asdict() | {"match_error_px": None if math.isnan(self.match_error_px) else self.match_error_px}
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedCamera:
+    """What was found of one camera.
+
+    Attributes:
+        name: of the camera.
+        camera: as it is, lens included.
+        verdict: on what was found, with the extrinsic.
+        initial: ``camera_from_lidar`` that it started from.
+        residual: what it leaves unexplained.
+        reference: the true ``camera_from_lidar``, or None where nobody knows it.
+    """
+
+    name: str
+    camera: CameraModel
+    verdict: Verdict
+    initial: Extrinsic = field(repr=False)
+    residual: Residual = field(default_factory=Residual)
+    reference: Extrinsic | None = field(default=None, repr=False)
+
+    def line(self) -> str:
+        """A sentence for the terminal."""
+        turned, shifted = self.verdict.moved
+        said = f"{self.name}: {self.verdict.word}, corrected by {turned:.2f}° / {shifted:.1f} cm"
+        if self.verdict.covariance is not None:
+            said += f", sure to {self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm"
+        if self.residual.rotation_deg is not None:
+            alone = f"{self.residual.rotation_deg:.2f}° / {self.residual.translation_cm:.1f} cm"
+            said += f", {alone} from what its own frames say"
+        if self.reference is not None:
+            error = pose_error(self.verdict.camera_from_lidar, self.reference)
+            said += f", off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        return f"{said}." if self.verdict.word == ACCEPTED else f"{said}. {explained(self.verdict)}"
+
+    def row(self) -> list[str]:
+        """What a table says of it, by `COLUMNS`; empty where there is nothing to say."""
+        turned, shifted = self.verdict.moved
+        residual, sure, off = self.residual, "", ""
+        if self.verdict.covariance is not None:
+            sure = f"{self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm"
+        if self.reference is not None:
+            error = pose_error(self.verdict.camera_from_lidar, self.reference)
+            off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        alone = (
+            "" if residual.rotation_deg is None else f"{residual.rotation_deg:.2f}° / {residual.translation_cm:.1f} cm"
+        )
+        px = "" if math.isnan(residual.match_error_px) else f"{residual.match_error_px:.1f} px"
+        return [self.name, self.verdict.word, f"{turned:.2f}° / {shifted:.1f} cm", sure, off, px, alone]
+
+    def recorded(self) -> dict[str, Any]:
+        """What a recording keeps of it, besides its pictures."""
+        camera = self.camera
+        return {
+            "verdict": self.verdict.as_dict(),
+            "initial": self.initial.tolist(),
+            "reference": None if self.reference is None else self.reference.tolist(),
+            "residual": self.residual.as_dict(),
+            "camera": {
+                "width": camera.width,
+                "height": camera.height,
+                "matrix": camera.matrix.ravel().tolist(),
+                "model": camera.model,
+                "coefficients": camera.coefficients.tolist(),
+            },
+        }
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What was found of all cameras of a rig.
+
+    Attributes:
+        cameras: in their order.
+        rigid: as one rigid rig.
+        tolerance: that each was allowed on the rig, as it was said; empty for none.
+    """
+
+    cameras: tuple[SolvedCamera, ...]
+    rigid: bool
+    tolerance: str = ""
+
+    @property
+    def how(self) -> str:
+        """In which way they were solved."""
+        if self.tolerance:
+            return f"as one rig, each within {self.tolerance} of its place on it"
+        return "as one rigid rig" if self.rigid else "each on its own"
+
+    @property
+    def word(self) -> Word:
+        """Accepted if all cameras are, rejected if one is."""
+        words = {camera.verdict.word for camera in self.cameras}
+        return REJECTED if REJECTED in words else CANNOT_TELL if CANNOT_TELL in words else ACCEPTED
+
+    def lines(self) -> Iterator[str]:
+        """Sentences for the terminal; the last one is the verdict on all."""
+        yield from (camera.line() for camera in self.cameras)
+        yield f"Verdict: {self.word}, of {len(self.cameras)} cameras {self.how}."
+
+    def markdown(self) -> Iterator[str]:
+        """The verdict and a table, for the viewer."""
+        rows = [camera.row() for camera in self.cameras]
+        kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
+        yield from (f"# {self.word.capitalize()}", "", f"{len(rows)} cameras, solved {self.how}.", "")
+        yield "| " + " | ".join(COLUMNS[column] for column in kept) + " |"
+        yield "|" + "---|" * len(kept)
+        for row in rows:
+            yield "| " + " | ".join(row[column] for column in kept) + " |"
+        yield ""
+        for reason in dict.fromkeys(explained(camera.verdict) for camera in self.cameras):
+            yield from (reason, "")
+
+    def as_dict(self) -> dict[str, object]:
+        """The JSON object: ``cameras`` by name, each with what `Verdict.as_dict` says, and its residual."""
+        cameras = {
+            camera.name: camera.verdict.as_dict() | {"residual": camera.residual.as_dict()} for camera in self.cameras
+        }
+        return {"verdict": self.word, "rigid": self.rigid, "tolerance": self.tolerance or None, "cameras": cameras}
+
+    def recorded(self) -> dict[str, Any]:
+        """What a recording keeps, besides pictures; `inspector.read.rig` reads it."""
+        cameras = {camera.name: camera.recorded() for camera in self.cameras}
+        return {"rigid": self.rigid, "tolerance": self.tolerance, "cameras": cameras}
+
+    def exported(self) -> dict[str, Exported]:
+        """What is not rejected, by the camera's name."""
+        return {one.name: exported_camera(one) for one in self.cameras if one.verdict.word != REJECTED}
+
+
+def exported_camera(one: SolvedCamera) -> Exported:
+    """What was found of a camera, for other tools; it says so where that is not accepted."""
+    origin = f"rig, camera {one.name}"
+    if one.verdict.word != ACCEPTED:
+        origin = f"{origin}; {one.verdict.word}: {explained(one.verdict)}"
+    return Exported(one.verdict.camera_from_lidar, one.camera, origin, verdict=one.verdict)
