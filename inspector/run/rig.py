@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
-from calibnet.drive.rig import CameraEstimate, RigEstimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import CameraModel, invert, pose_error
 from calibnet.geometry.known import Tolerance
@@ -21,6 +20,9 @@ from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.verdict import REJECTED, Verdict, moved
 from inspector.run.rig_solved import Residual, Solved, SolvedCamera
+
+if TYPE_CHECKING:
+    from calibnet.drive.rig import CameraEstimate, RigEstimate
 
 CAMERAS = "cameras"
 """Folder in which each camera of a rig has its own."""

@@ -13,7 +13,7 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.export.exported import Exported
 from inspector.verdicts import explained
 
-COLUMNS = ("camera", "verdict", "corrected by", "sure to", "off the reference", "matches off", "alone it says")
+COLUMNS = ("camera", "verdict", "matches off", "alone it says", "sure to", "off the reference", "corrected by")
 """Of a table with a row a camera."""
 
 
@@ -82,7 +82,7 @@ class SolvedCamera:
             "" if residual.rotation_deg is None else f"{residual.rotation_deg:.2f}° / {residual.translation_cm:.1f} cm"
         )
         px = "" if math.isnan(residual.match_error_px) else f"{residual.match_error_px:.1f} px"
-        return [self.name, self.verdict.word, f"{turned:.2f}° / {shifted:.1f} cm", sure, off, px, alone]
+        return [self.name, self.verdict.word, px, alone, sure, off, f"{turned:.2f}° / {shifted:.1f} cm"]
 
     def recorded(self) -> dict[str, Any]:
         """What a recording keeps of it, besides its pictures."""
@@ -141,7 +141,11 @@ class Solved:
         yield from (f"# {self.word.capitalize()}", "", f"{len(rows)} cameras, solved {self.how}.", "")
         yield "| " + " | ".join(COLUMNS[column] for column in kept) + " |"
         yield "|" + "---|" * len(kept)
+        names = [camera.name for camera in self.cameras]
+        alike = next((place for place, letters in enumerate(zip(*names, strict=False)) if len(set(letters)) > 1), 0)
+        words = max(names[0].rfind(mark, 0, alike) for mark in "-_. ") + 1  # that all names begin with
         for row in rows:
+            row[0] = row[0][words:]
             yield "| " + " | ".join(row[column] for column in kept) + " |"
         yield ""
         for reason in dict.fromkeys(explained(camera.verdict) for camera in self.cameras):

@@ -15,19 +15,24 @@ from numpy.testing import assert_allclose
 
 from calibnet.cascade.cascade import Cascade
 from calibnet.datasets.calibration_files import read_calibration
+from calibnet.drive.rig import CameraEstimate, RigEstimate
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert, miscalibration, rotation_from_vector, transform
 from calibnet.geometry.se3 import adjoint
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import Verdict, Word, moved
+from inspector import entities
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from inspector.read.rig import is_rig, read_rig
 from inspector.run.rig import open_rig, poses
 from tests.support.fakes import REFERENCE
 from tests.support.folder import write_folder
 
 RIGHT_FROM_LEFT = transform(rotation_from_vector([0.0, 0.02, 0.0]), [-0.5, 0.0, 0.0])
 FOUND = miscalibration([0.1, 0.2, 0.3], [0.01, 0.02, 0.03])
+ALONE = np.array([0.03, 0.0, 0.04, 0.0, np.radians(0.5), 0.0])
+"""How far a camera's own frames say that it is from what is found: 0.5 degrees and 5 cm."""
 COVARIANCE = np.diag([0.01**2] * 3 + [0.001**2] * 3)
 Invoke = Callable[..., tuple[int, str, str]]
 
@@ -46,18 +51,30 @@ class RigCascade:
         assert len(frames) == 2
         return self._estimate(initial)
 
-    def calibrate_rig(self, cameras: Any, initial: np.ndarray, observer: Any = None) -> DriveEstimate:
+    def calibrate_rig(
+        self, cameras: Any, initial: np.ndarray, observer: Any = None, tolerance: Any = None
+    ) -> RigEstimate:
         observer(1, 2)
-        return self._estimate(initial)
+        self.tolerance = tolerance
+        rig = self._estimate(initial)
+        found = []
+        for camera in cameras:
+            to_camera = adjoint(camera.camera_from_rig)
+            there, covariance = camera.camera_from_rig @ rig.camera_from_lidar, to_camera @ COVARIANCE @ to_camera.T
+            found.append(CameraEstimate(camera.name, there, covariance, 2, 1.5, ALONE, COVARIANCE))
+        return RigEstimate(rig.camera_from_lidar, COVARIANCE, 2, verdict=rig.verdict, cameras=tuple(found))
+
+
+LOADED = RigCascade()
 
 
 @pytest.fixture
 def invoke(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Invoke:
-    monkeypatch.setattr(Cascade, "load", staticmethod(lambda *_: RigCascade()))
+    monkeypatch.setattr(Cascade, "load", staticmethod(lambda *_: LOADED))
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments: str) -> tuple[int, str, str]:
-        code = run(cli, ["rig", *arguments])
+        code = run(cli, ["rig", *arguments] if arguments[0] not in ("export", "report") else list(arguments))
         return code, *capsys.readouterr()
 
     return call
@@ -144,3 +161,81 @@ def test_the_worst_camera_decides(rig: Path, invoke: Invoke, monkeypatch: pytest
     assert not Path("found/left.yaml").exists(), "what is rejected is not written"
     monkeypatch.setattr(RigCascade, "word", "cannot tell")
     assert invoke(str(rig), "--rigid")[0] == 4
+
+
+def test_a_tolerance_is_handed_on_and_told(rig: Path, invoke: Invoke) -> None:
+    code, out, err = invoke(str(rig), "--tolerance", "0.5deg/2cm", "--json", "-")
+    assert code == 0, err
+    expected = np.diag([0.02**2] * 3 + [np.radians(0.5) ** 2] * 3)
+    assert_allclose(LOADED.tolerance, expected)
+    content = json.loads(out)
+    assert content["rigid"] is False and content["tolerance"] == "0.5° / 2 cm"
+    residual = content["cameras"]["left"]["residual"]
+    assert residual["rotation_deg"] == pytest.approx(0.5) and residual["translation_cm"] == pytest.approx(5.0)
+    assert residual["match_error_px"] == 1.5
+    assert "left: accepted" in err and "0.50° / 5.0 cm from what its own frames say" in err
+    assert "as one rig, each within 0.5° / 2 cm of its place on it" in err
+    assert invoke(str(rig), "--tolerance", "2cm")[0] == 2
+    assert invoke(str(rig), "--tolerance", "1deg/1cm", "--rigid")[0] == 2
+
+
+def test_the_recording_of_a_rig_holds_what_was_found_and_every_camera_s_pictures(rig: Path, invoke: Invoke) -> None:
+    assert invoke(str(rig), "--rigid", "--miscalibrate", "0,0,0,0,0,0", "--save", "rig.rrd", "--headless")[0] == 0
+    assert is_rig(Path("rig.rrd"))
+    recorded = read_rig(Path("rig.rrd"))
+    assert recorded.title == "rig/my rig"
+    assert [camera.name for camera in recorded.solved.cameras] == ["left", "right"]
+    right = recorded.camera("right")
+    assert_allclose(right.verdict.camera_from_lidar, RIGHT_FROM_LEFT @ FOUND @ REFERENCE, atol=1e-12)
+    assert_allclose(right.initial, RIGHT_FROM_LEFT @ REFERENCE, atol=1e-12)
+    assert right.reference is not None and right.camera.same(open_rig([rig])["right"]._lens.camera)
+    assert right.residual.rotation_deg == pytest.approx(0.5)
+    assert recorded.moments == {"left": (0, 1), "right": (0, 1)}
+    pictures = recorded.pictures("right")
+    assert pictures.image(1).startswith(b"\xff\xd8")
+    before = pictures.overlay(entities.OVERLAY_MISCALIBRATED, 1)
+    after = pictures.overlay(entities.OVERLAY_CORRECTED, 1)
+    assert len(before.uv) > 100 and not np.array_equal(before.uv[:50], after.uv[:50])
+    assert len(pictures.overlay(entities.OVERLAY_REFERENCE, 0).uv) > 100
+
+
+def test_a_rig_is_exported_a_file_a_camera(rig: Path, invoke: Invoke) -> None:
+    invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless")
+    assert invoke("export", "rig.rrd", "--format", "yaml", "--output", "found")[0] == 0
+    for name, relative in (("left", np.eye(4)), ("right", RIGHT_FROM_LEFT)):
+        read = read_calibration(Path(f"found/{name}.yaml"))
+        assert_allclose(read.camera_from_lidar, relative @ FOUND @ REFERENCE, atol=1e-9)
+    code, out, _ = invoke("export", "rig.rrd", "--format", "ros", "--camera", "right")
+    assert code == 0 and "camera_optical_frame" in out
+    assert invoke("export", "rig.rrd", "--format", "ros", "--output", "ros")[0] == 0
+    assert "right_camera_optical_frame" in Path("ros/right.yaml").read_text()
+    code, _, err = invoke("export", "rig.rrd", "--format", "ros")
+    assert code == 2 and "Give a folder with --output for all cameras, or one with --camera: left, right." in err
+    assert (
+        "has no camera 'up'; choose from left, right"
+        in invoke("export", "rig.rrd", "--format", "ros", "--camera", "up")[2]
+    )
+    assert invoke("export", "rig.rrd", "--format", "ros", "--frame", "1", "--camera", "left")[0] == 2
+
+
+def test_what_is_rejected_of_a_rig_is_not_exported(rig: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RigCascade, "word", "rejected")
+    invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless")
+    assert invoke("export", "rig.rrd", "--format", "yaml", "--output", "found")[0] == 1
+    assert list(Path("found").iterdir()) == []
+
+
+def test_the_report_of_a_rig_shows_all_its_cameras(rig: Path, invoke: Invoke) -> None:
+    invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless")
+    code, _, err = invoke("report", "rig.rrd", "--out", "page")
+    assert code == 0, err
+    page = Path("page/index.html").read_text()
+    assert "2 cameras, solved as one rigid rig." in page and "Accepted" in page
+    for number, name in enumerate(("left", "right")):
+        assert f"<b>{name}</b>" in page and f"<td>{name}</td>" in page
+        for side in ("left", "right"):
+            file = f"pictures/camera_{number}_{side}.jpg"
+            assert file in page and Path("page", file).read_bytes().startswith(b"\xff\xd8")
+    assert "$" not in page.replace("${", "").split("<script>")[0]
+    assert json.loads(Path("page/metrics.json").read_text())["cameras"]["left"]["verdict"] == "accepted"
+    assert Path("page/recording.rrd").stat().st_size == Path("rig.rrd").stat().st_size
