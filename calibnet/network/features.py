@@ -54,6 +54,9 @@ def lidar_channels(lidar: Tensor) -> Tensor:
 class Trunk(nn.Module):
     """Encoder from 1/2 to 1/32 and decoder back to the finest scale of the cost volumes.
 
+    Without multi-scale features, a row of the paper's ablation, the encoder is whole and only its last level is read,
+    resampled to each scale (docs/decisions.md, "The paper's ablation").
+
     The encoder's finer levels may be those of another network, the ``pretrained`` ones, which start at the image;
     ours start behind a stem.
     """
@@ -64,7 +67,7 @@ class Trunk(nn.Module):
         norm, widths = config.normalization, [*their_widths, *config.widths[len(their_widths) :]]
         strides = [2 ** (level + 1) for level in range(len(widths))]
         self.levels = [strides.index(scale) for scale in config.scales]
-        deepest = self.levels[-1] if config.multi_scale_features else self.levels[0]
+        deepest = self.levels[-1]
         own = (
             nn.Sequential(
                 *([ConvBlock(widths[level - 1], width, norm, stride=2)] if level else []),
@@ -80,7 +83,7 @@ class Trunk(nn.Module):
             self.lateral = nn.ModuleList(Conv2d(widths[level], features, 1) for level in self.levels)
             self.smooth = nn.ModuleList(ConvBlock(features, features, norm) for _ in self.levels)
         else:
-            self.lateral = nn.ModuleList([Conv2d(widths[self.levels[0]], features, 1)])
+            self.lateral = nn.ModuleList([Conv2d(widths[deepest], features, 1)])
         self.project = nn.ModuleList(Conv2d(features, features, 1) for _ in config.volume_scales)
 
     def forward(self, x: Tensor) -> list[Tensor]:
@@ -90,11 +93,13 @@ class Trunk(nn.Module):
             x = stage(x)
             encoded.append(x)
         if not self.config.multi_scale_features:
-            finest = self.lateral[0](encoded[self.levels[0]])
-            return [
-                project(F.avg_pool2d(finest, 2**power) if power else finest)
-                for power, project in enumerate(self.project)
-            ]
+            coarsest = self.lateral[0](encoded[-1])
+            factors = [self.config.scales[-1] // scale for scale in self.config.volume_scales]
+            resampled = (
+                F.interpolate(coarsest, scale_factor=float(factor), mode="bilinear") if factor > 1 else coarsest
+                for factor in factors
+            )
+            return [project(feature) for project, feature in zip(self.project, resampled, strict=True)]
         features: list[Tensor] = []
         for position in reversed(range(len(self.levels))):
             merged = self.lateral[position](encoded[self.levels[position]])

@@ -112,3 +112,9 @@ def test_paper_preset_has_the_size_of_the_paper() -> None:
 def test_ablated_sizes_that_fit_the_paper_s_table(switch: str, parameters: float) -> None:
     network = CalibrationNetwork(replace(load_preset("paper"), **{switch: False}), RANGES[0])
     assert sum(p.numel() for p in network.parameters()) == pytest.approx(parameters, rel=0.02)
+
+
+def test_without_multi_scale_features_the_encoder_is_whole_as_the_paper_s_parameters_say() -> None:
+    """18.7 M in the paper; our pyramid is half as large as what it removes, and an encoder without 1/32 has 5 M."""
+    network = CalibrationNetwork(replace(load_preset("paper"), multi_scale_features=False), RANGES[0])
+    assert sum(p.numel() for p in network.parameters()) == pytest.approx(19.85e6, rel=0.001)

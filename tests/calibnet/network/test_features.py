@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+import torch.nn.functional as F
 
 from calibnet.errors import ConfigError
 from calibnet.network import efficientnet
@@ -78,7 +79,17 @@ def test_the_pretrained_encoder_feeds_the_same_pyramid(multi_scale: bool) -> Non
     extractor.load_pretrained()
     features = extractor.image(torch.zeros(2, 3, 64, 96, dtype=torch.uint8))
     assert [tuple(feature.shape) for feature in features] == [(2, 16, 8, 12), (2, 16, 4, 6), (2, 16, 2, 3)]
-    assert len(extractor.pretrained_levels()) == (4 if multi_scale else 3), "no level below the ones that are used"
+    assert len(extractor.pretrained_levels()) == 4
+
+
+def test_without_multi_scale_features_all_scales_are_one_feature_map() -> None:
+    extractor = FeatureExtractor(replace(TINY, multi_scale_features=False)).eval()
+    for project in extractor.image_trunk.project:
+        project.load_state_dict(extractor.image_trunk.project[0].state_dict())
+    image = torch.rand(1, 3, 64, 96, generator=torch.Generator().manual_seed(0)) * 255
+    fine, middle, coarse = extractor.image(image)
+    torch.testing.assert_close(F.interpolate(coarse, scale_factor=2.0, mode="bilinear"), middle)
+    torch.testing.assert_close(F.interpolate(coarse, scale_factor=4.0, mode="bilinear"), fine)
 
 
 def test_the_pretrained_levels_have_the_widths_they_promise_and_outputs_of_unit_size() -> None:
