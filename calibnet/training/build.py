@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from lightning_fabric import Fabric
@@ -97,6 +98,9 @@ def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNe
     config = load_preset(options.preset)
     if options.head:
         config = replace(config, head=options.head)
+    if options.image_encoder:
+        changes: dict[str, Any] = {"image_encoder": options.image_encoder}
+        config = replace(config, **changes)
     if options.ablation:
         config = ablated(config, options.ablation)
     network = CalibrationNetwork(config, MiscalibrationRange.parse(options.range))

@@ -57,6 +57,8 @@ class TrainingOptions:
     """Pose head, instead of the preset's."""
     ablation: str | None = None
     """Row of the paper's ablation, see `calibnet.network.ablations`: the preset without one of its modules."""
+    image_encoder: str | None = None
+    """Image encoder instead of the preset's: ``own`` starts from nothing, as other papers' networks do here."""
     uniform: bool = False
     """Whether miscalibrations are drawn from the range alone: no residuals, also if some travel with packed frames,
     and no wider draws. For comparisons, in which all networks are to see the same."""

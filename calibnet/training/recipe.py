@@ -167,7 +167,9 @@ class PaceRecipe:
     report_seconds: float = 5.0
     """Seconds of training between lines of progress."""
     checkpoint_seconds: float = 30.0
-    """Seconds of training between checkpoints; infinite, there is none, not even at the end."""
+    """Seconds of training between checkpoints."""
+    checkpoints: bool = True
+    """Whether there are any; a run of a minute needs none."""
     validation_seconds: float = 600.0
     """Seconds of training between validations."""
     validation_draws: int = 4

@@ -177,7 +177,7 @@ class Trainer:
 
     def _save_checkpoint(self) -> None:
         self._require_finite()
-        if math.isinf(self.recipe.pace.checkpoint_seconds):
+        if not self.recipe.pace.checkpoints:
             return
         state = {"steps": self.steps, "seconds": self.seconds, "options": asdict(self.options)}
         if self.fabric.is_global_zero:

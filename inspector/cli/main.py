@@ -53,6 +53,7 @@ COMMANDS = {
     ),
     "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
+    "ablate": LazyCommand("inspector.cli.ablate:ablate", "What each module of the network costs and is worth."),
     "benchmark": LazyCommand(
         "inspector.cli.benchmark:benchmark", "Milliseconds of the cascade by part, stage and frame."
     ),

@@ -32,6 +32,11 @@ if TYPE_CHECKING:
     type=click.Choice(list(ABLATIONS)),
     help="Row of the paper's ablation: the preset without one of its modules, in a folder of its own within --output.",
 )
+@click.option(
+    "--image-encoder",
+    type=click.Choice(["own", "efficientnet-lite0"]),
+    help="Instead of the preset's: own starts from nothing, the other from ImageNet.",
+)
 @click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
 @click.option(
@@ -135,6 +140,7 @@ def train(
     preset: str,
     method: str | None,
     ablation: str | None,
+    image_encoder: str | None,
     head: str | None,
     range_: MiscalibrationRange | None,
     every_stage: bool,
@@ -177,9 +183,9 @@ def train(
     if (range_ is not None) == every_stage:
         raise click.UsageError("Give either --range, the stage to train, or --all.")
 
-    if method and (every_stage or ablation or head):
+    if method and (every_stage or ablation or image_encoder or head):
         raise click.UsageError(
-            "--method trains one network as its paper has it: leave out --all, --ablation and --head."
+            "--method trains one network as its paper has it: leave out --all, --ablation, --image-encoder and --head."
         )
     if ablation and every_stage:
         raise click.UsageError("--ablation trains one stage: give --range instead of --all.")
@@ -192,6 +198,7 @@ def train(
     options = TrainingOptions(
         preset=method or preset,
         ablation=ablation,
+        image_encoder=image_encoder,
         uniform=uniform,
         head=head,
         range=str(range_ or ""),

@@ -1,0 +1,176 @@
+"""Table 3 of the paper, measured: what each module of the network costs, and what it is worth (`measure_ablation`)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import torch
+
+from calibnet.cascade.cascade import Cascade
+from calibnet.cascade.stage import Stage
+from calibnet.datasets import Frame
+from calibnet.datasets import Sequence as FrameSequence
+from calibnet.errors import CalibrationError, WeightsError
+from calibnet.evaluation.metrics import Metrics
+from calibnet.evaluation.runner import draw_miscalibration
+from calibnet.geometry import RANGES, MiscalibrationRange, pose_error
+from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
+from calibnet.network.config import load_preset
+from calibnet.network.convolution import pack
+from calibnet.network.counting import count
+from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.precision import fastest
+from calibnet.weights.files import weights_path
+
+HEIGHT, WIDTH = 256, 512
+"""Input at which multiply-adds are counted: the paper's."""
+
+
+class Claim(NamedTuple):
+    """A row of the paper's table, on its machine and its own car's frames.
+
+    Attributes:
+        parameters_m: millions.
+        flops_g: what the paper calls FLOPs, 1e9; its numbers are those of multiply-adds.
+        latency_ms: on its GPU.
+        translation_cm: error.
+        rotation_deg: error.
+    """
+
+    parameters_m: float
+    flops_g: float
+    latency_ms: float
+    translation_cm: float
+    rotation_deg: float
+
+
+CLAIMS = {
+    "multi-scale-features": Claim(18.7, 62.5, 17.5, 1.058, 0.084),
+    "multi-scale-volumes": Claim(19.1, 63.8, 18.8, 1.213, 0.099),
+    "aggregation": Claim(19.4, 70.5, 19.5, 1.151, 0.093),
+    "hierarchical-fusion": Claim(18.8, 61.1, 18.4, 0.930, 0.078),
+    "hybrid-loss": Claim(20.2, 77.4, 22.6, 0.997, 0.074),
+    "full": Claim(20.5, 78.3, 23.3, 0.864, 0.068),
+}
+"""By the names of `calibnet.network.ablations.ABLATIONS`."""
+
+Observer = Callable[[str, int, int], None]
+"""Told the row, and the runs of it done and to be done."""
+
+
+def measure_ablation(
+    presets: Sequence[str],
+    range_: MiscalibrationRange,
+    weights: Path | None,
+    sequences: Sequence[FrameSequence],
+    repeats: int = 1,
+    seed: int = 0,
+    timed: int = 3,
+    observer: Observer | None = None,
+) -> Iterator[dict[str, Any]]:
+    """Measure the rows of each preset: parameters, multiply-adds, latency of one look, and errors after one look.
+
+    Args:
+        presets: names of presets.
+        range_: one of the five; of the miscalibrations, and of the weights.
+        weights: folder in which ``calib-inspect train --ablation NAME`` left them; None for none.
+        sequences: frames to measure errors on, by rig; the first frame is the one that latency is measured on.
+        repeats: miscalibrations a frame.
+        seed: of the miscalibrations.
+        timed: looks whose median time is the latency; 0 for none.
+        observer: told how far it is.
+
+    Yields:
+        A row for each ablation and rig, as soon as it is there; without weights one row with a sentence ``why``.
+
+    Raises:
+        DatasetError: a frame cannot be read.
+        ConfigError: there is no such preset.
+    """
+    told = observer or (lambda row, done, total: None)
+    rigs: dict[str, list[FrameSequence]] = {}
+    for sequence in sequences:
+        rigs.setdefault(sequence.rig, []).append(sequence)
+    frame = sequences[0][0] if sequences else None
+    for preset in presets:
+        for name in ABLATIONS:
+            row: dict[str, Any] = {"preset": preset, "name": name, **_cost(preset, name, range_)}
+            stage, why = _trained(preset, name, range_, weights)
+            chosen = stage or _untrained(preset, name, range_)
+            row["latency_ms"] = latency(chosen, frame, timed) if frame is not None and timed else None
+            if stage is None or not rigs:
+                yield row | {"why": why or "No frames were given to measure errors on."}
+                continue
+            for rig, of_rig in rigs.items():
+                yield row | {"rig": rig} | _errors(stage, of_rig, repeats, seed, f"{preset}, {name}, {rig}", told)
+
+
+def _cost(preset: str, name: str, range_: MiscalibrationRange) -> dict[str, int]:
+    costs = count(CalibrationNetwork(ablated(load_preset(preset), name), range_), HEIGHT, WIDTH)
+    return {
+        "parameters": sum(cost.parameters for cost in costs),
+        "multiply_adds": sum(cost.multiply_adds for cost in costs),
+    }
+
+
+def _trained(preset: str, name: str, range_: MiscalibrationRange, weights: Path | None) -> tuple[Stage | None, str]:
+    """The stage of a row, or why there is none.
+
+    Raises:
+        WeightsError: a file is there and cannot be used, or holds another row's network.
+    """
+    command = f"make them with `calib-inspect train --preset {preset} --ablation {name} --range {range_}`"
+    if weights is None:
+        return None, f"No folder of weights was given; {command} and name its --output with --weights."
+    folder = ablation_folder(weights, name)
+    path = weights_path(preset, range_, folder)
+    if not path.exists():
+        return None, f"There are no weights at {path}; {command}."
+    stage = Cascade.load(preset, (RANGES.index(range_) + 1,), folder).stages[0]
+    wanted, found = ablated(load_preset(preset), name), stage.network.config
+    if any(getattr(wanted, switch) != getattr(found, switch) for switch in ABLATIONS.values() if switch):
+        raise WeightsError(f"{path} holds the network of another row of the ablation; {command}.")
+    return stage, ""
+
+
+def _untrained(preset: str, name: str, range_: MiscalibrationRange) -> Stage:
+    """A row's network with random weights, for its latency alone."""
+    network = CalibrationNetwork(ablated(load_preset(preset), name), range_).eval()
+    pack(network, fastest(torch.device("cpu")))
+    return Stage(RANGES.index(range_) + 1, range_, network)
+
+
+def latency(stage: Stage, frame: Frame, timed: int) -> float:
+    """Median milliseconds of one look at a frame, picture and scan included, after one that is not timed."""
+    times = []
+    for _ in range(1 + timed):
+        began = time.perf_counter()
+        stage.look(frame, stage.view(frame), frame.camera_from_lidar)
+        times.append(1000 * (time.perf_counter() - began))
+    return round(median(times[1:]), 2)
+
+
+def _errors(
+    stage: Stage, sequences: Sequence[FrameSequence], repeats: int, seed: int, row: str, told: Observer
+) -> dict[str, Any]:
+    """Errors after one look of a stage; a frame that cannot be calibrated counts with its initial error."""
+    errors, failed, done = [], 0, 0
+    total = repeats * sum(map(len, sequences))
+    told(row, 0, total)
+    for sequence in sequences:
+        for frame in sequence:
+            view, reference = stage.view(frame), frame.camera_from_lidar
+            for repeat in range(repeats):
+                after = initial = draw_miscalibration(stage.range, seed, frame.index, repeat) @ reference
+                try:
+                    after = stage.look(frame, view, initial).after
+                except CalibrationError:
+                    failed += 1
+                errors.append(pose_error(after, reference))
+                done += 1
+                told(row, done, total)
+    return {"runs": len(errors), "failed": failed, **Metrics.of(errors).as_dict()}
