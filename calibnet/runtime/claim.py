@@ -13,7 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from calibnet.runtime.writing import Kind, OutputError, check_output
+from calibnet.runtime.writing import Kind, OutputError, check_output, partials_of
 
 PATIENCE_S = 0.2
 """How long a lock is waited for: the last run that had it may just be ending."""
@@ -65,11 +65,16 @@ class Claim:
     def begin(self) -> Path:
         """Put an earlier file aside and make an empty one in its place; returns its path.
 
+        What a killed run left half written beside it, see `write_whole`, goes.
+
         Raises:
             OutputError: it may not be written any more.
             OSError: it cannot be.
         """
         check_output(self.path, self.kind)
+        for left in partials_of(self.path):
+            with contextlib.suppress(OSError):
+                left.unlink()  # of a run that was killed at its end: we have the lock, so nobody is writing it
         if self.path.exists():
             earlier = self.path.with_stem(f"{self.path.stem}.earlier-{secrets.token_hex(4)}")
             self.path.rename(earlier)

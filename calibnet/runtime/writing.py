@@ -7,6 +7,8 @@ run reads (`calibnet.runtime.reading`), and without ``--overwrite`` no file of a
 from __future__ import annotations
 
 import contextlib
+import glob
+import hashlib
 import os
 import stat
 import tempfile
@@ -55,6 +57,10 @@ def keeping_others() -> Iterator[None]:
         yield
     finally:
         _overwriting = before
+
+
+PARTIAL, LONGEST_NAME = ".partial", 100
+"""Ending of what is being written, and the longest name of an output that it is called after."""
 
 
 def allow_overwriting() -> None:
@@ -114,7 +120,7 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         check_output(path, kind)
-        descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:100]}.", suffix=".partial", dir=path.parent)
+        descriptor, name = tempfile.mkstemp(prefix=_before(path), suffix=PARTIAL, dir=path.parent)
         os.close(descriptor)
         partial = Path(name)
         if isinstance(write, bytes):
@@ -122,6 +128,7 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
         else:
             write(partial)
         partial.chmod(_usual_mode())
+        _settle(partial)
         replaced = check_output(path, kind)
         partial.replace(path)
     except BaseException as error:
@@ -132,6 +139,25 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
     return replaced
+
+
+def partials_of(path: Path) -> list[Path]:
+    """What `write_whole` was writing ``path`` to when it was killed, and what it is writing to now."""
+    return list(path.parent.glob(f"{glob.escape(_before(path))}{'[a-z0-9_]' * 8}{PARTIAL}"))
+
+
+def _before(path: Path) -> str:
+    name = path.name if len(path.name) <= LONGEST_NAME else hashlib.sha256(os.fsencode(path.name)).hexdigest()
+    return f".{name}."
+
+
+def _settle(path: Path) -> None:
+    """Bring a file to the disk, so that a power cut after it has taken another's place does not lose both."""
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def kind_of_content(head: bytes) -> Kind:

@@ -43,13 +43,15 @@ def compare(
 
     from inspector.compare.comparison import Comparison
     from inspector.compare.recording import record_comparison
-    from inspector.record.stream import RecordingLostError
+    from inspector.record.flushing import RecordingLostError
 
     outputs = viewing.outputs(f"compare-{'-'.join(called)}")
     comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
     try:
         outputs.check()
-        record_comparison(comparison, outputs.open())
+        remark = record_comparison(comparison, outputs.open())
+        if remark:
+            say(remark, err=True)
         outputs.complete()
         return finish(comparison, outputs)
     except RecordingLostError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import warnings
 from dataclasses import dataclass
@@ -115,8 +116,13 @@ def cli() -> None:
     """
 
 
+RERUN_LOG = "warn,re_log_encoding::rrd::file_sink=error"
+"""What Rerun may print: not that a growing recording has no footer, which it gets in the end."""
+
+
 def main() -> None:
     """Entry point of the console script."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # they are for us; what a user has to know is a sentence of ours
+    os.environ.setdefault("RUST_LOG", RERUN_LOG)
     sys.exit(run(cli))

@@ -246,7 +246,7 @@ def make_session(
 @contextmanager
 def recording_to(outputs: Outputs) -> Iterator[None]:
     """Close the outputs in the end, whatever happens."""
-    from inspector.record.stream import RecordingLostError
+    from inspector.record.flushing import RecordingLostError
 
     try:
         yield

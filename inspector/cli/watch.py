@@ -69,7 +69,10 @@ def watch_sequence(
             from inspector.record.watch import record_watch
 
             title = f"{options.title}, watched"
-            record_watch(outputs.open(), title, session.description.recording_id + "-watch", watched.watch, lines)
+            recording_id = session.description.recording_id + "-watch"
+            remark = record_watch(outputs.open(), title, recording_id, watched.watch, lines)
+            if remark:
+                say(remark, err=True)
             outputs.complete()
         write_json(json_file, as_json(watched))
         for line in lines:

@@ -33,12 +33,15 @@ RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (
 CHUNKS_A_FLUSH = 16
 
 
-def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
+def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> str:
     """Write the comparison.
 
     Args:
         comparison: the runs.
-        sinks: Rerun sinks, see `inspector.record.outputs`.
+        sinks: files and Rerun sinks, see `inspector.record.outputs`.
+
+    Returns:
+        What a user has to know about how it was closed; empty for nothing.
 
     Raises:
         RecordingError: a run's recording is damaged.
@@ -59,6 +62,7 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> None:
                 stream.flush()
     finally:
         stream.close()
+    return stream.remark
 
 
 def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:

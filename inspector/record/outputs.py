@@ -90,14 +90,10 @@ class Outputs:
             )
 
     def open(self) -> Sequence[Any]:
-        """Create the file, start what has to be started, and return Rerun's sinks, the file first."""
+        """Create the file, start what has to be started, and return the file's path and Rerun's sinks."""
         sinks: list[Any] = []
         if self.file is not None:
-            claim = self._claimed(self.file)
-            try:
-                sinks.append(rr.FileSink(claim.begin()))
-            except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
-                raise ConfigError(f"{self.file} cannot be written: {error}.") from None
+            sinks.append(self._claimed(self.file).begin())
         if self.viewer:
             sinks += self._open_viewer()
         if self.serve:

@@ -1,15 +1,14 @@
 """A Rerun recording of a calibration run: opened with its first frame, closed with a footer.
 
-The same input and seed give the same data: no wall-clock timeline, an id made from the run's options. A run whose pace
-lets it cut chunks by frames alone (`FLUSH_S`) also gives the same chunks (``rerun rrd compare --unordered``). Frames
-are flushed as they come, so that memory stays bounded and a killed run leaves all but its last second.
+The same input and seed give the same data, in the same chunks (``rerun rrd compare --unordered``): no wall-clock
+timeline, an id made from the run's options. Every frame is handed to the file when it is logged, so that memory stays
+bounded and a killed run leaves all frames but the one in work.
 """
 
 from __future__ import annotations
 
 import hashlib
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,21 +27,6 @@ from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
-
-FLUSH_SPARSE, FLUSH_DENSE = (4, 32), (1, 12)
-"""Fewest and most frames between two flushes, of a run that is fast enough to have so many within `FLUSH_S`.
-
-A flush writes one chunk an entity. Each costs 3 kB of file, much beside a small frame, and some of
-the memory that collects the footer, see `FLUSHES`. So the longer a run, the rarer the flushes.
-"""
-FLUSH_SHARE = 25
-"""Frames recorded for each frame that a kill may lose."""
-FLUSH_S = 1.0
-"""Seconds after a flush from which on the next frame is flushed at once: a kill loses what the last second recorded."""
-FLUSHES = 300
-"""Flushes at that pace; of a run longer than five minutes a kill may lose a 300th. Every flush costs 0.9 MB of memory
-until the recording is closed: 13 kB a chunk that Rerun's file sink keeps for the footer. Without a footer memory would
-stay as it is, and readers would have no random access."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +57,12 @@ class Recording:
         """Open the sinks and log what holds for the whole recording: title, properties, layout, legends.
 
         Args:
-            sinks: Rerun sinks, see `inspector.record.outputs`.
+            sinks: files and Rerun sinks, see `inspector.record.outputs`.
             description: identifies the run.
             layout: what the recording will contain.
         """
         self._contents = layout.contents
         self._tabs = wanted_tabs(layout)
-        self._frames = self._unflushed = 0
         self._seconds: dict[int, float] = {}
         blueprint = make_blueprint(layout, self._tabs)
         options, title = (
@@ -94,7 +77,6 @@ class Recording:
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
         self._stream.flush()  # a recording that is cut off anywhere later can still be read
-        self._flushed = self._began = time.monotonic()
 
     def log(self, observation: Observation) -> None:
         """Log everything about one frame and hand it to the sinks."""
@@ -102,28 +84,19 @@ class Recording:
         log_frame(self._rec, observation, self._contents)
         for tab in self._tabs:
             tab.log(self._rec, observation, self._contents)
-        self._frames += 1
-        self._flush_when_due()
-
-    def _flush_when_due(self) -> None:
-        self._unflushed += 1
-        fewest, most = FLUSH_DENSE if self._contents.dense else FLUSH_SPARSE
-        due = self._unflushed >= min(max(self._frames // FLUSH_SHARE, fewest), most)
-        now = time.monotonic()
-        if due or now - self._flushed >= max(FLUSH_S, (now - self._began) / FLUSHES):
-            self._unflushed = 0
-            self._stream.flush()
-            self._flushed = time.monotonic()
+        self._stream.flush()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
         """Log which frames could not be used, and why; nothing else is there of them."""
         for bad in frames:
             self._rec.set_frame(bad.frame, self._seconds.get(bad.frame, 0.0))
             self._rec.log(entities.SKIPPED, rr.TextLog(bad.why, level=rr.TextLogLevel.WARN))
+        self._stream.flush()
 
     def log_given(self, verdict: Verdict) -> None:
         """Log whether the calibration that the run started from is good."""
         self._rec.log_once(entities.VERDICT_GIVEN, verdict_values(verdict))
+        self._stream.flush()
 
     def log_drive(
         self,
@@ -136,21 +109,31 @@ class Recording:
         if estimate.verdict is not None:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
         log_drive(self._rec, estimate, reference, self._seconds, given, remarks)
+        self._stream.flush()
 
     def log_no_drive(self, why: Sequence[str]) -> None:
         """Say, where its answer would stand, why the drive is not solved."""
         text = "\n\n".join(["# Not solved", *why])
         self._rec.log_for_all(entities.DRIVE_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self._stream.flush()
 
     def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
         """Log what the drive's extrinsic makes of one of its frames."""
         observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
         log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
-        self._flush_when_due()
+        self._stream.flush()
 
-    def close(self) -> None:
-        """Flush and write the footer; nothing, where nothing can be written any more."""
-        self._stream.close()
+    def close(self, advance: Callable[[], object] | None = None) -> str:
+        """Flush and write the footer; nothing, where nothing can be written any more.
+
+        Args:
+            advance: called again and again while that takes long.
+
+        Returns:
+            What a user has to know about how it was closed; empty for nothing.
+        """
+        self._stream.close(advance)
+        return self._stream.remark
 
     def __enter__(self) -> Recording:
         return self

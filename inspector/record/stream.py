@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
 
-from calibnet.errors import CalibnetError
+from calibnet.errors import CalibnetError, ConfigError
+from inspector.record.flushing import RecordingLostError, flush
+from inspector.record.indexing import NoRoomError, index
 
-FLUSH_TIMEOUT_S = 60.0
 FLUSH_BYTES = 1024 * 1024 * 1024
 """Above any batch, so that only the flushes cut chunks."""
-
-
-class RecordingLostError(CalibnetError):
-    """Nothing can be written any more; Rerun would wait for it for ever, even when the process ends."""
 
 
 class ViewerClosedError(CalibnetError):
@@ -29,6 +27,7 @@ class Stream:
 
     Attributes:
         rec: what to log to. Chunks are cut by `flush` alone, and there is no wall-clock timeline.
+        remark: what a user has to know about how it was closed; empty for nothing.
     """
 
     def __init__(
@@ -40,30 +39,51 @@ class Stream:
             application_id: recordings with the same one share their layout in a viewer.
             recording_id: the same for the same data.
             title: for the viewer's list of recordings.
-            sinks: Rerun sinks, see `inspector.record.outputs`; without any, everything goes to stdout.
+            sinks: paths of files to write, and Rerun sinks, see `inspector.record.outputs`; without any, everything
+                goes to stdout.
             blueprint: the layout.
+
+        Raises:
+            ConfigError: a file cannot be written.
         """
         rr.set_strict_mode(True)  # what cannot be logged must be an error, not a gap in the recording and a warning
+        self.remark = ""
         self._sinks_gone = False
-        self._has_file = any(isinstance(sink, rr.FileSink) for sink in sinks)
-        self.rec = rr.RecordingStream(
-            application_id,
-            recording_id=recording_id,
-            batcher_config=rr.ChunkBatcherConfig(flush_tick=timedelta(days=1), flush_num_bytes=FLUSH_BYTES),
-        )
-        if sinks:
-            self.rec.set_sinks(*sinks, default_blueprint=blueprint)
-        else:
-            self.rec.stdout(default_blueprint=blueprint)
+        self._files = [sink for sink in sinks if isinstance(sink, Path)]
+        self._has_file = any(isinstance(sink, Path | rr.FileSink) for sink in sinks)
+        self._identity, self._blueprint = (application_id, recording_id), blueprint
+        self.rec = self._opened([_growing(sink) if isinstance(sink, Path) else sink for sink in sinks], True)
         self.rec.set_log_time_enabled(False)
         self.rec.send_recording_name(title)
 
-    def close(self) -> None:
-        """Flush and write the footer; nothing, where nothing can be written any more."""
+    def _opened(self, sinks: Sequence[Any], is_new: bool) -> rr.RecordingStream:
+        """Rerun's stream, which of a new recording says when it was begun."""
+        application_id, recording_id = self._identity
+        batching = rr.ChunkBatcherConfig(flush_tick=timedelta(days=1), flush_num_bytes=FLUSH_BYTES)
+        rec = rr.RecordingStream(
+            application_id, recording_id=recording_id, batcher_config=batching, send_properties=is_new
+        )
+        if sinks:
+            rec.set_sinks(*sinks, default_blueprint=self._blueprint)
+        else:
+            rec.stdout(default_blueprint=self._blueprint)
+        return rec
+
+    def close(self, advance: Callable[[], object] | None = None) -> None:
+        """Flush, and give the files their footers; nothing, where nothing can be written any more.
+
+        Args:
+            advance: called again and again while that takes long.
+        """
         if self._sinks_gone:
             return
         self.flush()
         self.rec.disconnect()
+        for file in self._files:
+            try:
+                index(file, lambda partial: self._opened([rr.FileSink(partial)], False), advance)
+            except NoRoomError as error:
+                self.remark = str(error)
 
     def flush(self) -> None:
         """Hand all rows to the sinks.
@@ -73,14 +93,21 @@ class Stream:
             ViewerClosedError: the viewer has gone and there is no file.
         """
         try:
-            self.rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
-        except RuntimeError as error:
-            self._sinks_gone = "timed out" in str(error) or not self._has_file
-            if "timed out" in str(error):
-                raise RecordingLostError(
-                    "The recording can no longer be written: the disk or a quota is full, or a viewer does not respond."
-                ) from None
+            flush(self.rec)
+        except RecordingLostError:
+            self._sinks_gone = True
+            raise
+        except RuntimeError:
             if not self._has_file:
+                self._sinks_gone = True
                 raise ViewerClosedError(
                     "The viewer has closed the connection, and there is no --save to go on with."
                 ) from None
+
+
+def _growing(path: Path) -> rr.FileSink:
+    """A file that is written while it has no footer."""
+    try:
+        return rr.FileSink(path, write_footer=False)
+    except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
+        raise ConfigError(f"{path} cannot be written: {error}.") from None

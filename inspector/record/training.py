@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
+from uuid import uuid4
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -12,6 +13,7 @@ import rerun.blueprint as rrb
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind
 from inspector import entities
+from inspector.record.stream import Stream
 
 if TYPE_CHECKING:
     from calibnet.training.progress import Progress
@@ -23,9 +25,9 @@ class TrainingLog:
 
     def __init__(self, path: Path, name: str) -> None:
         self._claim = Claim(path, Kind.RECORDING)
-        self.recording = rr.RecordingStream(entities.TRAINING_APPLICATION_ID)
-        self.recording.save(self._claim.begin(), default_blueprint=training_blueprint())
-        self.recording.send_recording_name(name)
+        sinks = [self._claim.begin()]
+        self._stream = Stream(entities.TRAINING_APPLICATION_ID, uuid4().hex, name, sinks, training_blueprint())
+        self.recording = self._stream.rec
 
     def progressed(self, progress: Progress) -> None:
         """Log the running means of the losses."""
@@ -34,22 +36,21 @@ class TrainingLog:
             if not math.isfinite(value):  # the warm-up has no pose whose error could be plotted
                 continue
             self.recording.log(f"{entities.TRAINING}/{loss}", rr.Scalars(value))
-        self.recording.flush()
+        self._stream.flush()
 
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
         """Log the figures of the held-out frames."""
         self._at(progress)
         for figure, value in figures._asdict().items():
             self.recording.log(f"{entities.VALIDATION}/{figure}", rr.Scalars(value))
-        self.recording.flush()
+        self._stream.flush()
 
     def __enter__(self) -> TrainingLog:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
         """Write the footer; an earlier recording of the name goes, or stays where the run did not come to its end."""
-        self.recording.flush()
-        self.recording.disconnect()
+        self._stream.close()
         if kind is None:
             self._claim.complete()
         self._claim.release()

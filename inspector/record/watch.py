@@ -32,17 +32,18 @@ def curve(axis: str, kind: str) -> str:
     return f"watch/{axis}/{kind}"
 
 
-def record_watch(
-    sinks: Sequence[Any], title: str, recording_id: str, found: Watch | None, lines: Sequence[str]
-) -> None:
+def record_watch(sinks: Sequence[Any], title: str, recording_id: str, found: Watch | None, lines: Sequence[str]) -> str:
     """Write the recording.
 
     Args:
-        sinks: of Rerun, see `inspector.record.outputs`.
+        sinks: files and Rerun sinks, see `inspector.record.outputs`.
         title: of the recording.
         recording_id: the same for the same data.
         found: what was found; None where there is only something to say.
         lines: what is said, the result last.
+
+    Returns:
+        What a user has to know about how it was closed; empty for nothing.
     """
     stream = Stream(entities.APPLICATION_ID, recording_id, title, sinks, watch_blueprint())
     try:
@@ -52,6 +53,7 @@ def record_watch(
             _log(stream.rec, found)
     finally:
         stream.close()
+    return stream.remark
 
 
 def _log(rec: rr.RecordingStream, found: Watch) -> None:

@@ -136,7 +136,7 @@ class Session:
             raise type(error)(f"{error}{self._what_is_kept(summary)}") from error
         finally:
             if recording is not None:
-                recording.close()
+                self._close(recording)
         if recording is not None and not summary.interrupted:
             self.outputs.complete()
         return summary
@@ -148,6 +148,14 @@ class Session:
         assert isinstance(self.cascade, DriveCalibrator)
         initial = self.start.initial(first_readable(self.frames))
         return SolvedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
+
+    def _close(self, recording: Recording) -> None:
+        """Close the recording, which of a long one takes a while."""
+        with frame_progress(self.console) as progress:
+            task = progress.add_task("index of the recording", total=None)
+            remark = recording.close(lambda: progress.update(task, advance=1))
+        if remark:
+            self.console.print(remark, style="yellow", markup=False, soft_wrap=True)
 
     def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""

@@ -46,6 +46,22 @@ def test_the_earlier_file_goes_only_when_the_new_one_is_whole(tmp_path: Path) ->
     assert len(names(tmp_path)) == 2, "what the run before had put aside stays"
 
 
+def test_what_a_killed_run_was_writing_goes_and_nothing_else(tmp_path: Path) -> None:
+    kept = {
+        ".run.rrd.partial",
+        ".run.rrd.b.abcdefgh.partial",
+        ".run.rrd.abcdefghi.partial",
+        ".other.rrd.abcdefgh.partial",
+    }
+    for name in {".run.rrd.a1b2c3_4.partial", *kept}:
+        (tmp_path / name).write_bytes(HEAD)
+    claim = Claim(tmp_path / "run.rrd", Kind.RECORDING)
+    claim.begin()
+    claim.complete()
+    claim.release()
+    assert names(tmp_path) == {"run.rrd", *kept}
+
+
 def test_names_of_ours_never_collide(tmp_path: Path) -> None:
     (tmp_path / "demo.rrd").write_bytes(HEAD)
     first, second = (Claim.of_new(tmp_path / "demo.rrd", Kind.RECORDING) for _ in range(2))

@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 
 from calibnet.verdict import Cause
 from inspector import entities
+from inspector.read.run import RecordedRun, read_run
 from inspector.record import recording as recording_module
 from inspector.record.outputs import rerun_binary
 from inspector.record.tabs import cascade, cost_volumes
@@ -150,10 +151,7 @@ def test_table_names_errors_skipped_stages_and_no_milliseconds(full_recording: P
 
 
 @pytest.mark.parametrize("detail", ["full", "overview"])
-def test_same_seed_same_recording(
-    record: Callable[..., Any], tmp_path: Path, detail: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(recording_module, "FLUSH_S", 60.0)  # a busy machine cuts other chunks
+def test_same_seed_same_recording(record: Callable[..., Any], tmp_path: Path, detail: str) -> None:
     for name in ("a", "b"):
         record(tmp_path / f"{name}.rrd", length=5, detail=detail)
     assert compare(tmp_path / "a.rrd", tmp_path / "b.rrd") == 0
@@ -166,28 +164,27 @@ def test_another_seed_is_another_recording(record: Callable[..., Any], tmp_path:
     assert compare(tmp_path / "1.rrd", tmp_path / "2.rrd") == 1
 
 
-@pytest.mark.parametrize(("seconds", "flushed"), [(0.1, [4, 8]), (0.4, [3, 6, 9]), (2.0, list(range(1, 11)))])
-def test_a_kill_loses_what_the_last_second_recorded(
-    record: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float, flushed: list[int]
+def test_a_kill_loses_nothing_of_what_was_recorded(
+    record: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ten frames at a pace of so many seconds each, and after which of them everything was handed to the file."""
-    now, frames, after = [0.0], [0], []
-    monkeypatch.setattr(recording_module.time, "monotonic", lambda: now[0])
-    log, flush = recording_module.Recording.log, recording_module.Stream.flush
+    """After every frame what the file holds at that moment is read, as after a kill."""
+    log, file, found = recording_module.Recording.log, tmp_path / "run.rrd", []
+
+    def killed() -> RecordedRun:
+        copy = tmp_path / "killed.rrd"
+        copy.write_bytes(file.read_bytes())
+        return read_run(copy)
 
     def logged(recording: Any, observation: Any) -> None:
-        now[0] += seconds
-        frames[0] += 1
         log(recording, observation)
-
-    def counted(stream: Any) -> None:
-        after.append(frames[0])
-        flush(stream)
+        run = killed()
+        found.append([frame.index for frame in run.frames])
+        np.testing.assert_array_equal(run.frames[-1].corrected, observation.trace.corrected)
 
     monkeypatch.setattr(recording_module.Recording, "log", logged)
-    monkeypatch.setattr(recording_module.Stream, "flush", counted)
-    record(tmp_path / "run.rrd", length=10, detail="overview", stages=(5,), strides=(32,))
-    assert after == [0, *flushed, 10]
+    record(file, length=4, detail="overview", strides=(32,))
+    assert found == [list(range(count)) for count in range(1, 5)]
+    assert read_run(file).warning == ""
 
 
 def compare(one: Path, other: Path) -> int:
