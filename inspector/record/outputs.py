@@ -33,7 +33,7 @@ SWITCHED_OFF = ("0", "off", "false", "no")
 PR_SET_PDEATHSIG = 1
 """Of Linux's prctl: the signal that a process gets when its parent ends."""
 RESERVE_BYTES = 32 * 1024 * 1024
-"""Free disk space below which recording stops, while the footer can still be written."""
+"""Free disk space below which recording stops, while what is at hand can still be written."""
 
 
 @dataclass

@@ -17,6 +17,7 @@ from rerun.chunk import RrdReader
 
 from calibnet.errors import ConfigError, DatasetError
 from inspector.read.file import RecordingFile
+from inspector.read.run import read_run
 from inspector.record import outputs as outputs_module
 from inspector.record.outputs import Outputs, has_display
 
@@ -141,11 +142,11 @@ def test_a_bad_first_frame_leaves_an_older_file_alone(
     assert file.read_bytes() == b"an older recording"
 
 
-def test_a_full_disk_stops_in_time_for_the_footer(
+def test_a_full_disk_stops_in_time_and_leaves_what_was_recorded(
     record: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "run.rrd"
-    free = iter([1 << 40, 1 << 40, 1000])
+    free = iter([1 << 40, 1 << 40, 1000, 1000])
 
     class Usage:
         def __init__(self, _: Path) -> None:
@@ -154,7 +155,8 @@ def test_a_full_disk_stops_in_time_for_the_footer(
     monkeypatch.setattr(outputs_module.shutil, "disk_usage", Usage)
     with pytest.raises(ConfigError, match=r"is full.*2 of 4 frames"):
         record(file, length=4)
-    RrdReader(file).store()
+    assert [frame.index for frame in read_run(file).frames] == [0, 1], "there is no room for an index, and none needed"
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize("value", ["off", "0", "False"])
