@@ -26,6 +26,8 @@ METHODS = Registry(
         "calibnet": "calibnet.methods.learned.method:CalibNetMethod",
         "lccnet": "calibnet.methods.learned.method:LCCNetMethod",
         "calibformer": "calibnet.methods.learned.method:CalibFormerMethod",
+        "information-distance": "calibnet.methods.information_distance:InformationDistance",
+        "calib-anything": "calibnet.methods.calib_anything:CalibAnything",
     },
 )
 

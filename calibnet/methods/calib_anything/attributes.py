@@ -1,0 +1,80 @@
+"""What is known of every point of a scan by itself: its reflectance, its normal and the segment it belongs to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.alignment.evidence import ranks
+from calibnet.geometry.types import Floats
+
+MOST_POINTS = 9000
+"""Points that are searched with, evenly from the scan: each look at a pose reads all of them."""
+NEIGHBOURS = 20
+"""Points that a normal is fitted to."""
+PLANES, PLANE_M, PLANE_SHARE = 3, 0.15, 0.08
+"""Most planes that are cut out (the ground, walls), how far off them their points may be, and the share of the scan
+that has to lie on one."""
+CLUSTER_M, CLUSTER_FEWEST = 0.8, 8
+"""Between neighbours of one segment, and the fewest of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Attributes:
+    """Points with what is known of each.
+
+    Attributes:
+        points: ``[N, 3]`` float32, metres, in the LiDAR frame.
+        reflectance: ``[N]``, the share of points with less of it, 0..1: every scanner has a scale of its own.
+        normals: ``[N, 3]``, of unit length, towards the scanner.
+        segments: ``[N]``, from 0; points of no segment have one of their own together.
+    """
+
+    points: NDArray[np.float32] = field(repr=False)
+    reflectance: Floats = field(repr=False)
+    normals: Floats = field(repr=False)
+    segments: NDArray[np.int64] = field(repr=False)
+
+    def only(self, rows: NDArray[np.int64]) -> Attributes:
+        """Some of them."""
+        return Attributes(self.points[rows], self.reflectance[rows], self.normals[rows], self.segments[rows])
+
+
+def attributes(scan: NDArray[np.float32], seed: int = 0) -> Attributes:
+    """Of the points of a scan ``[N, 4]``.
+
+    The paper cuts planes out of the scan and clusters what is left; so does this. With the fewer points that are
+    searched with, clusters are wide.
+    """
+    import open3d as o3d
+
+    chosen = scan[np.linspace(0, len(scan) - 1, min(len(scan), MOST_POINTS)).astype(np.int64)]
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(chosen[:, :3].astype(np.float64)))
+    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
+    cloud.orient_normals_towards_camera_location(np.zeros(3))
+    o3d.utility.random.seed(seed)
+    return Attributes(chosen[:, :3], ranks(chosen[:, 3]), np.asarray(cloud.normals), _segments(cloud))
+
+
+def _segments(cloud: object) -> NDArray[np.int64]:
+    """Planes first, then clusters of what is left."""
+    import open3d as o3d
+
+    assert isinstance(cloud, o3d.geometry.PointCloud)
+    total = len(cloud.points)
+    segments, left = np.zeros(total, np.int64), np.arange(total)
+    number = 1
+    for _ in range(PLANES):
+        if len(left) < max(3, PLANE_SHARE * total):
+            break
+        _, on_plane = cloud.select_by_index(left).segment_plane(PLANE_M, 3, 400)
+        if len(on_plane) < PLANE_SHARE * total:
+            break
+        segments[left[on_plane]] = number
+        left, number = np.delete(left, on_plane), number + 1
+    if len(left):
+        clusters = np.asarray(cloud.select_by_index(left).cluster_dbscan(CLUSTER_M, CLUSTER_FEWEST), np.int64)
+        segments[left] = np.where(clusters >= 0, number + clusters, 0)
+    return segments

@@ -1,0 +1,74 @@
+"""The picture cut into masks: by Segment Anything, whose masks are read from PNG files, or by a classical method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.frame import Frame
+from calibnet.datasets.images import read_image, resize_image
+from calibnet.errors import ConfigError
+from calibnet.geometry import PinholeCamera
+
+SCALE, SMALLEST, BLUR = 150.0, 120, 0.8
+"""Of the graph segmentation: how readily regions grow, the fewest pixels of one, and how much the picture is blurred."""
+MOST_MASKS = 2000
+"""Files read for a picture."""
+LARGEST_SHARE = 0.5
+"""Of the picture; what covers more tells nothing: it is the sky, or everything."""
+NONE = -1
+
+Labels = NDArray[np.int64]
+"""``[H, W]``, the mask that each pixel belongs to, or `NONE`."""
+
+
+def segmented(frame: Frame, camera: PinholeCamera) -> Labels:
+    """Regions of alike colours: the graph segmentation of Felzenszwalb & Huttenlocher (2004)."""
+    from skimage.segmentation import felzenszwalb
+
+    picture = resize_image(frame.image, camera)
+    return np.asarray(felzenszwalb(picture, scale=SCALE, sigma=BLUR, min_size=SMALLEST), np.int64)
+
+
+def read_masks(folder: Path, frame: Frame, camera: PinholeCamera) -> Labels:
+    """The masks of a frame: the PNG files of the folder that has its picture's name, white where the mask is.
+
+    Masks may lie over each other. A pixel belongs to the smallest one that has it, which is the most of a thing.
+
+    Raises:
+        ConfigError: there are none, or one has another size than the picture.
+    """
+    where = folder / Path(frame.source).stem
+    files = sorted(where.glob("*.png"))[:MOST_MASKS] if where.is_dir() else []
+    if not files:
+        raise ConfigError(
+            f"There are no masks in {where}: --masks DIR holds, for each picture, a folder of its name without ending, "
+            "with a PNG for each mask, as Segment Anything's amg.py writes them."
+        )
+    masks = [_read_mask(file, frame) for file in files]
+    labels = np.full((camera.height, camera.width), NONE, np.int64)
+    for number, mask in enumerate(sorted(masks, key=np.count_nonzero, reverse=True)):
+        if mask.mean() <= LARGEST_SHARE:
+            small = cv2.resize(mask.astype(np.uint8), (camera.width, camera.height), interpolation=cv2.INTER_NEAREST)
+            labels[small > 0] = number
+    return labels
+
+
+def _read_mask(file: Path, frame: Frame) -> NDArray[np.bool_]:
+    pixels = read_image(file)
+    size = (frame.camera.height, frame.camera.width)
+    if pixels.shape[:2] != size:
+        raise ConfigError(
+            f"The mask {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels and its picture {size[1]} x {size[0]}; "
+            "make the masks from the pictures as they are calibrated."
+        )
+    return np.asarray(pixels.max(axis=2) > 127)
+
+
+def painted(labels: Labels) -> NDArray[np.uint8]:
+    """Each mask in a colour of its own, ``[H, W, 3]``; black where there is none."""
+    palette = np.random.default_rng(0).integers(60, 256, (max(int(labels.max()) + 1, 1), 3), dtype=np.uint8)
+    return np.where((labels >= 0)[..., None], palette[np.maximum(labels, 0)], np.uint8(0))

@@ -1,0 +1,83 @@
+"""The search: extrinsics drawn at random around the guess, the best one found last being the centre of the next draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from calibnet.datasets.frame import Frame
+from calibnet.errors import CalibrationError
+from calibnet.exhibit import Curve, Exhibit
+from calibnet.geometry import MiscalibrationRange, miscalibration
+from calibnet.geometry.types import Extrinsic, Floats, Transform
+from calibnet.methods.calib_anything.attributes import attributes
+from calibnet.methods.calib_anything.consistency import FEWEST, Consistency
+from calibnet.methods.calib_anything.masks import Labels, painted, read_masks, segmented
+from calibnet.runtime.clock import Clock
+from calibnet.trace import CascadeTrace, StageTrace
+
+HEIGHT, WIDTH = 256, 832
+"""The picture is resized to the area of so many pixels, its aspect kept."""
+ROUNDS = ((1.0, 0.0, 300), (0.5, 0.5, 200), (0.25, 0.25, 200), (0.1, 0.15, 200), (0.04, 0.06, 150))
+"""Of the search: shares of the range's angles and offsets within which is drawn, and how often. The paper begins with the
+rotation alone, then searches all six at random; how far and how often is ours."""
+SEED = 0
+
+
+class CalibAnything:
+    """A `Calibrator` without weights."""
+
+    def __init__(self, range_: MiscalibrationRange, masks: Path | None = None) -> None:
+        """Search within ``range_``, in ``masks`` of Segment Anything; by default the picture is cut here."""
+        self.range, self.masks = range_, masks
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """Search one frame.
+
+        Raises:
+            CalibrationError: hardly any point is in the picture under the guess.
+            ConfigError: there are no masks of the frame where these are read.
+        """
+        clock, camera = Clock(torch.device("cpu")), frame.camera.fitted(HEIGHT, WIDTH, 1)
+        labels = segmented(frame, camera) if self.masks is None else read_masks(self.masks, frame, camera)
+        clock("masks")
+        if len(frame.points) < 3:
+            raise CalibrationError(f"Frame {frame.index} has too few points for any mask.")
+        score = Consistency(labels, camera, attributes(frame.points), initial)
+        clock("attributes")
+        change, scores = self._search(score, initial)
+        clock("search")
+        stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
+        if detail:
+            curve = Curve("Score of the best so far over the search", scores)
+            stage = replace(stage, exhibits=tuple(exhibits(labels, score, stage)), curves=(curve,))
+        return CascadeTrace(initial, (stage,))
+
+    def _search(self, score: Consistency, initial: Extrinsic) -> tuple[Transform, Floats]:
+        """The best change of the guess, and the score of the best so far after every draw."""
+        generator = np.random.default_rng(SEED)
+        best, scores = np.zeros(6), [score(initial)]
+        for turned, shifted, count in ROUNDS:
+            reach = np.array([turned * self.range.rotation_deg] * 3 + [shifted * self.range.translation_m] * 3)
+            limit = np.array([self.range.rotation_deg] * 3 + [self.range.translation_m] * 3)
+            centre = best
+            for draw in generator.uniform(-1, 1, (count, 6)):
+                tried = np.clip(centre + reach * draw, -limit, limit)
+                value = score(miscalibration(tried[:3], tried[3:]) @ initial)
+                if value > scores[-1]:
+                    best = tried
+                scores.append(max(value, scores[-1]))
+        return miscalibration(best[:3], best[3:]), np.array(scores)
+
+
+def exhibits(labels: Labels, score: Consistency, stage: StageTrace) -> Iterator[Exhibit]:
+    """The masks, and how alike the points in each are at the start and in the end."""
+    yield Exhibit("Masks", painted(labels))
+    for name, extrinsic in (("at the start", stage.before), ("in the end", stage.after)):
+        scores, counts = score.of_masks(extrinsic)
+        known = np.append(np.where(counts >= FEWEST, scores, np.nan), np.nan)  # the last one for no mask
+        yield Exhibit(f"How alike the points in each mask are, {name}", known[labels].astype(np.float32))

@@ -1,0 +1,64 @@
+"""Information distance, after Koide et al., "General, single-shot, target-less" (2023): reflectance against brightness.
+
+Where scan and picture fit, the reflectance of a point and the brightness of its pixel tell most of each other. The
+normalised information distance of the two is made small from several starts around the guess, of which the best is
+taken. Theirs matches learned features for a guess and then descends once; the guess is given here, and farther off than
+descending reaches, so that the starts are ours.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from calibnet.alignment import Evidence, align, gather, picture_camera
+from calibnet.alignment.evidence import Reflectance
+from calibnet.datasets.frame import Frame
+from calibnet.errors import CalibrationError
+from calibnet.exhibit import Curve, Exhibit
+from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.se3 import pose_from_vector
+from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.clock import Clock
+from calibnet.trace import CascadeTrace, StageTrace
+
+STARTS = 20
+"""From where it descends: the guess, and places drawn around it."""
+SEED = 0
+
+
+class InformationDistance:
+    """A `Calibrator` without weights."""
+
+    def __init__(self, range_: MiscalibrationRange) -> None:
+        """Expect miscalibrations within ``range_``."""
+        self.range = range_
+        self.covariance = np.diag(1 / np.diag(range_.information))
+
+    def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
+        """Descend from all starts.
+
+        Raises:
+            CalibrationError: the scan has no reflectance, or too few of its points are in the picture.
+        """
+        clock = Clock(torch.device("cpu"))
+        terms = [term for term in gather(frame, initial).terms if isinstance(term, Reflectance)]
+        if not terms:
+            raise CalibrationError(f"Frame {frame.index} has too few points with reflectance in the picture.")
+        evidence = Evidence(tuple(terms))
+        clock("histogram")
+        generator = np.random.default_rng(SEED)
+        spread = np.linalg.cholesky(self.covariance)
+        starts = [np.zeros(6), *(generator.normal(size=(STARTS - 1, 6)) @ spread.T)]
+        found = [align([evidence], np.zeros(6), self.covariance, [start])[0] for start in starts]
+        distances = np.array([evidence(pose_from_vector(vector))[0] for vector in found])
+        clock("descent")
+        change, camera = pose_from_vector(found[int(distances.argmin())]), picture_camera(frame.camera)
+        stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
+        if detail:
+            brightness = Exhibit("Brightness held against the scan's reflectance", terms[0].brightness.image)
+            curve = Curve("Distance that each start came down to, sorted", np.sort(distances))
+            stage = replace(stage, exhibits=(brightness,), curves=(curve,))
+        return CascadeTrace(initial, (stage,))
