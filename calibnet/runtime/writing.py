@@ -36,6 +36,7 @@ class Kind(StrEnum):
     JUNIT = "a JUnit file"
     EXPORT = "a file that calib-inspect exported"
     PAGE = "the page of a report"
+    TABLE = "a CSV table of calib-inspect"
     PNG = "a PNG picture"
     JPEG = "a JPEG picture"
     GIF = "a GIF picture"
@@ -174,6 +175,8 @@ def kind_of_content(head: bytes) -> Kind:
         return Kind.JUNIT
     if text[:9].lower() == b"<!doctype" and b'content="calib-inspect"' in head:
         return Kind.PAGE
+    if text.startswith(b"method,range,rig"):
+        return Kind.TABLE
     if head[7:9] == b"\0{":
         return Kind.WEIGHTS
     if text.startswith((b"{", b"[")):

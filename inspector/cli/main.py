@@ -55,6 +55,7 @@ COMMANDS = {
     "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
     "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
     "ablate": LazyCommand("inspector.cli.ablate:ablate", "What each module of the network costs and is worth."),
+    "bench": LazyCommand("inspector.cli.bench:bench", "All methods on the same frames: the paper's table, measured."),
     "benchmark": LazyCommand(
         "inspector.cli.benchmark:benchmark", "Milliseconds of the cascade by part, stage and frame."
     ),

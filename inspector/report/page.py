@@ -12,7 +12,7 @@ from calibnet.geometry import PoseError
 from inspector.read.run import RecordedRun
 from inspector.record.contents import Coloring
 from inspector.report.charts import charts, series_styles
-from inspector.report.metrics import DISTANCE_M, Figures
+from inspector.report.metrics import DISTANCE_M, Figures, State
 from inspector.report.pictures import depth_scale
 from inspector.report.tables import axes_table, stages_table
 from inspector.report.verdict import GRADES, ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
@@ -80,7 +80,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
     known = figures.has_reference
     return _template("page.html").substitute(
         title=escape(f"{name}: calibration report"),
-        style=_template("page.css").substitute(series_styles(figures.states)),
+        style=stylesheet(figures.states),
         headline=escape(headline(figures)),
         warning=f'<p class="warning">{escape(run.warning)}</p>' if run.warning else "",
         word=run.verdict.word.capitalize(),
@@ -122,6 +122,11 @@ def _scale(run: RecordedRun) -> str:
 
 def _resource(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def stylesheet(states: Sequence[State] = ()) -> str:
+    """The looks of a page, with the colours of the curves of some states."""
+    return _template("page.css").substitute(series_styles(states))
 
 
 def _template(name: str) -> Template:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.alignment.evidence import ranks
 from calibnet.geometry.types import Floats
+
+if TYPE_CHECKING:
+    from open3d.geometry import PointCloud
 
 MOST_POINTS = 9000
 """Points that are searched with, evenly from the scan: each look at a pose reads all of them."""
@@ -17,8 +21,8 @@ NEIGHBOURS = 20
 PLANES, PLANE_M, PLANE_SHARE = 3, 0.15, 0.08
 """Most planes that are cut out (the ground, walls), how far off them their points may be, and the share of the scan
 that has to lie on one."""
-CLUSTER_M, CLUSTER_FEWEST = 0.8, 8
-"""Between neighbours of one segment, and the fewest of them."""
+CLUSTER_M, PIECE_M, CLUSTER_FEWEST = 0.8, 1.6, 8
+"""Between neighbours of one segment, and between those of one piece of a plane; the fewest of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,23 +62,23 @@ def attributes(scan: NDArray[np.float32], seed: int = 0) -> Attributes:
     return Attributes(chosen[:, :3], ranks(chosen[:, 3]), np.asarray(cloud.normals), _segments(cloud))
 
 
-def _segments(cloud: object) -> NDArray[np.int64]:
-    """Planes first, then clusters of what is left."""
-    import open3d as o3d
-
-    assert isinstance(cloud, o3d.geometry.PointCloud)
+def _segments(cloud: PointCloud) -> NDArray[np.int64]:
+    """Planes first, each in its connected pieces, then clusters of what is left."""
     total = len(cloud.points)
     segments, left = np.zeros(total, np.int64), np.arange(total)
-    number = 1
+
+    def cut(rows: NDArray[np.int64], reach: float) -> None:
+        pieces = np.asarray(cloud.select_by_index(rows.tolist()).cluster_dbscan(reach, CLUSTER_FEWEST), np.int64)
+        segments[rows] = np.where(pieces >= 0, segments.max() + 1 + pieces, 0)
+
     for _ in range(PLANES):
         if len(left) < max(3, PLANE_SHARE * total):
             break
-        _, on_plane = cloud.select_by_index(left).segment_plane(PLANE_M, 3, 400)
-        if len(on_plane) < PLANE_SHARE * total:
+        _, found = cloud.select_by_index(left.tolist()).segment_plane(PLANE_M, 3, 400)
+        if len(found) < PLANE_SHARE * total:
             break
-        segments[left[on_plane]] = number
-        left, number = np.delete(left, on_plane), number + 1
+        cut(left[found], PIECE_M)
+        left = np.delete(left, found)
     if len(left):
-        clusters = np.asarray(cloud.select_by_index(left).cluster_dbscan(CLUSTER_M, CLUSTER_FEWEST), np.int64)
-        segments[left] = np.where(clusters >= 0, number + clusters, 0)
+        cut(left, CLUSTER_M)
     return segments

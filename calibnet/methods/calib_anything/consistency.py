@@ -46,7 +46,9 @@ class Consistency:
                 f"Only {len(self.scan.points)} points of {MOST_POINTS} are in the picture under the guess, too few for "
                 "masks; is the guess that far off?"
             )
-        self.columns = np.concatenate([np.stack([self.scan.reflectance, self.scan.reflectance**2]), self.scan.normals.T])
+        self.columns = np.concatenate(
+            [np.stack([self.scan.reflectance, self.scan.reflectance**2]), self.scan.normals.T]
+        )
         self.weights = dict(WEIGHTS) if np.ptp(self.scan.reflectance) > 0 else {**WEIGHTS, "reflectance": 0.0}
         self.variance = max(float(self.scan.reflectance.var()), 1e-9)
         everything = np.zeros(len(self.scan.points), np.int64)

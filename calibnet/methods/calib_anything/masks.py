@@ -14,7 +14,7 @@ from calibnet.errors import ConfigError
 from calibnet.geometry import PinholeCamera
 
 SCALE, SMALLEST, BLUR = 150.0, 120, 0.8
-"""Of the graph segmentation: how readily regions grow, the fewest pixels of one, and how much the picture is blurred."""
+"""Of the segmentation: how readily regions grow, the fewest pixels of one, and how much the picture is blurred."""
 MOST_MASKS = 2000
 """Files read for a picture."""
 LARGEST_SHARE = 0.5

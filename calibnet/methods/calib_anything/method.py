@@ -1,4 +1,4 @@
-"""The search: extrinsics drawn at random around the guess, the best one found last being the centre of the next draws."""
+"""The search: extrinsics drawn at random around the guess, in ever smaller rounds around the best one so far."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from calibnet.trace import CascadeTrace, StageTrace
 HEIGHT, WIDTH = 256, 832
 """The picture is resized to the area of so many pixels, its aspect kept."""
 ROUNDS = ((1.0, 0.0, 300), (0.5, 0.5, 200), (0.25, 0.25, 200), (0.1, 0.15, 200), (0.04, 0.06, 150))
-"""Of the search: shares of the range's angles and offsets within which is drawn, and how often. The paper begins with the
-rotation alone, then searches all six at random; how far and how often is ours."""
+"""Of the search: shares of the range's angles and offsets within which is drawn, and how often. The paper begins with
+the rotation alone, then searches all six at random; how far and how often is ours."""
 SEED = 0
 
 

@@ -1,0 +1,256 @@
+"""Table 2 of the paper, measured: every method on the same frames, miscalibrations and rigs (`measure_bench`)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from calibnet.datasets import Frame, PickedFrames
+from calibnet.datasets import Sequence as FrameSequence
+from calibnet.datasets.selection import spread
+from calibnet.errors import CalibnetError, CalibrationError
+from calibnet.evaluation.audit import Altered, alterations, other_drive
+from calibnet.evaluation.claims import CLAIMS
+from calibnet.evaluation.drives import shares_mount
+from calibnet.evaluation.metrics import Metrics
+from calibnet.evaluation.runner import draw_miscalibration
+from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
+from calibnet.geometry.types import Extrinsic
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator, card_of, drives_only
+
+FRAMES, DRIVES = "frames", "drives"
+AUDITED = ("grey", "swapped")
+"""Of `calibnet.evaluation.audit`, what every method is put to."""
+TIMED = 3
+"""Frames whose median time is a method's latency, after one that is not timed."""
+
+
+class Contestant(NamedTuple):
+    """A method of the table, by its name and by what opens it for a range."""
+
+    name: str
+    open: Callable[[MiscalibrationRange], Calibrator]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What all methods are measured on.
+
+    Attributes:
+        sequences: where the frames come from; their own extrinsics are the reference.
+        ranges: of the miscalibrations; the audit is done within the first.
+        repeats: miscalibrations a frame and a drive.
+        seed: of the miscalibrations.
+        most: frames of a sequence that are measured, spread over it, and frames of a drive, one after the other.
+        limit_s: seconds after which a row ends with what it has.
+        audit: whether altered frames are measured.
+        beside: opens what else the audit may take pictures from.
+    """
+
+    sequences: list[FrameSequence]
+    ranges: tuple[MiscalibrationRange, ...]
+    repeats: int = 1
+    seed: int = 0
+    most: int = 12
+    limit_s: float = 300.0
+    audit: bool = True
+    beside: Callable[[], Iterable[FrameSequence]] = field(default=tuple)
+
+    @property
+    def rigs(self) -> dict[str, list[FrameSequence]]:
+        """The sequences by rig."""
+        found: dict[str, list[FrameSequence]] = {}
+        for sequence in self.sequences:
+            found.setdefault(sequence.rig, []).append(sequence)
+        return found
+
+
+class Step(NamedTuple):
+    """How far a measurement is: the row, and runs of it done and to be done at most."""
+
+    row: str
+    done: int
+    total: int
+
+
+Observer = Callable[[Step], None]
+
+
+def measure_bench(
+    bench: Bench, contestants: Sequence[Contestant], observer: Observer | None = None
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Measure methods one after the other.
+
+    Yields:
+        The name of each and its entry in the table, as soon as it has one; a method or a row that cannot be measured
+        has a sentence ``why`` instead of figures.
+
+    Raises:
+        DatasetError: a frame cannot be read.
+    """
+    for contestant in contestants:
+        yield contestant.name, _entry(bench, contestant, observer or (lambda step: None))
+
+
+def _entry(bench: Bench, contestant: Contestant, observer: Observer) -> dict[str, Any]:
+    entry: dict[str, Any] = {"parameters": None, "multiply_adds": None, "latency_ms": None, "samples_trained": None}
+    entry |= {"trained_on": [], "rows": [], "audit": {}}
+    entry["claims"] = [claim.as_dict() for claim in CLAIMS.get(contestant.name, ())]
+    for position, range_ in enumerate(bench.ranges):
+        try:
+            method = contestant.open(range_)
+        except CalibnetError as error:
+            entry["rows"].append({"range": str(range_), "rig": "", "in_rig": None, "why": str(error)})
+            continue
+        card = card_of(method)
+        if entry["parameters"] is None:
+            entry |= {
+                "parameters": card.parameters,
+                "multiply_adds": card.multiply_adds,
+                "samples_trained": card.samples_trained,
+                "trained_on": list(card.trained_on),
+                "latency_ms": latency(bench, method, range_),
+            }
+        for rig, sequences in bench.rigs.items():
+            for of in kinds(method):
+                told = _telling(observer, f"{contestant.name}, {range_}, {of} of {rig}")
+                row = measure_row(bench, method, range_, sequences, of, told)
+                entry["rows"].append({"range": str(range_), "rig": rig, "in_rig": card.knows(rig), "of": of, **row})
+        if bench.audit and position == 0:
+            entry["audit"] = {"range": str(range_)} | {
+                name: measure_row(
+                    bench, method, range_, altered, kinds(method)[0], _telling(observer, f"{contestant.name}, {name}")
+                )
+                for name, altered in _altered(bench).items()
+            }
+    return entry
+
+
+def kinds(method: Calibrator) -> tuple[str, ...]:
+    """What a method can be measured on."""
+    if drives_only(method):
+        return (DRIVES,)
+    return (FRAMES, DRIVES) if isinstance(method, DriveCalibrator) else (FRAMES,)
+
+
+class _Try(NamedTuple):
+    """A run: where it starts, what it is held against, and what makes it."""
+
+    initial: Extrinsic
+    reference: Extrinsic
+    run: Callable[[Calibrator, Extrinsic], tuple[Extrinsic, bool]]
+
+
+def measure_row(
+    bench: Bench,
+    method: Calibrator,
+    range_: MiscalibrationRange,
+    sequences: Sequence[FrameSequence],
+    of: str,
+    told: Callable[[int, int], None],
+) -> dict[str, Any]:
+    """Errors of a method on single frames or drives of some sequences; refused runs count with their initial error.
+
+    Returns:
+        The figures, how many runs there are and how many were refused: not calibrated, or rejected by the method. With
+        no run at all, or with all refused, a sentence ``why``.
+    """
+    tries = list(_frames(bench, range_, sequences) if of == FRAMES else _drives(bench, range_, sequences))
+    errors: list[PoseError] = []
+    refused, why, began = 0, "", time.monotonic()
+    told(0, len(tries))
+    for done, one in enumerate(tries, start=1):
+        result = one.initial
+        try:
+            result, rejected = one.run(method, one.initial)
+            refused += rejected
+        except CalibrationError as error:
+            refused, why = refused + 1, str(error)
+        errors.append(pose_error(result, one.reference))
+        told(done, len(tries))
+        if time.monotonic() - began > bench.limit_s:
+            break
+    if not errors:
+        return {"runs": 0, "refused": 0, "why": "There is no drive of several frames on one mount among them."}
+    row: dict[str, Any] = {"runs": len(errors), "of_runs": len(tries), "refused": refused}
+    if refused == len(errors):
+        return row | {"why": why or "The method rejects all that it finds."}
+    return row | Metrics.of(errors).as_dict()
+
+
+def _frames(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[FrameSequence]) -> Iterator[_Try]:
+    def run(method: Calibrator, initial: Extrinsic, frame: Frame) -> tuple[Extrinsic, bool]:
+        trace = method.calibrate(frame, initial)
+        return trace.corrected, trace.rejected
+
+    for sequence in sequences:
+        for position in spread(len(sequence), bench.most):
+            frame = sequence[position]
+            for repeat in range(bench.repeats):
+                delta = draw_miscalibration(range_, bench.seed, frame.index, repeat)
+                yield _Try(
+                    delta @ frame.camera_from_lidar,
+                    frame.camera_from_lidar,
+                    lambda method, initial, frame=frame: run(method, initial, frame),  # type: ignore[misc]
+                )
+
+
+def _drives(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[FrameSequence]) -> Iterator[_Try]:
+    def run(method: Calibrator, initial: Extrinsic, drive: FrameSequence) -> tuple[Extrinsic, bool]:
+        assert isinstance(method, DriveCalibrator)
+        estimate = method.calibrate_drive(drive, initial)
+        rejected = estimate.verdict is not None and estimate.verdict.word == "rejected"
+        return initial if rejected else estimate.camera_from_lidar, rejected
+
+    for number, sequence in enumerate(sequences):
+        if not shares_mount(sequence):
+            continue
+        first = max(0, (len(sequence) - bench.most) // 2)
+        drive = PickedFrames(sequence, range(first, min(len(sequence), first + bench.most)))
+        reference = drive[0].camera_from_lidar
+        for repeat in range(bench.repeats):
+            delta = draw_miscalibration(range_, bench.seed, number, repeat + 1000)
+            yield _Try(
+                delta @ reference,
+                reference,
+                lambda method, initial, drive=drive: run(method, initial, drive),  # type: ignore[misc]
+            )
+
+
+def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> float | None:
+    """Median milliseconds of a method on a frame; of one that knows drives alone, those of a drive by its frames."""
+    sequence = bench.sequences[0]
+    if drives_only(method):
+        return None
+    positions = spread(len(sequence), TIMED)
+    times = []
+    for count, position in enumerate([positions[0], *positions]):
+        frame = sequence[position]
+        initial = draw_miscalibration(range_, bench.seed, frame.index, 0) @ frame.camera_from_lidar
+        began = time.perf_counter()
+        try:
+            method.calibrate(frame, initial)
+        except CalibrationError:
+            continue
+        if count:
+            times.append(1000 * (time.perf_counter() - began))
+    return float(np.median(times)) if times else None
+
+
+def _altered(bench: Bench) -> dict[str, list[FrameSequence]]:
+    """The sequences, altered in each of the ways."""
+    donors = [other_drive(sequence, bench.sequences, bench.beside) for sequence in bench.sequences]
+    return {
+        name: [
+            Altered(sequence, alterations(donor)[name]) for sequence, donor in zip(bench.sequences, donors, strict=True)
+        ]
+        for name in AUDITED
+    }
+
+
+def _telling(observer: Observer, row: str) -> Callable[[int, int], None]:
+    return lambda done, total: observer(Step(row, done, total))

@@ -1,0 +1,70 @@
+"""What papers say of their own methods, to stand beside what is measured here.
+
+Theirs are other frames, mostly of the rig that they trained on.
+
+Only figures that were found in print are here. Translation is in centimetres, rotation in degrees; a mean unless said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+KITTI_OWN = "KITTI, of one car: trained and tested on its frames"
+HAN = "as quoted by Han et al. 2025, table 2; their measurements are of each paper's own frames"
+PROJFUSION = "measured by the authors of ProjFusion (2026), one code base, trained and tested in one rig"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A published result.
+
+    Attributes:
+        range: of the miscalibrations, as far as it is said.
+        rotation_deg: error.
+        translation_cm: error.
+        rig: that it was measured on.
+        source: who says so, and where.
+    """
+
+    range: str
+    rotation_deg: float | None
+    translation_cm: float | None
+    rig: str
+    source: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """The form that JSON files hold."""
+        return dict(vars(self))
+
+
+CLAIMS: dict[str, tuple[Claim, ...]] = {
+    "cascade": (
+        Claim("±0.25 m", 0.138, 1.101, KITTI_OWN, "Han et al. 2025, table 2, of the method that our cascade follows"),
+        Claim("±1.5 m", 0.020, 0.278, KITTI_OWN, "Han et al. 2025, table 2, of the method that our cascade follows"),
+    ),
+    "regnet": (Claim("±20° / 1.5 m", 0.28, 6.0, KITTI_OWN, f"its own, {HAN}"),),
+    "calibnet": (
+        Claim("±0.2 m", 0.41, 4.34, KITTI_OWN, f"its own, {HAN}"),
+        Claim("10° / 25 cm", 2.28, 6.47, "KITTI odometry 13-16, 18; RMSE of the angle", PROJFUSION),
+    ),
+    "lccnet": (
+        Claim("±1.5 m", 0.017, 0.297, KITTI_OWN, f"its own, {HAN}"),
+        Claim("10° / 25 cm", 2.50, 6.08, "KITTI odometry 13-16, 18; one network; RMSE of the angle", PROJFUSION),
+    ),
+    "calibformer": (
+        Claim("±0.25 m", 0.141, 1.188, KITTI_OWN, f"its own, {HAN}"),
+        Claim("not said in its abstract", 0.0562, 0.8751, KITTI_OWN, "its own abstract (ICRA 2024)"),
+    ),
+    "calib-anything": (
+        Claim("±0.2 m", 0.136, 1.027, "KITTI", f"its own, {HAN}"),
+        Claim("10° / 25 cm", 5.32, 28.2, "KITTI odometry 13-16, 18; RMSE of the angle", PROJFUSION),
+        Claim("not said", 0.299, 12.08, "KITTI", "a table of others (PMC13006848)"),
+    ),
+    "pcba": (Claim("±1.5 m", 0.019, 0.305, "not said", f"its own, {HAN}"),),
+    "information-distance": (
+        Claim("10° / 25 cm", 13.1, 147.0, "KITTI odometry 13-16, 18; single shot; RMSE of the angle", PROJFUSION),
+        Claim("not said", 5.02, 8.91, "KITTI", "a table of others (PMC13006848)"),
+    ),
+}
+"""By the name of the method."""

@@ -1,0 +1,83 @@
+"""Who stands in the table of `calibnet.evaluation.bench`: the cascade, with any weights, and other methods."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from calibnet.cascade.cascade import Cascade
+from calibnet.evaluation.bench import Contestant
+from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
+from calibnet.methods.calibrator import Calibrator, MethodCard
+from calibnet.methods.registry import CASCADE, METHODS, accepts, open_method
+from calibnet.network.config import load_preset
+from calibnet.network.counting import count
+from calibnet.network.network import CalibrationNetwork
+from calibnet.weights import read_record, weights_path
+
+HEIGHT, WIDTH = 256, 512
+"""Input at which multiply-adds are counted: the paper's."""
+KITTI_RIG = "KITTI 2011_09_26"
+"""Of all KITTI frames that are trained on."""
+
+
+def contestants(
+    names: tuple[str, ...], ours: dict[str, Path], told: dict[str, Any], preset: str = "compact"
+) -> list[Contestant]:
+    """The rows of the table, by name.
+
+    Args:
+        names: of methods; ``all`` for every one.
+        ours: further rows of the cascade, by name, with the folders of their weights.
+        told: options of other methods, of which each is told those that it has.
+        preset: network of the cascade.
+
+    Raises:
+        ConfigError: there is no such method.
+    """
+    chosen = (CASCADE, *METHODS.names()) if "all" in names else names
+    found = []
+    for name in chosen:
+        if name == CASCADE:
+            found.append(Contestant(CASCADE, lambda range_: MeasuredCascade.within(range_, preset)))
+            found += [
+                Contestant(label, lambda range_, folder=folder: MeasuredCascade.within(range_, preset, folder))  # type: ignore[misc]
+                for label, folder in ours.items()
+            ]
+        else:
+            found.append(Contestant(name, lambda range_, name=name: _open(name, range_, told)))  # type: ignore[misc]
+    return found
+
+
+def _open(name: str, range_: MiscalibrationRange, told: dict[str, Any]) -> Calibrator:
+    maker = METHODS.load(name)
+    return open_method(name, range_, **{option: value for option, value in told.items() if accepts(maker, option)})
+
+
+class MeasuredCascade(Cascade):
+    """The cascade, saying what it costs."""
+
+    card: MethodCard
+
+    @classmethod
+    def within(cls, range_: MiscalibrationRange, preset: str, folder: Path | None = None) -> MeasuredCascade:
+        """The stages that ``evaluate`` runs for a range, with weights of a folder or of the package."""
+        cascade = cls.load(preset, stages_within(range_), folder, wider=True)
+        assert isinstance(cascade, cls)
+        cascade.card = cascade_card(cascade, preset, folder)
+        return cascade
+
+
+def cascade_card(cascade: Cascade, preset: str, folder: Path | None) -> MethodCard:
+    """What the stages cost together, and what their records say they were trained on."""
+    costs = count(CalibrationNetwork(load_preset(preset), RANGES[0]), HEIGHT, WIDTH)  # of one stage: all cost the same
+    records = [read_record(weights_path(preset, RANGES[number - 1], folder)) for number in cascade.numbers]
+    options = [record.get("options", {}) for record in records]
+    data = " ".join(f"{one.get('packed') or ''} {' '.join(map(str, one.get('data') or []))}" for one in options)
+    return MethodCard(
+        len(cascade.stages) * sum(cost.parameters for cost in costs),
+        len(cascade.stages) * sum(cost.multiply_adds for cost in costs),
+        sum(int(record.get("samples", 0)) for record in records),
+        tuple(dict.fromkeys(rig for record in records for rig in record.get("rigs", ())))
+        or ((KITTI_RIG,) if "kitti" in data.lower() else ()),
+    )

@@ -1,0 +1,232 @@
+"""``calib-inspect bench``: the paper's table of systems, measured: all methods on the same frames."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from calibnet.errors import ConfigError
+from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
+from inspector.cli.output import (
+    JSON_FILE,
+    console_beside,
+    overwrite_option,
+    prepare,
+    prepare_json,
+    say,
+    write,
+    write_json,
+)
+
+if TYPE_CHECKING:
+    from calibnet.evaluation.bench import Bench, Contestant
+    from calibnet.evaluation.bench import Step as BenchStep
+    from calibnet.geometry import MiscalibrationRange
+
+FILE = click.Path(dir_okay=False, path_type=Path)
+
+
+class NamedFolder(click.ParamType[tuple[str, Path]]):
+    """``NAME=DIR`` to both."""
+
+    name = "NAME=DIR"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, Path]:
+        """Split it; a value that is split already is kept."""
+        if isinstance(value, tuple):
+            return value
+        name, equals, folder = str(value).partition("=")
+        if not (name and equals and folder):
+            self.fail(f"{value!r} is not NAME=DIR, for instance cascade-10k=weights/10k.", param, ctx)
+        return name, Path(folder)
+
+
+@click.command()
+@click.option("--methods", default="all", show_default=True, metavar="NAME,NAME", help="Which methods; all for every.")
+@click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
+@click.option(
+    "--range", "ranges", multiple=True, type=RANGE, help="Of the miscalibrations. Repeatable.  [20/1.5, 5/0.5]"
+)
+@click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
+@click.option(
+    "--most", type=click.IntRange(2), default=12, show_default=True, help="Frames measured of a sequence or a drive."
+)
+@click.option(
+    "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame or drive."
+)
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Of the miscalibrations.")
+@click.option("--limit", type=click.FloatRange(1), default=300.0, show_default=True, help="Seconds for a row at most.")
+@click.option("--audit/--no-audit", default=True, help="Also with grey and other pictures.  [default: yes]")
+@click.option("--preset", default="compact", show_default=True, help="Network of the cascade.")
+@click.option("--weights", type=FOLDER, help="Folder of the weights of other methods.")
+@click.option(
+    "--ours", multiple=True, type=NamedFolder(), help="A further row of the cascade, with weights of DIR. Repeatable."
+)
+@click.option("--masks", type=FOLDER, metavar="DIR", help="Masks for calib-anything, as in seq.")
+@click.option("--threads", type=click.IntRange(1), default=2, show_default=True, help="Of the CPU.")
+@click.option(
+    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier bench."
+)
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Also as CSV, a line a row.")
+@click.option("--html", "html_file", type=FILE, metavar="FILE", help="Also as a page.")
+@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
+@overwrite_option
+def bench(
+    methods: str,
+    data: tuple[str, ...],
+    ranges: tuple[MiscalibrationRange, ...],
+    frames: str,
+    most: int,
+    repeats: int,
+    seed: int,
+    limit: float,
+    audit: bool,
+    preset: str,
+    weights: Path | None,
+    ours: tuple[tuple[str, Path], ...],
+    masks: Path | None,
+    threads: int,
+    source: Path | None,
+    json_file: str | None,
+    csv_file: Path | None,
+    html_file: Path | None,
+    markdown_file: Path | None,
+) -> None:
+    """Measure all methods on the same frames from the same miscalibrations, in the rigs they know and in others.
+
+    A row a range and rig: errors, refused runs, success. Beside them what a method costs, what it was trained on, what
+    it makes of grey pictures and of those of another drive, and what its paper claims. A method that cannot run, for
+    want of weights or of motion, is a row that says so.
+    """
+    from calibnet.runtime.writing import Kind
+    from inspector.report import bench_page
+    from inspector.report.bench_rows import as_csv, as_markdown
+
+    outputs = (
+        (csv_file, as_csv, Kind.TABLE),
+        (html_file, bench_page.page, Kind.PAGE),
+        (markdown_file, as_markdown, Kind.EXPORT),
+    )
+    for file, _, kind in outputs:
+        prepare(file, kind)
+    prepare_json(json_file)
+    if source is not None:
+        content = read_bench(source)
+    else:
+        if not data:
+            raise click.UsageError("--data is needed, for instance --data kitti-raw:DIR:2011_09_26/0048.")
+        measured, contestants = set_up(data, ranges, frames, methods, dict(ours), preset, weights, masks)
+        measured = replace(measured, repeats=repeats, seed=seed, most=most, limit_s=limit, audit=audit)
+        content = run(measured, contestants, threads, json_file)
+    from inspector.cli.bench_tables import print_bench
+
+    print_bench(content, console_beside(json_file))
+    write_json(json_file, content)
+    for file, made, kind in outputs:
+        if file is not None:
+            write(file, made(content).encode(), kind)
+
+
+def set_up(
+    data: tuple[str, ...],
+    ranges: tuple[MiscalibrationRange, ...],
+    frames: str,
+    methods: str,
+    ours: dict[str, Path],
+    preset: str,
+    weights: Path | None,
+    masks: Path | None,
+) -> tuple[Bench, list[Contestant]]:
+    """What is measured, and who."""
+    from calibnet.datasets import PickedFrames, select_frames
+    from calibnet.datasets.discovery import find_sequences
+    from calibnet.evaluation.bench import Bench
+    from calibnet.evaluation.contestants import contestants
+    from calibnet.geometry import RANGES
+    from calibnet.methods.registry import CASCADE, METHODS
+    from calibnet.training.data import open_data
+
+    names = tuple(name.strip() for name in methods.split(",") if name.strip())
+    for name in names:
+        if name not in ("all", CASCADE) and name not in METHODS:
+            raise click.UsageError(f"There is no method {name!r}; choose from {CASCADE}, {', '.join(METHODS.names())}.")
+    opened = [sequence for spec in data for sequence in open_data(spec)]
+    sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
+    dataset, _, rest = data[0].partition(":")
+    root = Path(rest.partition(":")[0])
+    measured = Bench(list(sequences), ranges or (RANGES[0], RANGES[2]), beside=lambda: find_sequences(dataset, root))
+    return measured, contestants(names, ours, {"weights": weights, "masks": masks}, preset)
+
+
+def run(measured: Bench, contestants: list[Contestant], threads: int, json_file: str | None) -> dict[str, Any]:
+    """Measure; after every method the JSON file is written, so that what was measured is not lost."""
+    import cv2
+    import torch
+
+    from calibnet.evaluation.bench import measure_bench
+    from inspector.cli.evaluate import Bars
+
+    torch.set_num_threads(threads)
+    cv2.setNumThreads(threads)
+    content = described(measured, threads)
+    bars = Bars()
+
+    def show(step: BenchStep) -> None:
+        from calibnet.evaluation.measure import Step
+
+        bars.show(Step(step.row, step.done, step.total, ""))
+
+    with bars:
+        for name, entry in measure_bench(measured, contestants, show):
+            content["methods"][name] = entry
+            for row in entry["rows"]:
+                if "why" in row:
+                    say(f"{name}, {row['range']}: {row['why']}", err=True)
+            if json_file not in (None, "-"):
+                Path(str(json_file)).with_suffix(".partial.json").write_text(json.dumps(content, indent=2))
+    if json_file not in (None, "-"):
+        Path(str(json_file)).with_suffix(".partial.json").unlink(missing_ok=True)
+    return content
+
+
+def described(measured: Bench, threads: int) -> dict[str, Any]:
+    """What was measured on."""
+    import platform
+
+    from calibnet import __version__
+
+    return {
+        "table": "bench",
+        "version": __version__,
+        "sequences": [{"name": one.name, "rig": one.rig, "frames": len(one)} for one in measured.sequences],
+        "ranges": [str(range_) for range_ in measured.ranges],
+        "repeats": measured.repeats,
+        "seed": measured.seed,
+        "most": measured.most,
+        "limit_s": measured.limit_s,
+        "threads": threads,
+        "processor": platform.processor() or platform.machine(),
+        "methods": {},
+    }
+
+
+def read_bench(source: Path) -> dict[str, Any]:
+    """The JSON of an earlier bench.
+
+    Raises:
+        ConfigError: it is not one.
+    """
+    from calibnet.runtime.reading import parse_json, read_text
+
+    try:
+        content = parse_json(read_text(source, "The bench", error=ConfigError))
+    except ValueError as error:
+        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect bench --json` wrote.") from None
+    if not isinstance(content, dict) or content.get("table") != "bench":
+        raise ConfigError(f"{source} was not written by `calib-inspect bench --json`.")
+    return content
