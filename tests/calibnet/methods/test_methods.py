@@ -18,6 +18,14 @@ from tests.support.scene import make_frame
 from tests.support.toy_package import install_toys
 
 
+@pytest.fixture
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searches that are as short as their promises allow."""
+    monkeypatch.setattr("calibnet.methods.information_distance.STARTS", 2)
+    monkeypatch.setattr("calibnet.methods.calib_anything.method.ROUNDS", ((1.0, 1.0, 20),))
+
+
+@pytest.mark.usefixtures("_quick")
 @pytest.mark.parametrize("name", METHODS.own)
 def test_methods_keep_their_promises(name: str, tmp_path: Path) -> None:
     if name in NETWORKS:
