@@ -16,6 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from inspector.live.payload import picture_jpeg, points_bytes
 from inspector.live.session import LiveSession
+from inspector.live.stream import TryStream
 from inspector.serving.files import file_route
 from inspector.serving.viewer_files import VIEWER_FILES
 
@@ -32,10 +33,12 @@ class LiveApp:
             session: what they act on.
             viewer: folder with the files of Rerun's web viewer.
         """
-        self._session = session
+        assert isinstance(session.stream, TryStream), "a page's viewer gets pieces"
+        self._session, self._recorded = session, session.stream
         self._windows: set[WebSocket] = set()
         self._viewers: set[asyncio.Event] = set()
-        session.tell, session.grown = self._tell_all, self._wake
+        session.tell = self._tell_all
+        session.on_recorded(self._wake)
         files = {f"/{file.name}": file for file in PAGE.iterdir() if file.is_file()}
         files |= {f"/viewer/{name}": viewer / name for name in VIEWER_FILES if name != "index.html"}
         files |= {"/": PAGE / "live.html", "/viewer/": PAGE / "viewer.html", "/viewer/viewer.js": PAGE / "viewer.js"}
@@ -83,8 +86,8 @@ class LiveApp:
         try:
             while not gone.done():
                 more.clear()
-                while sent < len(self._session.stream):
-                    await viewer.send_bytes(await asyncio.to_thread(self._session.stream.piece, sent))
+                while sent < len(self._recorded):
+                    await viewer.send_bytes(await asyncio.to_thread(self._recorded.piece, sent))
                     sent += 1
                 await more.wait()
         except (WebSocketDisconnect, RuntimeError):

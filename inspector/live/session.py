@@ -3,34 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-import math
-import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
 import numpy as np
 
-from calibnet.datasets.frame import Frame
-from calibnet.datasets.selection import spread
-from calibnet.errors import CalibnetError, CalibrationError, ConfigError, DatasetError
-from calibnet.geometry import MiscalibrationRange, pose_error
+from calibnet.errors import CalibnetError, ConfigError
+from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator
-from calibnet.trace import CascadeTrace
+from calibnet.methods.calibrator import Calibrator
 from inspector.live.accept import Target, doubts, verdict_on
-from inspector.live.bench import Bench, StagedCalibrator
+from inspector.live.answers import Answers
+from inspector.live.bench import Bench
 from inspector.live.payload import palettes
 from inspector.live.pose import Pose
-from inspector.live.stream import TryStream
+from inspector.live.stream import TryRecording, TryStream
 from inspector.live.tries import Try
-from inspector.live.worker import Job, Worker
-from inspector.record.observation import Observation
-from inspector.record.pictures.matches import point_at
+from inspector.live.worker import Worker
 
-MOST_SEARCHED = 24
-"""Frames, spread over the drive, among which the worst is looked for."""
-REACH_PX = 12.0
-"""Distance from a click up to which a point counts."""
 Tell = Callable[[dict[str, Any]], Awaitable[None]]
 
 
@@ -42,7 +32,15 @@ class LiveSession:
         stream: the recording of it.
     """
 
-    def __init__(self, bench: Bench, method: Calibrator, target: Target, range_: MiscalibrationRange) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        method: Calibrator,
+        target: Target,
+        range_: MiscalibrationRange,
+        stream: TryRecording | None = None,
+        known: str = "",
+    ) -> None:
         """Begin without a try.
 
         Args:
@@ -50,13 +48,14 @@ class LiveSession:
             method: that answers: the cascade, or another one.
             target: where an accepted calibration goes.
             range_: of the sliders, and of random poses.
+            stream: that tries are recorded in; `TryStream`, if not given.
+            known: what the method knows of the pose that it starts from, in words.
         """
-        self.bench, self.stream = bench, TryStream()
-        self._method, self._target, self._range = method, target, range_
+        self.bench, self.stream = bench, stream or TryStream()
+        self._target, self._range, self._known = target, range_, known
         self._worker = Worker(self._tell_state, self._tell_problem)
-        self._observations: dict[int, Observation] = {}
+        self._answers = Answers(bench, self.stream, method, self._worker, self._tell_try)
         self.tell: Tell = _nobody
-        self.grown: Callable[[], Awaitable[None]] = _nothing
         self._actions: dict[str, Callable[[dict[str, Any]], Awaitable[None]]] = {
             "pose": self._pose,
             "undo": self._undo,
@@ -91,7 +90,8 @@ class LiveSession:
         return {
             "is": "hello",
             "name": self.bench.name,
-            "stages": list(self._method.numbers) if isinstance(self._method, StagedCalibrator) else [],
+            "known": self._known,
+            "stages": self._answers.stages,
             "range": [self._range.rotation_deg, self._range.translation_m],
             "target": str(self._target.file),
             "palettes": palettes(),
@@ -120,6 +120,10 @@ class LiveSession:
             "busy": self._worker.busy,
             "progress": self._worker.progress,
         }
+
+    def on_recorded(self, grown: Callable[[], Awaitable[None]]) -> None:
+        """Say who is told when something was added to `stream`."""
+        self._answers.recorded = grown
 
     async def idle(self) -> None:
         """Return when nothing runs or waits."""
@@ -175,67 +179,17 @@ class LiveSession:
         if message.get("run"):
             await self._run(message)
 
-    # ---- running ------------------------------------------------------------------------------------------------
+    # ---- running and frames -------------------------------------------------------------------------------------
 
     async def _run(self, message: dict[str, Any]) -> None:
-        """Run all stages, or the one that is named, from the pose."""
         number = message.get("stage")
-        method = self._method
-        if number is not None:
-            if not isinstance(method, StagedCalibrator):
-                raise ConfigError("This method has no stages to run one at a time.")
-            method = method.only(int(number))
-        frame, start, reference = self.bench.frame, self.bench.extrinsic, self.bench.reference
-
-        def compute(_: Callable[[int, int], None]) -> tuple[CascadeTrace, float]:
-            began = time.perf_counter()
-            trace = method.calibrate(frame, start)
-            return trace, 1000 * (time.perf_counter() - began)
-
-        async def finish(result: tuple[CascadeTrace, float]) -> None:
-            trace, milliseconds = result
-            made = self.bench.keep(lambda number: Try.of_trace(number, frame.index, trace, milliseconds))
-            await self._tell_try(made)
-            self._record(made, method, frame, reference)
-
-        self._worker.ask(Job("running all stages" if number is None else f"running stage {number}", compute, finish))
-
-    def _record(self, made: Try, method: Calibrator, frame: Frame, reference: Extrinsic | None) -> None:
-        """Record a try when nobody waits for an answer: only then is it run again with all its details."""
-
-        def compute(_: Callable[[int, int], None]) -> Observation:
-            trace = method.calibrate(frame, made.steps[0].camera_from_lidar, detail=True)
-            observation = Observation(frame, trace, reference)
-            self.stream.log(made, observation)
-            return observation
-
-        async def finish(observation: Observation) -> None:
-            self._observations = {made.number: observation}
-            await self.grown()
-
-        self._worker.ask_later(Job(f"recording try {made.number}", compute, finish))
+        self._answers.run(None if number is None else int(number))
 
     async def _drive(self, message: dict[str, Any]) -> None:
-        frames, start, index = self.bench.frames, self.bench.extrinsic, self.bench.frame.index
-        method = self._method
-        if not isinstance(method, DriveCalibrator):
-            raise ConfigError("This method calibrates single frames and solves no drive.")
-
-        def compute(tell: Callable[[int, int], None]) -> Any:
-            began = time.perf_counter()
-            return method.calibrate_drive(frames, start, tell), 1000 * (time.perf_counter() - began)
-
-        async def finish(result: Any) -> None:
-            estimate, milliseconds = result
-            made = self.bench.keep(lambda number: Try.of_drive(number, index, start, estimate, milliseconds))
-            await self._tell_try(made)
-
-        self._worker.ask(Job("solving the drive", compute, finish))
+        self._answers.drive()
 
     async def _stop(self, message: dict[str, Any]) -> None:
         self._worker.stop()
-
-    # ---- frames -------------------------------------------------------------------------------------------------
 
     async def _frame(self, message: dict[str, Any]) -> None:
         position = int(message["position"]) % len(self.bench.frames)
@@ -243,51 +197,20 @@ class LiveSession:
         await self._moved(message)
 
     async def _worst(self, message: dict[str, Any]) -> None:
-        """Show the frame, of some from all over the drive, that the cascade leaves worst from this pose."""
-        frames, pose, start = self.bench.frames, self.bench.pose, self.bench
-
-        def compute(tell: Callable[[int, int], None]) -> tuple[int, Frame]:
-            positions, worst = spread(len(frames), MOST_SEARCHED), (-math.inf, 0)
-            for done, position in enumerate(positions):
-                tell(done, len(positions))
-                try:
-                    frame = frames[position]
-                    trace = self._method.calibrate(frame, pose.applied_to(start.guess_of(frame)))
-                    badness = _badness(trace, start.reference_of(frame))
-                except (CalibrationError, DatasetError):
-                    badness = math.inf
-                worst = max(worst, (badness, position))
-            return worst[1], frames[worst[1]]
-
-        async def finish(found: tuple[int, Frame]) -> None:
-            self.bench.show(*found)
+        async def shown() -> None:
             await self._moved({"run": True})
 
-        self._worker.ask(Job("looking for the worst frame", compute, finish))
+        self._answers.worst(shown)
 
     async def _look(self, message: dict[str, Any]) -> None:
         """Move the search windows of the newest try to the point at a pixel of the picture under a step of it."""
-        made = self.bench.tries[int(message["try"])]
-        observation = self._observations.get(made.number)
-        if observation is None or observation.frame is not self.bench.frame:
-            raise ConfigError("Only the newest try on this frame still has its cost volumes; run again from there.")
         under = np.array(message["under"], float).reshape(4, 4) if "under" in message else self._step(message)
-        point = point_at(
-            observation.projected(under), (float(message["pixel"][0]), float(message["pixel"][1])), REACH_PX
-        )
-        if point is None:
-            raise ConfigError("No point of the scan lies there; click on one.")
+        pixel = float(message["pixel"][0]), float(message["pixel"][1])
 
-        def compute(_: Callable[[int, int], None]) -> None:
-            self.stream.log_point(made, observation, point)
+        async def found(metres: float) -> None:
+            await self.tell({"is": "said", "text": f"Search windows moved to a point {metres:.1f} m away."})
 
-        async def finish(_: object) -> None:
-            await self.grown()
-            x, y, z = observation.frame.points[point, :3].tolist()
-            distance = math.hypot(x, y, z)
-            await self.tell({"is": "said", "text": f"Search windows moved to a point {distance:.1f} m away."})
-
-        self._worker.ask(Job("looking there", compute, finish))
+        self._answers.look(self.bench.tries[int(message["try"])], under, pixel, found)
 
     # ---- keeping ------------------------------------------------------------------------------------------------
 
@@ -321,17 +244,5 @@ class LiveSession:
         await self.tell({"is": "problem", "text": text})
 
 
-def _badness(trace: CascadeTrace, reference: Extrinsic | None) -> float:
-    """How wrong a frame ended: by its error in degrees and decimetres or, without a reference, by its fit."""
-    if reference is None:
-        return trace.stages[-1].match_error_px if trace.stages else 0.0
-    error = pose_error(trace.arrived, reference)
-    return error.rotation_deg + error.translation_cm / 10
-
-
 async def _nobody(message: dict[str, Any]) -> None:
     """Tell nobody: no window is open."""
-
-
-async def _nothing() -> None:
-    """Do nothing: no viewer is open."""

@@ -1,7 +1,7 @@
 """Every try as data for the viewer, on one timeline, ``try``: ``number * 8 + stage``, as `entities.STEP` has frames.
 
-What the viewer gets are pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection: no
-other port is open. All of them are kept in a file, for windows that are opened later.
+What the page's viewer gets are pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection:
+no other port is open. All of them are kept in a file, for windows that are opened later.
 """
 
 from __future__ import annotations
@@ -44,23 +44,26 @@ class TrySubtree(Subtree):
         self._stream.set_time(TIMELINE, sequence=self.number * entities.STEPS_PER_FRAME + stage)
 
 
-class TryStream:
-    """The recording of a live session, piece by piece."""
+class TryRecording:
+    """The recording of a live session; where it goes is for those to say that derive from it."""
 
-    def __init__(self) -> None:
-        """Open it; nothing is in it before the first try."""
+    def __init__(self, tabs: tuple[Tab, ...] = TABS) -> None:
+        """Open it; nothing is in it before the first try.
+
+        Args:
+            tabs: that are shown where there is data for them.
+        """
         rr.set_strict_mode(True)
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=uuid.uuid4().hex)
-        self._bytes = rr.binary_stream(self._stream)
         self._stream.set_log_time_enabled(False)
         self._rec = TrySubtree(self._stream)
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the stream
-        self._pieces: list[tuple[int, int]] = []
-        self._lock = threading.Lock()
-        self._tabs: list[Tab] = []
+        self._all_tabs, self._tabs = tabs, list[Tab]()
+
+    def answer(self, made: Try, observation: Observation) -> None:
+        """Show at once what a try came to, before its details; nothing where a page does."""
 
     def log(self, made: Try, observation: Observation) -> None:
-        """Log a try on one frame, and keep it as a piece."""
+        """Log a try on one frame with its details."""
         if not self._tabs:
             self._open(Layout.of(observation, CONTENTS))
         self._rec.number = made.number
@@ -77,11 +80,31 @@ class TryStream:
         self._keep()
 
     def _open(self, layout: Layout) -> None:
-        self._tabs = [tab for tab in TABS if tab.wanted(layout)]
+        self._tabs = [tab for tab in self._all_tabs if tab.wanted(layout)]
         self._stream.send_recording_name("live")
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
         self._stream.send_blueprint(make_blueprint(layout, self._tabs, timeline=TIMELINE, following=True))
+
+    def _keep(self) -> None:
+        """Hand on what was logged."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Forget everything."""
+        self._stream.disconnect()
+
+
+class TryStream(TryRecording):
+    """The recording piece by piece, for the page."""
+
+    def __init__(self) -> None:
+        """Open it; nothing is in it before the first try."""
+        super().__init__()
+        self._bytes = rr.binary_stream(self._stream)
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the stream
+        self._pieces: list[tuple[int, int]] = []
+        self._lock = threading.Lock()
 
     def _keep(self) -> None:
         piece = self._bytes.read() or b""
@@ -103,5 +126,5 @@ class TryStream:
     def close(self) -> None:
         """Forget everything."""
         self._bytes.read()  # Rerun would warn of data that nobody took
-        self._stream.disconnect()
+        super().close()
         self._file.close()

@@ -11,9 +11,16 @@ from typing import Any
 
 from calibnet.errors import CalibnetError
 
+GRACE_S, GRACE_STEPS = 0.2, 8
+"""Seconds that what may wait is put off after every answer: somebody who moves a slider on is answered first."""
+
 
 class StoppedError(Exception):
     """The job was to end."""
+
+
+class YieldedError(Exception):
+    """The job made room for one that somebody waits for."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +30,7 @@ class Job:
     Attributes:
         name: for people.
         compute: runs beside the server; it may call its argument with (done, in all), which raises
-            `StoppedError` when the job is to end.
+            `StoppedError` when the job is to end, and `YieldedError` when it can wait and somebody waits for another.
         finish: runs in the server's thread with the result.
     """
 
@@ -64,7 +71,7 @@ class Worker:
         self._wake()
 
     def ask_later(self, job: Job) -> None:
-        """Run a job when nothing else waits; it is not forgotten."""
+        """Run a job when nothing else waits; it is not forgotten, and runs again after it made room for another."""
         self._later.append(job)
         self._wake()
 
@@ -91,19 +98,29 @@ class Worker:
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         while self._next is not None or self._later:
+            for _ in range(GRACE_STEPS):
+                if self._next is None:
+                    await asyncio.sleep(GRACE_S / GRACE_STEPS)
+            if self._next is None and not self._later:
+                break  # closed meanwhile
+            can_wait = self._next is None
             job, self._next = self._next or self._later.pop(0), None
             self.busy, self.progress = job.name, None
             self._stop.clear()
             await self._changed()
 
-            def tell(done: int, total: int) -> None:
+            def tell(done: int, total: int, can_wait: bool = can_wait) -> None:
                 if self._stop.is_set():
                     raise StoppedError
+                if can_wait and self._next is not None:
+                    raise YieldedError
                 self.progress = (done, total)
                 asyncio.run_coroutine_threadsafe(self._changed(), loop)
 
             try:
                 await job.finish(await loop.run_in_executor(self._thread, job.compute, tell))
+            except YieldedError:
+                self._later.insert(0, job)
             except StoppedError:
                 await self._failed(f"Stopped: {job.name}.")
             except CalibnetError as error:

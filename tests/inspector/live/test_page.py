@@ -204,7 +204,7 @@ def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., L
     answered(page)
     frame = next(frame for frame in page.frames if "viewer" in frame.url)
     frame.wait_for_function("window.given.length === 1")
-    seen = session._observations[0].projected(session.bench.tries[0].found)
+    seen = session._answers._newest[1].projected(session.bench.tries[0].found)
     u, v = seen.pixels[int(np.argmin(seen.depth))].tolist()
     box, (width, height) = page.locator("#canvas").bounding_box(), (400, 120)
     assert box is not None

@@ -76,7 +76,7 @@ def test_frames_go_round_and_the_worst_is_found(make: Make, heard_after: HeardAf
 def test_a_click_moves_the_windows_to_that_point(make: Make, heard_after: HeardAfter) -> None:
     session = make()
     heard_after(session, MOVE)
-    seen = session._observations[0].projected(session.bench.tries[0].found)
+    seen = session._answers._newest[1].projected(session.bench.tries[0].found)
     nearest = int(np.argmin(seen.depth))
     pixel = seen.pixels[nearest].tolist()
     heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": pixel})

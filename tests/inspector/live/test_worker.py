@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -54,6 +55,28 @@ def test_of_those_that_wait_only_the_newest_runs_and_later_ones_all() -> None:
         go.set()
 
     assert run(scenario)[0] == ["first", "new", "later 1", "later 2"]
+
+
+def test_what_can_wait_makes_room_and_runs_again() -> None:
+    async def scenario(worker: Worker, done: list[str], _: list[str]) -> None:
+        running = threading.Event()
+
+        def compute(tell: Callable[[int, int], None]) -> str:
+            first = not running.is_set()
+            running.set()
+            for number in range(1_000 if first else 1):
+                time.sleep(0.01)
+                tell(number, 1_000)
+            return "recorded"
+
+        async def finish(result: str) -> None:
+            done.append(result)
+
+        worker.ask_later(Job("recording", compute, finish))
+        await asyncio.to_thread(running.wait, 20)
+        worker.ask(job("answer", done))
+
+    assert run(scenario) == (["answer", "recorded"], [])
 
 
 def test_a_job_that_tells_how_far_it_is_can_be_stopped() -> None:
