@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import tempfile
 import time
 import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import ConfigError
 from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import (
@@ -29,7 +31,7 @@ from inspector.cli.inspect import (
     root_option,
     split_option,
 )
-from inspector.cli.options import FOLDER, FRAMES, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
+from inspector.cli.options import FOLDER, FRAMES, KNOWN_OPTIONS, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
 from inspector.cli.output import overwrite_option, say
 from inspector.cli.recordings import OUTPUT_FILE
 from inspector.cli.run import UNJUDGED, announce, checked, open_other
@@ -39,6 +41,7 @@ from inspector.run.options import DEFAULT_RANGE
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
     from calibnet.methods.calibrator import Calibrator
+    from inspector.live.session import LiveSession
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--frames", type=FRAMES, default=":", help="Positions to choose from, for instance 0:100:5.  [all]"),
@@ -51,6 +54,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
+    *KNOWN_OPTIONS,
     *METHOD_OPTIONS,
     click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
     click.option(
@@ -63,16 +67,22 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     ),
     click.option("--format", "form", type=click.Choice(FORMATS.names()), default="yaml", show_default=True),
     overwrite_option,
+    click.option("--native", is_flag=True, help="Rerun's own window and the keys of this terminal, instead of a page."),
+    click.option(
+        "--connect", metavar="URL", help="With --native, a viewer that runs: rerun+http://HOST:PORT/proxy.  [a new one]"
+    ),
     click.option("--open/--no-open", "open_page", default=True, help="Open a browser, where there is a display."),
 )
 
 
 @dataclass(frozen=True)
 class Keeping:
-    """Where an accepted calibration goes, and whether the page is opened."""
+    """Where an accepted calibration goes, and where the session is shown."""
 
     output: Path
     form: str
+    native: bool
+    connect: str | None
     open_page: bool
 
 
@@ -96,6 +106,7 @@ def live() -> None:
 
     A page on this machine, which nobody opens who does not have its address. Every try stays and can be gone back to.
     Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, Ctrl+Z undoes, the arrows change the frame.
+    With --native they are those of this terminal, where z undoes and ? tells all of them.
     """
 
 
@@ -159,47 +170,99 @@ def demo(length: int, keeping: Keeping, **asked: Any) -> int:
 
 
 def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
-    """Serve the page until Ctrl-C or SIGTERM.
+    """Show the page or the window until Ctrl-C or SIGTERM.
 
     Args:
         sequence: what to look at.
-        keeping: where an accepted calibration goes.
+        keeping: where an accepted calibration goes, and where the session is shown.
         **asked: fields of `RunOptions`.
     """
     from rich.console import Console
 
     from calibnet.cascade.cascade import Cascade
-    from calibnet.runtime.interruption import StopRequest
     from inspector.live.accept import Target
-    from inspector.live.app import LiveApp
     from inspector.live.bench import Bench
     from inspector.live.session import LiveSession
-    from inspector.record.outputs import has_display
-    from inspector.serving.server import PageServer
-    from inspector.serving.viewer_files import fetch_viewer
 
+    if keeping.connect is not None and not keeping.native:
+        raise click.UsageError("--connect belongs to --native: a page brings its own viewer.")
+    if keeping.native:
+        check_window(keeping.connect)
     options = checked(sequence, asked)
     target = Target(keeping.output, keeping.form)
     target.check()
     method: Calibrator
     if options.method == CASCADE:
         numbers = options.stages or options.start.stages
-        method = cascade = Cascade.load(options.preset, numbers, options.weights, wider=options.stages is None)
+        method = cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.known)
         announce(Console(stderr=True, highlight=False), options, cascade)
     else:
         method = open_other(options)
         say(UNJUDGED, err=True)
     bench = Bench(sequence, options.positions, options.start, options.seed)
-    session = LiveSession(bench, method, target, options.range or DEFAULT_RANGE)
+    session = partial(LiveSession, bench, method, target, options.range or DEFAULT_RANGE, known=options.known.words)
+    if keeping.native:
+        in_a_window(session, keeping.connect)
+    else:
+        on_a_page(session(), keeping.open_page)
+    return ExitCode.OK
+
+
+def on_a_page(session: LiveSession, open_page: bool) -> None:
+    """Serve the page until Ctrl-C or SIGTERM."""
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.live.app import LiveApp
+    from inspector.record.outputs import has_display
+    from inspector.serving.server import PageServer
+    from inspector.serving.viewer_files import fetch_viewer
+
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
         fetch_viewer(Path(viewer))
         try:
             with StopRequest() as stop, PageServer(LiveApp(session, Path(viewer)).asgi) as server:
                 say(f"Live at {server.address} until Ctrl-C.")
-                if keeping.open_page and has_display():
+                if open_page and has_display():
                     webbrowser.open(server.address)
                 while not stop.requested:
                     time.sleep(0.1)
         finally:
             session.close()
-    return ExitCode.OK
+
+
+def check_window(connect: str | None) -> None:
+    """Find out before the work whether there is a viewer, or a screen to open one on.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    from inspector.record.outputs import check_viewer, has_display
+
+    if connect is not None:
+        check_viewer(connect)
+    elif not has_display():
+        raise ConfigError("There is no screen for --native; leave it out for the page, or name a viewer by --connect.")
+
+
+def in_a_window(make: Callable[..., LiveSession], connect: str | None) -> None:
+    """Act on the keys of the terminal until Esc, Ctrl-C, SIGTERM or their end; the window outlives that.
+
+    Args:
+        make: the session, with ``stream`` given.
+        connect: address of a viewer that runs; None to open one.
+    """
+    import rerun as rr
+
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.live.keys import keyboard
+    from inspector.live.terminal import Terminal, help_text
+    from inspector.live.window import WindowRecording
+    from inspector.record.outputs import open_viewer
+
+    window = WindowRecording(rr.GrpcSink(connect or open_viewer()), help_text())
+    session = make(stream=window)
+    say("Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, ? tells all, Esc ends.")
+    try:
+        with StopRequest() as stop, keyboard() as read:
+            asyncio.run(Terminal(session, window, say).run(read, lambda: stop.requested))
+    finally:
+        session.close()

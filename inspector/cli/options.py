@@ -168,6 +168,17 @@ ANGLE = QuantityType("ANGLE", "parse_angle")
 TOLERANCE = QuantityType("ANGLE/LENGTH", "parse_tolerance")
 FOLDER = click.Path(file_okay=False, path_type=Path)
 """A folder; whether it must exist is for the command to say."""
+KNOWN_OPTIONS = (
+    click.option(
+        "--fix",
+        type=AXES,
+        help="Axes of the start that are known exactly, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z keep the "
+        "camera's place as seen from the LiDAR.",
+    ),
+    click.option("--prior-translation", type=LENGTH, help="The camera's place is known to this, on each axis."),
+    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
+)
+"""Of every command that starts from an extrinsic of which something may be known."""
 METHOD_OPTIONS = (
     click.option(
         "--method",

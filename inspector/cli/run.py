@@ -16,13 +16,11 @@ from calibnet.errors import ConfigError
 from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode, fail
 from inspector.cli.options import (
-    ANGLE,
-    AXES,
     COLORING,
     DETAIL,
     FOLDER,
     FRAMES,
-    LENGTH,
+    KNOWN_OPTIONS,
     METHOD_OPTIONS,
     MISCALIBRATION,
     PARTS,
@@ -76,14 +74,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         show_default=True,
         help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
     ),
-    click.option(
-        "--fix",
-        type=AXES,
-        help="Axes of the start that are known exactly, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z keep the "
-        "camera's place as seen from the LiDAR.",
-    ),
-    click.option("--prior-translation", type=LENGTH, help="The camera's place is known to this, on each axis."),
-    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
+    *KNOWN_OPTIONS,
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     *METHOD_OPTIONS,

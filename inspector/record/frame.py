@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from calibnet.datasets.frame import Frame
 from calibnet.runtime.text import one_line
 from calibnet.verdict import Verdict
 from inspector import entities
@@ -24,7 +25,7 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
     """Set the timelines to a frame, and log what every recording has of it."""
     frame = observation.frame
     rec.set_frame(frame.index, frame.timestamp)
-    rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
+    log_image(rec, frame)
     table = stage_table(observation, rec.path if Part.OVERLAYS in contents.parts else None)
     rec.log(entities.TABLE, rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN))
     if observation.trace.verdict is not None:
@@ -32,6 +33,11 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
     log_underlays(rec, observation, contents)
     _log_extrinsics(rec, observation)
     _log_camera(rec, observation)
+
+
+def log_image(rec: Subtree, frame: Frame) -> None:
+    """The picture as the camera took it."""
+    rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
 
 
 def verdict_values(verdict: Verdict) -> rr.AnyValues:

@@ -70,9 +70,7 @@ class Outputs:
         if os.environ.get("RERUN", "").lower() in SWITCHED_OFF:
             raise ConfigError("RERUN in the environment switches Rerun off, so nothing would be recorded; unset it.")
         if self.connect is not None:
-            host, port = _address(self.connect)
-            if not _listening(host, port):
-                raise ConfigError(f"No viewer listens at {self.connect}; start one with `rerun`, or use --save.")
+            check_viewer(self.connect)
         if self.file is not None:
             claim = self._claimed(self.file)
             try:
@@ -133,16 +131,13 @@ class Outputs:
         return self._claim
 
     def _open_viewer(self) -> list[Any]:
-        port = free_port()
         try:
-            command = [rerun_binary(), "--port", str(port), "--bind", self.bind, "--hide-welcome-screen"]
-            start_program(command, port, outlives_us=True)
+            return [rr.GrpcSink(open_viewer(self.bind))]
         except ConfigError:
             if self.file is None:
                 raise
             self.viewer = False  # a screen was promised and is not there: the file is what remains
             return []
-        return [rr.GrpcSink(f"rerun+http://{LOCALHOST}:{port}/proxy")]
 
     def _serve(self) -> str:
         port, web_port = free_port(), free_port()
@@ -152,6 +147,29 @@ class Outputs:
         url = f"rerun+http://{host}:{port}/proxy"
         self.page = f"http://{host}:{web_port}/?url={quote(url, safe='')}"
         return url
+
+
+def open_viewer(bind: str = LOCALHOST) -> str:
+    """Open a viewer in a window, which outlives this process, and return its address.
+
+    Raises:
+        ConfigError: it does not start.
+    """
+    port = free_port()
+    command = [rerun_binary(), "--port", str(port), "--bind", bind, "--hide-welcome-screen"]
+    start_program(command, port, outlives_us=True)
+    return f"rerun+http://{LOCALHOST}:{port}/proxy"
+
+
+def check_viewer(url: str) -> None:
+    """Find out whether a viewer listens at an address.
+
+    Raises:
+        ConfigError: none does, or it is no address.
+    """
+    host, port = _address(url)
+    if not _listening(host, port):
+        raise ConfigError(f"No viewer listens at {url}; start one with `rerun`, or use --save.")
 
 
 def _address(url: str) -> tuple[str, int]:

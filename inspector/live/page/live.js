@@ -361,7 +361,7 @@ function setState(next) {
 const heard = {
   hello(message) {
     hello = message;
-    at("name").textContent = message.name;
+    at("name").textContent = message.known ? `${message.name}, ${message.known}` : message.name;
     at("accept").title = `Writes ${message.target}`;
     tries = message.tries;
     if (!at("sliders").children.length) {

@@ -102,11 +102,11 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
 
 def _maps_page(stage: StageLayout, layout: Layout, name: str) -> View:
     legends = map_legends(legend("Marks in the window", LEGEND_WINDOW))
-    rows = [_map_row(stage.number, grid, layout) for grid in stage.grids]
+    rows = [_map_row(stage.number, grid, layout, len(stage.grids) == 1) for grid in stage.grids]
     return rrb.Vertical(*rows, legends, row_shares=[1.0] * len(rows) + [0.35], name=name)
 
 
-def _map_row(number: int, grid: Grid, layout: Layout) -> View:
+def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     def path(name: str) -> str:
         return entities.of_scale(number, grid.stride, name)
 
@@ -118,6 +118,8 @@ def _map_row(number: int, grid: Grid, layout: Layout) -> View:
         map_view(f"{scale}: how surely (peak probability)", path(PEAK_PROBABILITY), number, grid, cell),
         image_view(f"{scale}: window of the pink cell", path(WINDOW)),
     ]
+    if alone:
+        return rrb.Grid(*views, grid_columns=2)
     return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])
 
 

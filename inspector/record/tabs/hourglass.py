@@ -68,23 +68,23 @@ def view(layout: Layout) -> View:
 
 
 def _stage_pages(stage: StageLayout, layout: Layout) -> View:
-    probability = rrb.Vertical(*(_probability_row(stage.number, grid, layout) for grid in stage.grids))
+    alone = len(stage.grids) == 1
+    probability = rrb.Vertical(*(_probability_row(stage.number, grid, layout, alone) for grid in stage.grids))
     channels = rrb.Vertical(*(_channels_row(stage.number, grid) for grid in stage.grids), name="Channels")
     words = legend("Decided", entities.LEGEND_DECIDED)
     return rrb.Tabs(with_legend(probability, words, "Where the probability went"), channels, name=stage.title)
 
 
-def _probability_row(number: int, grid: Grid, layout: Layout) -> View:
+def _probability_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     scale = f"1/{grid.stride}"
     names = {DECIDED_BEFORE: "decided, before the hourglass", DECIDED_AFTER: "decided, after it"}
     if layout.has_reference:
         names |= {TRUTH_BEFORE: "share on the truth, before", TRUTH_AFTER: "share on the truth, after"}
-    return rrb.Horizontal(
-        *(
-            map_view(f"{scale}: {name}", entities.of_scale(number, grid.stride, path), number, grid)
-            for path, name in names.items()
-        )
-    )
+    views = [
+        map_view(f"{scale}: {name}", entities.of_scale(number, grid.stride, path), number, grid)
+        for path, name in names.items()
+    ]
+    return rrb.Grid(*views, grid_columns=2) if alone else rrb.Horizontal(*views)
 
 
 def _channels_row(number: int, grid: Grid) -> View:

@@ -24,13 +24,13 @@ Make = Callable[..., LiveSession]
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    """A session: ``make(length=3, as_is=False, cascade=None)``."""
+    """A session: ``make(length=3, as_is=False, cascade=None, stream=None)``."""
     made: list[LiveSession] = []
 
-    def session(length: int = 3, as_is: bool = False, cascade: Any = None) -> LiveSession:
+    def session(length: int = 3, as_is: bool = False, cascade: Any = None, **given: Any) -> LiveSession:
         bench = Bench(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
         target = Target(tmp_path / "out" / "calibration.corrected.yaml")
-        made.append(LiveSession(bench, cascade or FakeCascade(), target, RANGE))
+        made.append(LiveSession(bench, cascade or FakeCascade(), target, RANGE, **given))
         return made[-1]
 
     yield session

@@ -42,6 +42,11 @@ def test_without_run_the_pose_alone_moves(make: Make, heard_after: HeardAfter) -
     assert poses == [MOVE["pose"], [0.0] * 6, MOVE["pose"], [0.0] * 6]
 
 
+def test_a_window_is_told_what_is_known_of_the_pose(make: Make) -> None:
+    assert make(known="x, y, z fixed").hello()["known"] == "x, y, z fixed"
+    assert make().hello()["known"] == ""
+
+
 def test_one_stage_alone(make: Make, heard_after: HeardAfter) -> None:
     (answer,) = told(heard_after(make(), {"do": "run", "stage": 4}), "try")
     assert [step["name"] for step in answer["steps"]] == ["mine", "stage 4"]

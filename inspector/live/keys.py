@@ -1,0 +1,59 @@
+"""The keys of a terminal, one by one, without waiting for Enter."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from calibnet.errors import ConfigError
+
+END = ""
+"""What is read when no more keys can come."""
+Read = Callable[[float], list[str]]
+"""The keys that were pressed since, after waiting so many seconds at most for the first."""
+
+
+@contextmanager
+def keyboard(descriptor: int | None = None) -> Iterator[Read]:
+    """Read keys while this lasts; the terminal is left as it was found. What is no terminal is read as keys too.
+
+    Args:
+        descriptor: of the terminal; standard input, if not given.
+
+    Raises:
+        ConfigError: this system has no such terminals.
+    """
+    if sys.platform == "win32":
+        raise ConfigError("--native reads its keys from a terminal of Linux or macOS; leave it out for the page.")
+    import termios
+    import tty
+
+    terminal = sys.stdin.fileno() if descriptor is None else descriptor
+    before = termios.tcgetattr(terminal) if os.isatty(terminal) else None
+    if before is not None:
+        tty.setcbreak(terminal)  # Ctrl-C still interrupts
+
+    def read(seconds: float) -> list[str]:
+        if not select.select([terminal], [], [], seconds)[0]:
+            return []
+        text = os.read(terminal, 1024).decode(errors="ignore")
+        return split_keys(text) if text else [END]
+
+    try:
+        yield read
+    finally:
+        if before is not None:
+            termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+
+
+def split_keys(text: str) -> list[str]:
+    """Characters, and what a terminal sends for one key, such as ``ESC [ C`` for the right arrow, in one piece."""
+    keys: list[str] = []
+    while text:
+        length = 3 if text[0] == "\x1b" and text[1:2] in ("[", "O") and len(text) >= 3 else 1
+        keys.append(text[:length])
+        text = text[length:]
+    return keys

@@ -1,0 +1,185 @@
+"""A live session by the keys of a terminal, beside Rerun's own window."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Any
+
+from inspector.live.keys import END, Read
+from inspector.live.pose import Pose
+from inspector.live.session import LiveSession
+from inspector.live.window import WindowRecording
+
+AXES = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z"}
+"""The keys that turn or move up and down, as in OpenCalib's manual tool."""
+STEPS = {"coarse": (0.25, 0.02), "fine": (0.02, 0.002)}
+"""Degrees and metres that a key moves by; with Shift a tenth."""
+RELEASE_S = 0.3
+"""As long as keys come faster than that, nobody has let go."""
+POLL_S = 0.05
+LEFT, RIGHT, ESCAPE = ("\x1b[D", "\x1bOD"), ("\x1b[C", "\x1bOC"), "\x1b"
+MESSAGES: dict[str, dict[str, Any]] = {
+    "\n": {"do": "run"},
+    "\r": {"do": "run"},
+    **{str(number): {"do": "run", "stage": number} for number in range(1, 6)},
+    "m": {"do": "drive"},
+    "x": {"do": "worst"},
+    "z": {"do": "undo"},
+    "Z": {"do": "redo"},
+    "0": {"do": "guess"},
+    "9": {"do": "reference"},
+    "i": {"do": "random"},
+}
+HELP = {
+    "q a, w s, e d": "roll, pitch, yaw",
+    "r f, t g, y h": "x (right), y (down), z (ahead)",
+    "Shift": "a tenth of the step",
+    "v": "coarse or fine steps",
+    "Enter": "run all stages",
+    "1 to 5": "run that stage alone",
+    "m": "solve the drive from all frames",
+    "z, Z": "undo, redo",
+    "0, 9, i": "to the guess, to the reference, random",
+    "l": "take the last answer as the pose",
+    "n, p, arrows": "next, previous frame",
+    "x": "the worst frame from here",
+    "k": "keep the last answer as calibration",
+    "o": "run on release, or only with Enter",
+    "?": "these keys",
+    "Esc, Ctrl-C": "end",
+}
+
+
+def help_text() -> str:
+    """What the keys do, as Markdown."""
+    return "\n".join(["| key | does |", "| --- | --- |", *(f"| {key} | {does} |" for key, does in HELP.items())])
+
+
+class Terminal:
+    """Turns keys into messages to a session, and what it tells into lines."""
+
+    def __init__(self, session: LiveSession, window: WindowRecording, say: Callable[[str], None]) -> None:
+        """Connect a session with its window.
+
+        Args:
+            session: that acts, and records to the window.
+            window: that follows the pose.
+            say: prints a line.
+        """
+        self._session, self._window, self._say = session, window, say
+        self._bench = session.bench
+        self._steps, self._on_release = "coarse", True
+        self._moved_at: float | None = None
+        self._asked: dict[str, Any] | None = None
+        self._busy = ""
+        self._held: object = None
+        session.tell = self._hear
+
+    async def run(self, read: Read, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Act on keys until they end, one of them says so, or ``stopped`` does."""
+        await self._hold()
+        while not stopped():
+            for key in await asyncio.to_thread(read, POLL_S):
+                if key in (END, ESCAPE):
+                    await self._release()
+                    await self._session.idle()
+                    return
+                await self._press(key)
+            await self._hold()
+            if self._moved_at is not None and time.monotonic() - self._moved_at >= RELEASE_S:
+                await self._release()
+
+    async def _press(self, key: str) -> None:
+        if self._asked is not None:
+            again, self._asked = self._asked, None
+            if key == "y":
+                await self._session.act(again)
+            else:
+                self._say("Left as it is.")
+        elif (pose := self._turned(key)) is not None:
+            await self._session.act({"do": "pose", "pose": list(pose)})
+            self._moved_at = time.monotonic()
+        elif key in MESSAGES:
+            self._moved_at = None
+            moves = MESSAGES[key]["do"] in ("undo", "redo", "guess", "reference", "random")
+            await self._session.act({**MESSAGES[key], **({"run": self._on_release} if moves else {})})
+        elif key in (*LEFT, *RIGHT, "n", "p"):
+            by = 1 if key in (*RIGHT, "n") else -1
+            await self._session.act({"do": "frame", "position": self._bench.position + by, "run": self._on_release})
+        elif key in ("l", "k"):
+            await self._last("take" if key == "l" else "accept")
+        elif key == "v":
+            self._steps = "fine" if self._steps == "coarse" else "coarse"
+            degrees, metres = STEPS[self._steps]
+            self._say(f"Steps of {degrees:g}° and {100 * metres:g} cm.")
+        elif key == "o":
+            self._on_release = not self._on_release
+            self._say("Runs when keys are let go." if self._on_release else "Runs with Enter only.")
+        elif key == "?":
+            for name, does in HELP.items():
+                self._say(f"{name:>14}  {does}")
+
+    def _turned(self, key: str) -> Pose | None:
+        """The pose after a key that moves it; None where the key does something else."""
+        for keys, axis in AXES.items():
+            if key.lower() in keys:
+                step = STEPS[self._steps][axis in ("x", "y", "z")] * (0.1 if key.isupper() else 1.0)
+                value = getattr(self._bench.pose, axis) + (step if key.lower() == keys[0] else -step)
+                return self._bench.pose._replace(**{axis: value})
+        return None
+
+    async def _release(self) -> None:
+        moved, self._moved_at = self._moved_at, None
+        if moved is not None and self._on_release:
+            await self._session.act({"do": "run"})
+
+    async def _last(self, what: str) -> None:
+        """Take or keep the last answer; without one, what is kept is the pose."""
+        if self._bench.tries:
+            made = self._bench.tries[-1]
+            await self._session.act({"do": what, "try": made.number, "step": len(made.steps) - 1})
+        elif what == "accept":
+            await self._session.act({"do": what})
+
+    async def _hold(self) -> None:
+        """Let the window follow, where the pose or the frame is another one."""
+        bench = self._bench
+        now = (bench.frame, bench.pose)
+        if self._held is None or now != self._held:
+            self._held = now
+            await asyncio.to_thread(self._window.hold, len(bench.tries), bench.frame, bench.extrinsic, bench.reference)
+
+    async def _hear(self, message: dict[str, Any]) -> None:
+        kind = message["is"]
+        if kind == "try":
+            for line in try_lines(message):
+                self._say(line)
+        elif kind in ("said", "problem"):
+            self._say(message["text"])
+        elif kind == "sure?":
+            self._asked = message["again"]
+            self._say(f"{message['text']} Write it all the same? y / n")
+        elif kind == "state" and message["busy"] != self._busy:
+            self._busy = message["busy"]
+            if self._busy and not self._busy.startswith("recording"):
+                self._say(f"{self._busy[0].upper()}{self._busy[1:]} ...")
+
+
+def try_lines(made: dict[str, Any]) -> list[str]:
+    """What a try came to, from `inspector.live.tries.Try.as_dict`."""
+    verdict, sigma = made["verdict"], made["sigma"]
+    word = "no verdict" if verdict is None else verdict["word"]
+    head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {word.upper()}."
+    reason = [] if verdict is None else [verdict["text"]]
+    sure = [] if sigma is None else [f"Sure to {sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
+    rows = []
+    for position, step in enumerate(made["steps"]):
+        name = f"after {step['name']}" if position else "from"
+        error, moved = (
+            None if one is None else f"{one[0]:.2f}°, {one[1]:.1f} cm" for one in (step["error"], step["moved"])
+        )
+        parts = [*([f"{error} off"] if error else []), *([f"moved by {moved}"] if position else [])]
+        rows.append(f"  {name:<14} {'; '.join(parts)}")
+    return [head, *rows, *[" ".join([*reason, *sure])]]

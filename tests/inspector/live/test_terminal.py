@@ -1,0 +1,153 @@
+"""A session by keys, with Rerun's own window; the window is a file here."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from PIL import Image
+
+from calibnet.geometry import pose_error
+from inspector.live.bench import Bench
+from inspector.live.keys import END, keyboard, split_keys
+from inspector.live.session import LiveSession
+from inspector.live.terminal import Terminal, help_text
+from inspector.live.window import WindowRecording
+from tests.support.fakes import FakeCascade
+
+Read = Callable[..., list[tuple[Any, Any]]]
+
+
+class Window:
+    """A session whose window is a file, and the lines that it says."""
+
+    def __init__(self, file: Path, make: Callable[..., LiveSession], **given: Any) -> None:
+        self.file = file
+        self.recording = WindowRecording(rr.FileSink(file), help_text())
+        self.session = make(stream=self.recording, **given)
+        self.said: list[str] = []
+
+    @property
+    def bench(self) -> Bench:
+        return self.session.bench
+
+    def press(self, *keys: str) -> list[str]:
+        """Press keys, each when what came before is done, then end; what was said."""
+        self.said.clear()
+        waiting = [*keys, END]
+
+        async def all_of_it() -> None:
+            terminal = Terminal(self.session, self.recording, self.said.append)
+
+            def read(_: float) -> list[str]:
+                return [waiting.pop(0)]
+
+            original = terminal._press
+
+            async def press(key: str) -> None:
+                await original(key)
+                await self.session.idle()
+
+            terminal._press = press  # type: ignore[method-assign]
+            await terminal.run(read)
+
+        asyncio.run(all_of_it())
+        return list(self.said)
+
+
+@pytest.fixture
+def window(make: Callable[..., LiveSession], tmp_path: Path) -> Callable[..., Window]:
+    return lambda **given: Window(tmp_path / "window.rrd", make, **given)
+
+
+def test_keys_turn_and_move_and_letting_go_asks(window: Callable[..., Window]) -> None:
+    one = window()
+    said = one.press("q", "q", "A", "f", "y")
+    assert tuple(one.bench.pose) == pytest.approx((0.475, 0, 0, -0.02, 0, 0.02))
+    (made,) = one.bench.tries
+    assert said[0] == "Running all stages ..."
+    assert said[1].startswith("Try 0, frame 4: stages 3 to 5, ") and said[1].endswith(" ms: ACCEPTED.")
+    error = pose_error(made.found, one.bench.reference)
+    assert any(f"{error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off" in line for line in said)
+    said = one.press("v", "e", "z", "Z", "o", "d")
+    assert one.bench.pose.yaw == pytest.approx(0.0)
+    assert "Steps of 0.02° and 0.2 cm." in said and "Runs with Enter only." in said
+
+
+def test_single_stages_frames_and_the_drive(window: Callable[..., Window]) -> None:
+    one = window()
+    one.press("4", "n", "\x1b[D", "p", "m", "9")
+    assert [made.title for made in one.bench.tries][:1] == ["stage 4"]
+    assert "drive of 3 frames" in [made.title for made in one.bench.tries]
+    assert one.bench.frame.index == 6  # forth, back, and back round to the last of 4, 5, 6
+    np.testing.assert_allclose(one.bench.extrinsic, one.bench.reference, atol=1e-9)
+    assert "There is no stage" not in "".join(one.said)
+
+
+def test_what_is_kept_is_asked_about_where_it_is_rejected(window: Callable[..., Window], tmp_path: Path) -> None:
+    one, file = window(cascade=FakeCascade(doubted=(4,))), tmp_path / "out" / "calibration.corrected.yaml"
+    said = one.press("\n", "k", "n")
+    assert any(line.startswith("Rejected: ") and line.endswith("y / n") for line in said)
+    assert said[-1] == "Left as it is." and not file.exists()
+    assert one.press("k", "y")[-1] == f"Wrote {file}."
+    assert "rejected" in file.read_text()
+
+
+def test_the_window_follows_the_hand_then_shows_the_stages_then_the_details(
+    window: Callable[..., Window], read: Read
+) -> None:
+    one = window()
+    one.press("q", "\n", "w", "\n")
+    one.session.close()
+    points = read(one.file, "overlay/current", "Points2D:positions", "try")
+    assert sorted({step for step, _ in points}) == [
+        8 * number + step for number in (0, 1) for step in (0, 3, 4, 5, 6, 7)
+    ]
+    mine = [value for step, value in points if step == 8]
+    assert mine[0] != next(value for step, value in points if step == 0)
+    for entity, component in (
+        ("image", "EncodedImage:blob"),
+        ("stage_5/scale_8/best_match", "EncodedImage:blob"),
+        ("table", "TextDocument:text"),
+    ):
+        assert read(one.file, entity, component, "try"), entity
+    words = [value.as_py()[0] for _, value in read(one.file, "table", "TextDocument:text", "try")]
+    assert words[0].startswith("# No answer yet") and "Accepted" in words[-1]
+    picture = read(one.file, "image", "EncodedImage:blob", "try")[0][1].as_py()[0]
+    assert Image.open(io.BytesIO(bytes(picture))).size == (400, 120)
+
+
+def test_keys_are_read_as_they_come() -> None:
+    assert split_keys("qW\x1b[C\x1b") == ["q", "W", "\x1b[C", "\x1b"]
+    out, into = os.pipe()
+    with keyboard(out) as read:
+        assert read(0.0) == []
+        os.write(into, "qé\x1b[D".encode())
+        assert read(5.0) == ["q", "é", "\x1b[D"]
+        os.close(into)
+        assert read(5.0) == [END]
+    os.close(out)
+
+
+def test_a_terminal_is_left_as_it_was_found() -> None:
+    import pty
+    import termios
+
+    master, slave = pty.openpty()
+    before = termios.tcgetattr(slave)
+    with keyboard(slave) as read:
+        assert not termios.tcgetattr(slave)[3] & termios.ICANON
+        os.write(master, b"q")
+        assert read(5.0) == ["q"]
+    assert termios.tcgetattr(slave) == before
+
+
+def test_every_key_that_is_told_does_something() -> None:
+    assert all(f"| {key} |" in help_text() for key in ("q a, w s, e d", "Enter", "k"))
