@@ -123,9 +123,11 @@ def _trained(preset: str, name: str, range_: MiscalibrationRange, weights: Path 
     Raises:
         WeightsError: a file is there and cannot be used, or holds another row's network.
     """
-    command = f"make them with `calib-inspect train --preset {preset} --ablation {name} --range {range_}`"
+    train = f"`calib-inspect train --preset {preset} --ablation"
     if weights is None:
-        return None, f"No folder of weights was given; {command} and name its --output with --weights."
+        why = f"No folder of weights was given: {train} ROW --range {range_} --output DIR` fills one, row by row."
+        return None, why
+    command = f"make them with {train} {name} --range {range_} --output {weights}`"
     folder = ablation_folder(weights, name)
     path = weights_path(preset, range_, folder)
     if not path.exists():

@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
-from inspector.cli.output import JSON_FILE, console_beside, make_console, overwrite_option, prepare_json, write_json
+from inspector.cli.output import (
+    JSON_FILE,
+    console_beside,
+    make_console,
+    overwrite_option,
+    prepare,
+    prepare_json,
+    say,
+    write,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from calibnet.geometry import MiscalibrationRange
+
+FILE = click.Path(dir_okay=False, path_type=Path)
+COLUMNS = ("preset", "without", "rig", "parameters", "multiply-adds", "latency", "rotation", "translation")
+NAMES = 3
+"""Columns that are names; the others are numbers."""
 
 
 @click.command()
@@ -31,7 +48,11 @@ if TYPE_CHECKING:
     "--timed", type=click.IntRange(0), default=3, show_default=True, help="Looks whose median is the latency; 0: none."
 )
 @click.option("--threads", type=click.IntRange(1), default=2, show_default=True, help="Of the CPU.")
+@click.option(
+    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier run."
+)
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout, no table.")
+@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def ablate(
     presets: tuple[str, ...],
@@ -43,19 +64,52 @@ def ablate(
     seed: int,
     timed: int,
     threads: int,
+    source: Path | None,
     json_file: str | None,
+    markdown_file: Path | None,
 ) -> None:
     """Take the network apart: what each of the paper's five ablations and the whole network costs and is worth.
 
     Parameters, multiply-adds, latency and errors stand beside the paper's. Errors are those after one look of the
-    network of --range, by rig, for the rows that --weights has; latency is of one look. The preset paper has no
-    weights, and takes a minute or two of CPU for its latencies.
+    network of --range, by rig, for the rows that --weights has; latency is of one look, on the first frame of --data.
+    The preset paper has no weights, and takes a minute or two of CPU for its latencies.
 
     \b
     calib-inspect train --ablation aggregation --range 5/0.5 --samples 10000 --uniform --packed PARTS --output ROWS
     calib-inspect ablate --weights ROWS \\
       --data kitti-raw:KITTI/raw:2011_09_26/0048 --data kitti-odometry:KITTI/odometry:04
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
+    from calibnet.runtime.writing import Kind
+
+    prepare_json(json_file)
+    prepare(markdown_file, Kind.EXPORT)
+    if source is not None:
+        content = read_ablation(source)
+    else:
+        content = measured(
+            presets or ("compact", "paper"), range_, weights, data, frames, repeats, seed, timed, threads
+        )
+    if json_file != "-":
+        console_beside(json_file).print(ablation_table(content))
+        for why in dict.fromkeys(row["why"] for row in content["rows"] if "why" in row):
+            say(why)
+    write_json(json_file, content)
+    if markdown_file is not None:
+        write(markdown_file, as_markdown(content).encode(), Kind.EXPORT)
+
+
+def measured(
+    presets: Sequence[str],
+    range_: MiscalibrationRange,
+    weights: Path | None,
+    data: tuple[str, ...],
+    frames: str,
+    repeats: int,
+    seed: int,
+    timed: int,
+    threads: int,
+) -> dict[str, Any]:
+    """Measure what is asked for, with progress; returns what JSON files hold."""
     import torch
 
     from calibnet.datasets import PickedFrames, select_frames
@@ -66,63 +120,99 @@ def ablate(
     if range_ not in RANGES:
         ranges = ", ".join(str(one) for one in RANGES)
         raise click.UsageError(f"--range {range_} is none of those that networks are trained for: {ranges}.")
-    prepare_json(json_file)
     torch.set_num_threads(threads)
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
-    console = console_beside(json_file)
     rows: list[dict[str, Any]] = []
     with make_console().status("") as status:
 
         def show(row: str, done: int, total: int) -> None:
             status.update(f"{row}: {done} of {total}")
 
-        chosen = presets or ("compact", "paper")
-        for row in measure_ablation(chosen, range_, weights, sequences, repeats, seed, timed, show):
+        for row in measure_ablation(presets, range_, weights, sequences, repeats, seed, timed, show):
             rows.append(row)
             status.update(f"{row['preset']}, {row['name']}: done")
-    content = {
+    return {
+        "table": "ablate",
         "range": str(range_),
         "input": [HEIGHT, WIDTH],
-        "sequences": [sequence.name for sequence in sequences],
+        "sequences": [{"name": one.name, "rig": one.rig, "frames": len(one)} for one in sequences],
         "repeats": repeats,
         "seed": seed,
-        "machine": {"processor": platform.machine(), "threads": threads, "torch": torch.__version__},
+        "threads": threads,
+        "processor": platform.processor() or platform.machine(),
         "rows": rows,
     }
-    if json_file != "-":
-        console.print(ablation_table(content))
-        for why in dict.fromkeys(row["why"] for row in rows if "why" in row):
-            console.print(why, markup=False, soft_wrap=True)
-    write_json(json_file, content)
+
+
+def read_ablation(source: Path) -> dict[str, Any]:
+    """The JSON of an earlier run.
+
+    Raises:
+        ConfigError: it is not one.
+    """
+    from calibnet.runtime.reading import parse_json, read_text
+
+    try:
+        content = parse_json(read_text(source, "The ablation", error=ConfigError))
+    except ValueError as error:
+        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect ablate --json` wrote.") from None
+    if not isinstance(content, dict) or content.get("table") != "ablate":
+        raise ConfigError(f"{source} was not written by `calib-inspect ablate --json`.")
+    return content
+
+
+def title(content: dict[str, Any]) -> str:
+    """What the table is of."""
+    return f"Ablation, ±{content['range']}, one look; in brackets what the paper says of its own"
+
+
+def cells(row: dict[str, Any]) -> tuple[str, ...]:
+    """A row as texts, in the order of `COLUMNS`."""
+    from calibnet.evaluation.ablation import CLAIMS
+
+    claim, took = CLAIMS[row["name"]], row["latency_ms"]
+    rotation, translation = row.get("rotation_deg"), row.get("translation_cm")
+    return (
+        row["preset"],
+        "(nothing: full)" if row["name"] == "full" else row["name"],
+        row.get("rig", ""),
+        f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
+        f"{row['multiply_adds'] / 1e9:.2f} G ({claim.flops_g:g})",
+        "" if took is None else f"{took:.0f} ms ({claim.latency_ms:g})",
+        "" if rotation is None else f"{rotation['mean']:.2f}° ({claim.rotation_deg:g}°)",
+        "" if translation is None else f"{translation['mean']:.1f} cm ({claim.translation_cm:g} cm)",
+    )
 
 
 def ablation_table(content: dict[str, Any]) -> Table:
-    """A line a row; in brackets what the paper says of its own."""
+    """A line a row, for the terminal."""
     from rich.table import Table
 
-    from calibnet.evaluation.ablation import CLAIMS
-
-    table = Table(title=f"Ablation, ±{content['range']}, one look; in brackets the paper's figures")
-    for name in ("preset", "without", "rig"):
-        table.add_column(name)
-    for name in ("parameters", "multiply-adds", "latency", "rotation", "translation"):
-        table.add_column(name, justify="right")
+    table = Table(title=title(content))
+    for position, name in enumerate(COLUMNS):
+        table.add_column(name, justify="left" if position < NAMES else "right", overflow="fold")
     before = ""
     for row in content["rows"]:
         if before and row["preset"] != before:
             table.add_section()
-        before, claim = row["preset"], CLAIMS[row["name"]]
-        took = "" if row["latency_ms"] is None else f"{row['latency_ms']:.0f} ms ({claim.latency_ms:g})"
-        rotation, translation = row.get("rotation_deg"), row.get("translation_cm")
-        table.add_row(
-            row["preset"],
-            "(nothing: full)" if row["name"] == "full" else row["name"],
-            row.get("rig", ""),
-            f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
-            f"{row['multiply_adds'] / 1e9:.1f} G ({claim.flops_g:g})",
-            took,
-            "" if rotation is None else f"{rotation['mean']:.2f}° ({claim.rotation_deg:g})",
-            "" if translation is None else f"{translation['mean']:.1f} cm ({claim.translation_cm:g})",
-        )
+        before = row["preset"]
+        table.add_row(*cells(row))
     return table
+
+
+def as_markdown(content: dict[str, Any]) -> str:
+    """The same for documents."""
+    of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
+    lines = [
+        f"{title(content)}.",
+        "",
+        "| " + " | ".join(COLUMNS) + " |",
+        "|" + "---|" * NAMES + "---:|" * (len(COLUMNS) - NAMES),
+        *("| " + " | ".join(cells(row)) + " |" for row in content["rows"]),
+        "",
+        f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "
+        f"multiply-adds at {content['input'][0]} x {content['input'][1]}; latency of one look on "
+        f"{content['processor']}, {content['threads']} threads. Made by calib-inspect ablate.",
+    ]
+    return "\n".join(lines) + "\n"

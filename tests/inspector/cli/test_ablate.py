@@ -1,0 +1,55 @@
+"""``ablate`` from its options to table, JSON and Markdown; ``train`` with what does not go together."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from calibnet.geometry import RANGES
+from calibnet.network.ablations import ABLATIONS
+from calibnet.network.config import load_preset
+from calibnet.network.network import CalibrationNetwork
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+
+
+def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, page = tmp_path / "table-3.json", tmp_path / "table-3.md"
+    assert run(cli, ["ablate", "--preset", "compact", "--json", str(out)]) == 0
+    content = json.loads(out.read_text())
+    rows = {row["name"]: row for row in content["rows"]}
+    assert list(rows) == list(ABLATIONS)
+    network = CalibrationNetwork(load_preset("compact"), RANGES[2])
+    assert rows["full"]["parameters"] == sum(parameter.numel() for parameter in network.parameters())
+    assert rows["full"]["preset"] == "compact"
+    assert rows["full"]["latency_ms"] is None
+    assert capsys.readouterr().out.count("train --preset compact --ablation ROW --range 5/0.5") == 1
+    assert run(cli, ["ablate", "--from", str(out), "--markdown", str(page)]) == 0
+    assert "| compact | (nothing: full) |  | 2.65 M (20.5) |" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["ablate", "--range", "4/0.4"], 2, "20/1.5, 10/1, 5/0.5, 2/0.2, 1/0.1"),
+        (["ablate", "--preset", "huge"], 3, "'huge'"),
+        (["ablate", "--from", "other.json"], 3, "was not written by `calib-inspect ablate --json`"),
+        (["train", "--method", "lccnet", "--all", "--samples", "8"], 2, "--method trains one network"),
+        (["train", "--method", "lccnet", "--ablation", "full", "--range", "5/0.5", "--samples", "8"], 2, "--method"),
+        (["train", "--ablation", "full", "--all", "--samples", "8"], 2, "--ablation trains one stage"),
+    ],
+)
+def test_what_does_not_go_is_a_sentence(
+    arguments: list[str],
+    code: int,
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("other.json").write_text("{}")
+    assert run(cli, arguments) == code
+    assert said in " ".join(capsys.readouterr().err.split())
