@@ -55,7 +55,27 @@ def _folder(root: Path, name: str) -> Iterator[Sequence]:
             yield open_sequence("folder", folder)
 
 
+def _kitti_360(root: Path, name: str) -> Iterator[Sequence]:
+    for folder in sorted((root / "data_2d_raw").glob("*_drive_*_sync")):
+        drive = folder.name.split("_")[4]
+        if not name or int(name) == int(drive):
+            for camera in range(4):
+                if (folder / f"image_0{camera}").is_dir():
+                    yield open_sequence("kitti-360", root, drive=drive, camera=camera)
+
+
+def _nuscenes(root: Path, name: str) -> Iterator[Sequence]:
+    """Of every scene ``CAM_FRONT``; ``SCENE/CAMERA`` names another one."""
+    from calibnet.datasets.nuscenes_tables import find_tables, scene_names
+
+    scene, _, camera = name.partition("/")
+    for one in [scene] if scene else scene_names(find_tables(root)):
+        yield open_sequence("nuscenes", root, scene=one, camera=camera or "CAM_FRONT")
+
+
 FINDERS = {
+    "kitti-360": _kitti_360,
+    "nuscenes": _nuscenes,
     "kitti-raw": _raw,
     "kitti-odometry": _odometry,
     "kitti-object": _object,

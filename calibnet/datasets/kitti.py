@@ -65,6 +65,24 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
     return values
 
 
+def read_calibration_row(path: Path, size: int) -> Floats:
+    """Read a KITTI calibration file that is one row of numbers without a name, of a rigid transform if they are 12.
+
+    Raises:
+        DatasetError: the file is missing, or holds anything else.
+    """
+    remedy = "get it from KITTI's calibration"
+    try:
+        row = np.array(read_text(path, "Calibration", remedy=remedy).split(), dtype=np.float64)
+    except ValueError:
+        row = np.zeros(0)
+    if row.size != size or not np.isfinite(row).all():
+        raise DatasetError(f"Calibration {path} is not one row of {size} finite numbers; {remedy}.")
+    if size == 12:
+        checked_rotation(row.reshape(3, 4)[:, :3], path, path.stem)
+    return row
+
+
 def rectified_calibration(projection: Floats, camera0_from_lidar: Extrinsic) -> Calibration:
     """The exact calibration of a rectified camera.
 

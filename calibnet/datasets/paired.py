@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibnet.datasets.bin_clouds import KITTI
 from calibnet.datasets.calibration import Calibration
@@ -101,7 +102,7 @@ class PairedSequence(ABC):
         image_path, scan_path = files.needed
         calibration = self._calibration(files)
         image, original, faces = self._picture(files)
-        points = read_scan(scan_path, self.cloud_columns, self._full_scale)
+        points = self._points(files)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
         remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {image_path}")
@@ -131,6 +132,10 @@ class PairedSequence(ABC):
     @abstractmethod
     def _calibration(self, files: FrameFiles) -> Calibration:
         """The calibration of one frame."""
+
+    def _points(self, files: FrameFiles) -> NDArray[np.float32]:
+        """The scan ``[N, 4]`` of one frame, in our axes."""
+        return read_scan(files.needed.scan, self.cloud_columns, self._full_scale)
 
     def _picture(self, files: FrameFiles) -> Picture:
         """The image of one frame."""

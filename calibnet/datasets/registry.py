@@ -22,6 +22,8 @@ DATASETS = Registry(
         "kitti-raw": "calibnet.datasets.kitti_raw:KittiRaw",
         "kitti-object": "calibnet.datasets.kitti_object:KittiObject",
         "kitti-tracking": "calibnet.datasets.kitti_tracking:KittiTracking",
+        "kitti-360": "calibnet.datasets.kitti360:Kitti360",
+        "nuscenes": "calibnet.datasets.nuscenes:NuScenes",
         "folder": "calibnet.datasets.folder:Folder",
     },
 )

@@ -181,12 +181,17 @@ def run_battery(
 def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:
     """Open what ``--sequences`` names; each dataset calls its parts differently."""
     options = {} if camera is None else {"camera": camera}
-    if dataset not in ("kitti-odometry", "kitti-raw", "kitti-object", "kitti-tracking"):
+    if dataset == "kitti-360" and parts:
+        return [open_sequence(dataset, root, drive=part, **options) for part in parts]
+    if dataset == "nuscenes":
+        scenes = [part.partition("/") for part in parts or [""]]
+        return [open_sequence(dataset, root, scene=one, camera=of or "CAM_FRONT") for one, _, of in scenes]
+    if dataset not in ("kitti-360", "kitti-odometry", "kitti-raw", "kitti-object", "kitti-tracking"):
         return [open_sequence(dataset, root / part, **options) for part in parts or ["."]]
     if dataset == "kitti-object":
         return [open_sequence(dataset, root, split=part, **options) for part in parts or ["training"]]
     if not parts:
-        example = "2011_09_26/0005" if dataset == "kitti-raw" else "04"
+        example = {"kitti-raw": "2011_09_26/0005", "kitti-360": "0003"}.get(dataset, "04")
         raise click.UsageError(f"--sequences is needed with --dataset {dataset}, for instance --sequences {example}.")
     if dataset == "kitti-raw":
         return [open_sequence(dataset, root, **drive(part), **options) for part in parts]

@@ -1,4 +1,4 @@
-"""``calib-inspect seq|raw|object|folder|demo``: calibrate frames and record every stage."""
+"""``calib-inspect seq|raw|tracking|kitti360|nuscenes|object|folder|demo``: calibrate frames and record every stage."""
 
 from __future__ import annotations
 
@@ -24,12 +24,39 @@ root_option = click.option("--root", type=FOLDER, envvar="KITTI_ROOT", help="The
 camera_option = click.option(
     "--camera", type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
 )
+perspective_option = click.option(
+    "--camera",
+    type=click.IntRange(0, 3),
+    default=0,
+    show_default=True,
+    help="Camera to calibrate: 0 and 1 look ahead, 2 and 3 are fisheyes to the sides.",
+)
+NUSCENES_OPTIONS = (
+    click.option("--root", type=FOLDER, envvar="NUSCENES", help="The dataset's folder.  [env: NUSCENES]"),
+    click.option("--camera", metavar="CHANNEL", default="CAM_FRONT", show_default=True, help="Camera to calibrate."),
+    click.option("--version", default="", metavar="NAME", help="Folder of the tables.  [default: the only one]"),
+    click.option(
+        "--compensate/--as-taken",
+        default=True,
+        show_default=True,
+        help="Move each scan to the time of its image, by the car's poses.",
+    ),
+)
+
+
+def nuscenes_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command what says where nuScenes is and what of it is read."""
+    for option in reversed(NUSCENES_OPTIONS):
+        command = option(command)
+    return command
+
+
 split_option = click.option(
     "--split", default="training", show_default=True, help="training, testing, or a list in ImageSets."
 )
 dataset_option = click.option(
     "--dataset",
-    type=click.Choice([name for name in dataset_names() if not name.startswith("kitti-")]),
+    type=click.Choice([name for name in dataset_names() if not name.startswith(("kitti-", "nuscenes"))]),
     default="folder",
     show_default=True,
     help="What the folder holds; packages can add to these.",
@@ -161,6 +188,31 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
 
 @click.command()
+@click.argument("drive")
+@root_option
+@perspective_option
+@run_options
+def kitti360(drive: str, root: Path | None, camera: int, **asked: Any) -> int:
+    """Calibrate a drive of KITTI-360, for instance 0003.
+
+    --root is the folder that holds `calibration`, `data_2d_raw` and `data_3d_raw`.
+    """
+    return calibrate(open_kitti360(drive, root, camera), camera=camera, **asked)
+
+
+@click.command()
+@click.argument("scene", required=False, default="")
+@nuscenes_options
+@run_options
+def nuscenes(scene: str, root: Path | None, camera: str, version: str, compensate: bool, **asked: Any) -> int:
+    """Calibrate the keyframes of a scene of nuScenes, for instance scene-0061; the first one by default.
+
+    --root is the folder that holds `samples` and the tables, `v1.0-mini`. Its SDK is not needed.
+    """
+    return calibrate(open_nuscenes(scene, root, camera, version, compensate), camera=camera, **asked)
+
+
+@click.command()
 @click.argument("directory", type=FOLDER)
 @folder_options
 @run_options
@@ -258,6 +310,24 @@ def open_tracking(sequence: str, root: Path | None, camera: int) -> Sequence:
     from calibnet.datasets import open_sequence
 
     return open_sequence("kitti-tracking", require_root(root, "tracking"), sequence=sequence, camera=camera)
+
+
+def open_kitti360(drive: str, root: Path | None, camera: int) -> Sequence:
+    """A drive of KITTI-360."""
+    from calibnet.datasets import open_sequence
+
+    return open_sequence("kitti-360", require_root(root, "360"), drive=drive, camera=camera)
+
+
+def open_nuscenes(scene: str, root: Path | None, camera: str, version: str, compensate: bool) -> Sequence:
+    """A scene of nuScenes."""
+    from calibnet.datasets import open_sequence
+
+    if root is None:
+        raise ConfigError(
+            "No nuScenes folder: give --root DIR or set NUSCENES to where nuScenes is unpacked (from nuscenes.org)."
+        )
+    return open_sequence("nuscenes", root, scene=scene, camera=camera, version=version, compensate=compensate)
 
 
 def open_object(split: str, root: Path | None, camera: int) -> Sequence:

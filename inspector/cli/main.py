@@ -36,6 +36,8 @@ COMMANDS = {
     "raw": LazyCommand("inspector.cli.inspect:raw", "The same for a KITTI raw drive."),
     "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
     "tracking": LazyCommand("inspector.cli.inspect:tracking", "The same for a KITTI tracking sequence."),
+    "kitti360": LazyCommand("inspector.cli.inspect:kitti360", "The same for a KITTI-360 drive."),
+    "nuscenes": LazyCommand("inspector.cli.inspect:nuscenes", "The same for a scene of nuScenes."),
     "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
     "bag": LazyCommand("inspector.cli.inspect:bag", "The same for a ROS 1 or ROS 2 bag, or an MCAP file."),
     "rig": LazyCommand("inspector.cli.rig:rig", "Several cameras on one LiDAR, each alone or all as one rig."),

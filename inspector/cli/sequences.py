@@ -1,4 +1,4 @@
-"""The subcommands ``seq|raw|tracking|object|folder|bag`` of groups that say something of a sequence, such as verify."""
+"""The subcommands ``seq``, ``raw``, ``folder`` and so on of groups that say something of a sequence, such as verify."""
 
 from __future__ import annotations
 
@@ -14,12 +14,16 @@ from inspector.cli.inspect import (
     bag_options,
     camera_option,
     folder_options,
+    nuscenes_options,
     open_bag,
     open_folder,
+    open_kitti360,
+    open_nuscenes,
     open_object,
     open_odometry,
     open_raw,
     open_tracking,
+    perspective_option,
     root_option,
     split_option,
 )
@@ -69,6 +73,23 @@ def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
     def tracking(sequence: str, root: Path | None, camera: int, **asked: Any) -> int:
         """Of a KITTI tracking sequence, for instance 0004."""
         return act(lambda: open_tracking(sequence, root, camera), camera=camera, **asked)
+
+    @group.command()
+    @click.argument("drive")
+    @root_option
+    @perspective_option
+    @options
+    def kitti360(drive: str, root: Path | None, camera: int, **asked: Any) -> int:
+        """Of a KITTI-360 drive, for instance 0003."""
+        return act(lambda: open_kitti360(drive, root, camera), camera=camera, **asked)
+
+    @group.command()
+    @click.argument("scene", required=False, default="")
+    @nuscenes_options
+    @options
+    def nuscenes(scene: str, root: Path | None, camera: str, version: str, compensate: bool, **asked: Any) -> int:
+        """Of a scene of nuScenes, for instance scene-0061."""
+        return act(lambda: open_nuscenes(scene, root, camera, version, compensate), camera=camera, **asked)
 
     @group.command("object")
     @split_option

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from calibnet.datasets.calibration_files import kalibr, koide, opencv, ours, ros, transforms
+from calibnet.datasets.calibration_files import kalibr, koide, mei, opencv, ours, ros, transforms
 from calibnet.datasets.calibration_files.calibration_file import CalibrationFile, Wanted
 from calibnet.datasets.calibration_files.text import parse
 from calibnet.errors import DatasetError
@@ -17,7 +17,8 @@ def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> Calibration
     """Read a calibration file.
 
     Known are our ``calibration.yaml``, ROS's ``camera_info``, Kalibr's ``camchain``, OpenCV's ``FileStorage``,
-    koide3's ``calib.json``, lists of transforms such as ``/tf_static``, and Autoware's.
+    CamOdoCal's (KITTI-360's fisheyes), koide3's ``calib.json``, lists of transforms such as ``/tf_static``, and
+    Autoware's.
 
     Args:
         path: the file.
@@ -37,6 +38,8 @@ def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> Calibration
         return koide.read(content, path, wanted)
     if kalibr.is_known(content):
         return kalibr.read(content, path, wanted)
+    if mei.is_known(content):
+        return mei.read(content, path)
     if opencv.is_known(content, of_opencv):
         return opencv.read(content, path, wanted)
     if ros.is_known(content):

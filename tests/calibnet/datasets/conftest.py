@@ -159,11 +159,25 @@ def write_folder(root: Path) -> Layout:
     return layout
 
 
+def write_kitti_360(root: Path) -> Layout:
+    from tests.calibnet.datasets import published  # which is made of what is above
+
+    return published.write_kitti_360(root)
+
+
+def write_nuscenes(root: Path) -> Layout:
+    from tests.calibnet.datasets import published
+
+    return published.write_nuscenes(root)
+
+
 LAYOUTS: dict[str, Callable[[Path], Layout]] = {
     "kitti-odometry": write_kitti_odometry,
     "kitti-raw": write_kitti_raw,
     "kitti-object": write_kitti_object,
     "kitti-tracking": write_kitti_tracking,
+    "kitti-360": write_kitti_360,
+    "nuscenes": write_nuscenes,
     "folder": write_folder,
 }
 """One line a dataset of the registry; the protocol's test fails for a dataset without one."""

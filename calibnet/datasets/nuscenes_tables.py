@@ -1,0 +1,257 @@
+"""nuScenes's tables: JSON lists of flat records, read one by one, since a table of the whole dataset has a gigabyte."""
+
+from __future__ import annotations
+
+import codecs
+import json
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from calibnet.datasets.calibration_files import values
+from calibnet.errors import DatasetError
+from calibnet.geometry import transform
+from calibnet.geometry.types import Intrinsics, Transform
+from calibnet.runtime.reading import MEGABYTE, open_file
+
+LARGEST_BYTES = 4096 * MEGABYTE
+"""Of a table."""
+LARGEST_RECORD = MEGABYTE
+REMEDY = "get it from nuScenes's metadata"
+LIDAR = "LIDAR_TOP"
+NEEDED = ("sample_data", "calibrated_sensor", "sensor", "ego_pose")
+"""Tables without which nothing can be read; ``sample`` and ``scene`` tell scenes apart."""
+EVERYTHING = "all"
+"""Name of the sequence where nothing tells scenes apart."""
+
+Record = Mapping[str, Any]
+
+
+class Sensor(NamedTuple):
+    """One calibration of a sensor: ``car_from_sensor`` 4x4, and the 3x3 matrix of a camera."""
+
+    channel: str
+    car_from_sensor: Transform
+    matrix: Intrinsics | None
+
+
+@dataclass(frozen=True)
+class Taken:
+    """An image or a sweep.
+
+    Attributes:
+        file: its file.
+        seconds: when it was taken.
+        sensor: token of the sensor's calibration.
+        pose: token of the car's pose then.
+        size: width and height of an image; zeros of a sweep.
+    """
+
+    file: Path
+    seconds: float
+    sensor: str
+    pose: str
+    size: tuple[int, int]
+
+
+class Pair(NamedTuple):
+    """The image and the sweep of a sample."""
+
+    image: Taken
+    sweep: Taken
+
+
+def find_tables(root: Path, version: str = "") -> Path:
+    """The folder of the tables below a root, or the root itself.
+
+    Args:
+        root: of nuScenes.
+        version: the folder's name; the only one by default.
+
+    Raises:
+        DatasetError: there is none, several, or one lacks a table.
+    """
+    if version:
+        found = [root / version]
+    else:
+        found = sorted({path.parent for path in [*root.glob("sample_data.json"), *root.glob("*/sample_data.json")]})
+    if len(found) > 1:
+        names = ", ".join(path.name for path in found)
+        raise DatasetError(f"{root} has tables of several versions ({names}); choose one with --version.")
+    if not found:
+        raise DatasetError(f"{root} has no tables; unpack nuScenes's metadata there: v1.0-mini/*.json, for instance.")
+    for name in NEEDED:
+        if not (found[0] / f"{name}.json").exists():
+            raise DatasetError(f"{found[0]} has no {name}.json; {REMEDY}.")
+    return found[0]
+
+
+def chosen_scene(tables: Path, asked: str) -> tuple[str, frozenset[str] | None]:
+    """Name of a scene, and the tokens of its samples; None for all.
+
+    Args:
+        tables: their folder.
+        asked: the scene's name or number; the first one if empty.
+
+    Raises:
+        DatasetError: there is no such scene, or the tables do not tell.
+    """
+    if not all((tables / f"{name}.json").exists() for name in ("scene", "sample")):
+        if asked in ("", EVERYTHING):
+            return EVERYTHING, None
+        raise DatasetError(f"{tables} has no scene.json and sample.json, which tell scenes apart; {REMEDY}.")
+    scenes = {
+        text(one, "name", tables, "scene"): text(one, "token", tables, "scene") for one in records(tables, "scene")
+    }
+    name = asked or next(iter(scenes), "")
+    name = name if not name.isdecimal() else f"scene-{name.zfill(4)}"
+    if name not in scenes:
+        first = ", ".join(list(scenes)[:10]) + (" and more" if len(scenes) > 10 else "")
+        raise DatasetError(f"{tables} has no scene {name!r}; scenes there: {first or 'none'}.")
+    samples = frozenset(
+        text(one, "token", tables, "sample")
+        for one in records(tables, "sample")
+        if one.get("scene_token") == scenes[name]
+    )
+    return name, samples
+
+
+def scene_names(tables: Path) -> list[str]:
+    """The scenes, in their order; one without a name where nothing tells them apart."""
+    if not all((tables / f"{name}.json").exists() for name in ("scene", "sample")):
+        return [""]
+    return [text(one, "name", tables, "scene") for one in records(tables, "scene")]
+
+
+def read_sensors(tables: Path) -> dict[str, Sensor]:
+    """The calibrations of all sensors, by token."""
+    channels = {
+        text(one, "token", tables, "sensor"): text(one, "channel", tables, "sensor")
+        for one in records(tables, "sensor")
+    }
+    path, found = tables / "calibrated_sensor.json", {}
+    for one in records(tables, "calibrated_sensor"):
+        token = text(one, "token", tables, "calibrated_sensor")
+        channel = channels.get(text(one, "sensor_token", tables, "calibrated_sensor"))
+        if channel is None:
+            raise DatasetError(f"{path}: {token} is of a sensor that sensor.json does not have; {REMEDY}.")
+        intrinsic = one.get("camera_intrinsic")
+        matrix = values.numbers(intrinsic, f"{token}.camera_intrinsic", path, (3, 3)) if intrinsic else None
+        found[token] = Sensor(channel, pose(one, path), matrix)
+    return found
+
+
+def read_pairs(
+    tables: Path, root: Path, sensors: Mapping[str, Sensor], camera: str, samples: Collection[str] | None
+) -> list[Pair]:
+    """The keyframes of a camera with those of the LiDAR, in the order of time.
+
+    Args:
+        tables: their folder.
+        root: that files are relative to.
+        sensors: by token.
+        camera: its channel.
+        samples: tokens of those that are wanted; None for all.
+    """
+    images, sweeps = dict[str, Taken](), dict[str, Taken]()
+    of_channel = {camera: images, LIDAR: sweeps}
+    for one in records(tables, "sample_data"):
+        sensor = sensors.get(str(one.get("calibrated_sensor_token")))
+        if not one.get("is_key_frame") or sensor is None or sensor.channel not in of_channel:
+            continue
+        sample = text(one, "sample_token", tables, "sample_data")
+        if samples is None or sample in samples:
+            of_channel[sensor.channel].setdefault(sample, _taken(one, tables, root))
+    both = [Pair(image, sweeps[sample]) for sample, image in images.items() if sample in sweeps]
+    return sorted(both, key=lambda pair: pair.image.seconds)
+
+
+def read_poses(tables: Path, tokens: Collection[str]) -> dict[str, Transform]:
+    """``world_from_car`` by token.
+
+    Raises:
+        DatasetError: one of them is not there.
+    """
+    path = tables / "ego_pose.json"
+    wanted = set(tokens)
+    found = {str(one["token"]): pose(one, path) for one in records(tables, "ego_pose") if one.get("token") in wanted}
+    if missing := wanted - found.keys():
+        raise DatasetError(f"{path} lacks {len(missing)} of {len(wanted)} poses, {min(missing)} among them; {REMEDY}.")
+    return found
+
+
+def pose(record: Record, path: Path) -> Transform:
+    """4x4 of ``translation`` and ``rotation`` (w x y z)."""
+    token = str(record.get("token"))
+    turn = values.quaternion(record.get("rotation"), "wxyz", path, f"{token}.rotation")
+    return transform(turn, values.numbers(record.get("translation"), f"{token}.translation", path, (3,)))
+
+
+def records(tables: Path, table: str) -> Iterator[Record]:
+    """The records of a table, one in memory at a time.
+
+    Raises:
+        DatasetError: the file is missing, damaged, or no list of records.
+    """
+    path = tables / f"{table}.json"
+    decoder, decode = json.JSONDecoder(), codecs.getincrementaldecoder("utf-8")()
+    damaged = DatasetError(f"Table {path} is damaged or no list of records; {REMEDY}.")
+    buffer, begun, ended = "", False, False
+    try:
+        with open_file(path, LARGEST_BYTES) as file:
+            while True:
+                buffer = buffer.lstrip()
+                if not begun and buffer:
+                    if buffer[0] != "[":
+                        raise damaged
+                    begun, buffer = True, buffer[1:].lstrip()
+                buffer = buffer.removeprefix(",").lstrip()
+                if begun and buffer.startswith("]"):
+                    return
+                try:
+                    record, end = decoder.raw_decode(buffer) if begun and buffer else (None, 0)
+                except ValueError:
+                    record, end = None, 0
+                if end:
+                    if not isinstance(record, dict):
+                        raise damaged
+                    buffer = buffer[end:]
+                    yield record
+                    continue
+                data = b"" if ended else file.read(MEGABYTE)
+                if ended or len(buffer) > LARGEST_RECORD + MEGABYTE:
+                    raise damaged
+                ended = not data
+                buffer += decode.decode(data, ended)
+    except (OSError, UnicodeDecodeError, RecursionError) as error:
+        raise DatasetError(f"Table {path} cannot be read ({error}); {REMEDY}.") from None
+
+
+def text(record: Record, key: str, tables: Path, table: str) -> str:
+    """A value that is a text.
+
+    Raises:
+        DatasetError: it is none.
+    """
+    value = record.get(key)
+    if not isinstance(value, str):
+        raise DatasetError(f"Table {tables / table}.json has a record without {key}; {REMEDY}.")
+    return value
+
+
+def _taken(one: Record, tables: Path, root: Path) -> Taken:
+    name = Path(text(one, "filename", tables, "sample_data"))
+    if name.is_absolute() or ".." in name.parts:
+        raise DatasetError(f"Table {tables / 'sample_data.json'} names {name}, which is not below {root}; {REMEDY}.")
+    sides = [one.get(side) if isinstance(one.get(side), int) else 0 for side in ("width", "height")]
+    time = values.numbers([one.get("timestamp")], "timestamp", tables / "sample_data.json", (1,))[0]
+    return Taken(
+        root / name,
+        float(np.float64(time) * 1e-6),
+        text(one, "calibrated_sensor_token", tables, "sample_data"),
+        text(one, "ego_pose_token", tables, "sample_data"),
+        (int(sides[0] or 0), int(sides[1] or 0)),
+    )
