@@ -188,16 +188,16 @@ def object_(split: str, root: Path | None, camera: int, **asked: Any) -> int:
 
 
 @click.command()
-@click.argument("drive")
+@click.argument("number", metavar="DRIVE")
 @root_option
 @perspective_option
 @run_options
-def kitti360(drive: str, root: Path | None, camera: int, **asked: Any) -> int:
+def kitti360(number: str, root: Path | None, camera: int, **asked: Any) -> int:
     """Calibrate a drive of KITTI-360, for instance 0003.
 
     --root is the folder that holds `calibration`, `data_2d_raw` and `data_3d_raw`.
     """
-    return calibrate(open_kitti360(drive, root, camera), camera=camera, **asked)
+    return calibrate(open_kitti360(number, root, camera), camera=camera, **asked)
 
 
 @click.command()

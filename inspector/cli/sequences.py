@@ -75,13 +75,13 @@ def over_sequences(group: click.Group, act: Callable[..., int]) -> None:
         return act(lambda: open_tracking(sequence, root, camera), camera=camera, **asked)
 
     @group.command()
-    @click.argument("drive")
+    @click.argument("number", metavar="DRIVE")
     @root_option
     @perspective_option
     @options
-    def kitti360(drive: str, root: Path | None, camera: int, **asked: Any) -> int:
+    def kitti360(number: str, root: Path | None, camera: int, **asked: Any) -> int:
         """Of a KITTI-360 drive, for instance 0003."""
-        return act(lambda: open_kitti360(drive, root, camera), camera=camera, **asked)
+        return act(lambda: open_kitti360(number, root, camera), camera=camera, **asked)
 
     @group.command()
     @click.argument("scene", required=False, default="")
