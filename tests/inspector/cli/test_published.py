@@ -43,7 +43,7 @@ def test_nuscenes(tmp_path: Path, opened: list[tuple[Any, dict[str, Any]]], caps
     assert (sequence.name, asked["camera"], sequence.notes) == ("nuscenes/scene-0103", "CAM_FRONT", ())
     assert run(cli, ["nuscenes", "--root", str(tmp_path), "--camera", "CAM_BACK"]) == 3
     assert "no keyframe of CAM_BACK" in capsys.readouterr().err
-    assert run(cli, ["nuscenes"]) == 2
+    assert run(cli, ["nuscenes"]) == 3
     assert "give --root DIR or set NUSCENES" in capsys.readouterr().err
     assert [one.name for one in open_sequences("nuscenes", tmp_path, ["103"], None)] == ["nuscenes/scene-0103"]
 
