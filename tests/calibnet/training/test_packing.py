@@ -20,7 +20,14 @@ from calibnet.training import packing
 from calibnet.training.build import build
 from calibnet.training.data import Source
 from calibnet.training.options import TrainingOptions
-from calibnet.training.packed import KEY, STEPS_PER_METRE, packed_residuals, read_packed, unpack_scan
+from calibnet.training.packed import (
+    KEY,
+    STEPS_PER_METRE,
+    PackedSequence,
+    packed_residuals,
+    read_packed,
+    unpack_scan,
+)
 from calibnet.training.packing import FARTHEST_M, LARGEST_WIDTH, pack_picture, pack_scan, pack_training, smaller
 from tests.calibnet.training.tiny_run import options, trainer_of
 from tests.support.scene import Scenes, make_frame
@@ -216,3 +223,15 @@ def test_parts_of_two_packings_are_not_mixed(
 def test_an_empty_folder_says_how_to_fill_it(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=f"No packed training frames are in {tmp_path}.*pack-training"):
         read_packed(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "rig"),
+    [
+        ("kitti-raw/2011_09_26_drive_0005", "KITTI 2011_09_26"),
+        ("kitti-object/train", "KITTI object detection"),
+        ("folder/opencalib-a", "folder/opencalib-a"),
+    ],
+)
+def test_packed_sources_are_of_the_rig_that_their_dataset_names(name: str, rig: str) -> None:
+    assert PackedSequence(name).rig == rig
