@@ -63,7 +63,7 @@ def unpack_scan(data: bytes) -> NDArray[np.float32]:
 
 
 def rig_of(name: str) -> str:
-    """The rig of a packed source as its dataset names it, as far as its name tells: of KITTI's drives it is their day."""
+    """The rig of a packed source as its dataset names it, if its name tells: of KITTI's drives it is their day."""
     if name.startswith("kitti-object/"):
         return "KITTI object detection"
     day = re.search(r"kitti.*(\d{4}_\d\d_\d\d)", name)
