@@ -6,6 +6,7 @@ much again, are run and recorded when nobody waits.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Awaitable, Callable
@@ -60,12 +61,29 @@ class Answers:
         self._bench, self.stream, self._method, self._worker = bench, stream, method, worker
         self._tell_try = tell_try
         self._newest: tuple[int, Observation] | None = None
+        self._ready = False
         self.recorded: Callable[[], Awaitable[None]] = _nothing
 
     @property
     def stages(self) -> list[int]:
         """Those that can be run one at a time."""
         return list(self._method.numbers) if isinstance(self._method, StagedCalibrator) else []
+
+    def get_ready(self) -> None:
+        """Let the networks see the frame once, unasked: the first look at a size of picture takes twice as long."""
+        method, frame, start = self._method, self._bench.frame, self._bench.extrinsic
+        if self._ready or not isinstance(method, StagedCalibrator):
+            return
+        self._ready = True
+
+        def compute(_: Progress) -> None:
+            with contextlib.suppress(CalibrationError):  # whoever asks is told
+                method.calibrate(frame, start)
+
+        async def finish(_: object) -> None:
+            pass
+
+        self._worker.ask_later(Job("getting ready", compute, finish))
 
     def run(self, number: int | None = None) -> None:
         """Run all stages, or the one that is named, from the pose.

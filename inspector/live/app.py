@@ -66,6 +66,7 @@ class LiveApp:
         await window.accept()
         await window.send_json(self._session.hello())
         self._windows.add(window)
+        self._session.opened()
         try:
             while True:
                 message = json.loads(await window.receive_text())

@@ -99,6 +99,10 @@ class LiveSession:
             "state": self.state(),
         }
 
+    def opened(self) -> None:
+        """Somebody looks: get ready for the first question."""
+        self._answers.get_ready()
+
     def state(self) -> dict[str, Any]:
         """What changes with every message."""
         bench, camera = self.bench, self.bench.frame.camera

@@ -80,6 +80,7 @@ class Terminal:
     async def run(self, read: Read, stopped: Callable[[], bool] = lambda: False) -> None:
         """Act on keys until they end, one of them says so, or ``stopped`` does."""
         await self._hold()
+        self._session.opened()
         while not stopped():
             for key in await asyncio.to_thread(read, POLL_S):
                 if key in (END, ESCAPE):
@@ -163,7 +164,7 @@ class Terminal:
             self._say(f"{message['text']} Write it all the same? y / n")
         elif kind == "state" and message["busy"] != self._busy:
             self._busy = message["busy"]
-            if self._busy and not self._busy.startswith("recording"):
+            if self._busy and not self._busy.startswith(("recording", "getting")):
                 self._say(f"{self._busy[0].upper()}{self._busy[1:]} ...")
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from calibnet.errors import CalibnetError
 
-GRACE_S, GRACE_STEPS = 0.2, 8
+GRACE_S, GRACE_STEPS = 0.6, 12
 """Seconds that what may wait is put off after every answer: somebody who moves a slider on is answered first."""
 
 

@@ -22,6 +22,12 @@ RANGE = MiscalibrationRange(5, 0.5)
 Make = Callable[..., LiveSession]
 
 
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody moves on: what can wait does not."""
+    monkeypatch.setattr("inspector.live.worker.GRACE_S", 0.0)
+
+
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
     """A session: ``make(length=3, as_is=False, cascade=None, stream=None)``."""

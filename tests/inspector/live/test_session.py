@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,32 @@ def test_a_release_is_answered_stage_by_stage(make: Make, heard_after: HeardAfte
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.05 * errors[0]
     assert answer["verdict"]["word"] == "accepted"
     assert len(session.stream) == 1
+
+
+def test_networks_see_the_frame_once_before_anybody_asks(make: Make) -> None:
+    class Counting(FakeCascade):
+        runs = 0
+
+        def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
+            self.runs += 1
+            if self.runs == 1:
+                raise CalibrationError("Only 3 cells hold a point.")
+            return super().calibrate(frame, initial, detail)
+
+    cascade, problems = Counting(), []
+    session = make(cascade=cascade)
+
+    async def look() -> None:
+        async def hear(message: dict[str, Any]) -> None:
+            problems.extend([message] if message["is"] == "problem" else [])
+
+        session.tell = hear
+        for _ in range(2):
+            session.opened()
+            await session.idle()
+
+    asyncio.run(look())
+    assert (cascade.runs, problems, session.bench.tries) == (1, [], [])
 
 
 def test_without_run_the_pose_alone_moves(make: Make, heard_after: HeardAfter) -> None:
