@@ -93,7 +93,7 @@ def next_lines(file: Path, rig: bool = False) -> list[str]:
 
 def saved_lines(outputs: Outputs, frames: int) -> list[str]:
     """What to say about a recording that was written, and about an earlier one of its name."""
-    from inspector.record.outputs import open_command
+    from inspector.programs import open_command
 
     assert outputs.file is not None
     file, size = outputs.file, outputs.file.stat().st_size

@@ -15,8 +15,8 @@ from rerun.chunk import RrdReader
 from calibnet.runtime.reading import require_file
 from calibnet.runtime.writing import Kind, kind_of_file
 from inspector import entities
+from inspector.programs import rerun_binary
 from inspector.read.understood import RecordingError, understood
-from inspector.record.outputs import rerun_binary
 
 if TYPE_CHECKING:
     from rerun.chunk import Chunk, StoreEntry

@@ -21,7 +21,7 @@ from rerun.experimental import ViewerClient
 from calibnet.errors import ConfigError
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
-from inspector.record.outputs import LOCALHOST, free_port, rerun_binary, start_program
+from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
 PATIENCE_S: Final = 120.0
 PAUSE_S: Final = 0.3

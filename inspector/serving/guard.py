@@ -27,15 +27,16 @@ def new_token() -> str:
 class Guard:
     """ASGI middleware that checks Host, Origin and token, and takes the token off the path."""
 
-    def __init__(self, app: ASGIApp, port: int, token: str) -> None:
+    def __init__(self, app: ASGIApp, port: int, token: str, only_here: bool = True) -> None:
         """Stand before an app.
 
         Args:
             app: knows nothing of the token.
             port: that the server listens on.
             token: of `new_token`.
+            only_here: the server listens on 127.0.0.1; else it may have any name, and the token alone is asked for.
         """
-        self._app = app
+        self._app, self._only_here = app, only_here
         self._hosts = {f"{LOCALHOST}:{port}", f"localhost:{port}"}
         self._token = token
         live, pages = (" ".join(f"{scheme}://{host}" for host in sorted(self._hosts)) for scheme in ("ws", "http"))
@@ -52,7 +53,8 @@ class Guard:
         """Answer 403 to strangers and 404 without the token; a websocket of theirs is not opened."""
         headers = Headers(scope=scope)
         origin = headers.get("origin")
-        allowed = headers.get("host") in self._hosts and (origin is None or urlsplit(origin).netloc in self._hosts)
+        hosts = self._hosts if self._only_here else {headers.get("host", "")}
+        allowed = headers.get("host") in hosts and (origin is None or urlsplit(origin).netloc in hosts)
         token, _, path = str(scope["path"]).lstrip("/").partition("/")
         known = secrets.compare_digest(token.encode(), self._token.encode())
         if not (allowed and known):

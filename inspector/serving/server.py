@@ -1,4 +1,4 @@
-"""A server for the pages of one command, on this machine only, which ends with it.
+"""A server for the pages of one command, on this machine only if nobody asks for more, which ends with it.
 
 The server is uvicorn, the apps are Starlette's: both know ranges, slow clients and clients
 that hang up.
@@ -14,10 +14,12 @@ from types import TracebackType
 import uvicorn
 from starlette.types import ASGIApp
 
-from calibnet.errors import CalibnetError
+from calibnet.errors import CalibnetError, ConfigError
+from calibnet.runtime.text import one_line
 from inspector.serving.guard import LOCALHOST, Guard, new_token
 
 PATIENCE_S = 10.0
+ANY = "0.0.0.0"
 KEEP_ALIVE_S = 15
 MOST_CONNECTIONS = 64
 """Open at the same time; others are told to come again."""
@@ -30,14 +32,32 @@ class PageServer:
         address: where the app's root is, with the token that opens it.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
-        """Listen on a free port of this machine; `inspector.serving.guard.Guard` stands before the app."""
-        self._socket = socket.socket()
-        self._socket.bind((LOCALHOST, 0))
+    def __init__(self, app: ASGIApp, bind: str = LOCALHOST) -> None:
+        """Listen on a free port; `inspector.serving.guard.Guard` stands before the app.
+
+        Args:
+            app: to serve.
+            bind: address of this machine to listen on; of another than 127.0.0.1 whoever has the token may come.
+
+        Raises:
+            ConfigError: this machine has no such address.
+        """
+        self._socket = socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET)
+        try:
+            if not bind.strip():  # to the system that is every address
+                raise ValueError
+            self._socket.bind((bind, 0))
+        except (OSError, UnicodeError, ValueError):
+            self._socket.close()
+            raise ConfigError(
+                f"--bind {one_line(bind)[:100]!r} is no address of this machine; 127.0.0.1 is for this machine alone, "
+                "0.0.0.0 for all that reach it."
+            ) from None
         port, token = int(self._socket.getsockname()[1]), new_token()
-        self.address = f"http://{LOCALHOST}:{port}/{token}/"
+        shown = LOCALHOST if bind == ANY else f"[{bind}]" if ":" in bind else bind
+        self.address = f"http://{shown}:{port}/{token}/"
         config = uvicorn.Config(
-            Guard(app, port, token),
+            Guard(app, port, token, only_here=bind == LOCALHOST),
             lifespan="off",
             log_config=None,
             access_log=False,

@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.error import URLError
 
 from calibnet.errors import CalibnetError
-from inspector.record.outputs import Outputs
+from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 
@@ -23,17 +23,19 @@ def fetch_viewer(folder: Path) -> None:
     Raises:
         CalibnetError: Rerun does not start, or does not have them.
     """
-    outputs = Outputs(serve=True)
+    port, web_port = free_port(), free_port()
+    ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
+    server = start_program([rerun_binary(), "--serve-web", "--bind", LOCALHOST, *ports], web_port)
     try:
-        outputs.open()
-        address, _, _ = str(outputs.page).partition("?")
         folder.mkdir(parents=True, exist_ok=True)
         for name in VIEWER_FILES:
-            with urllib.request.urlopen(f"{address}{name}", timeout=60) as answer, (folder / name).open("wb") as file:
+            address = f"http://{LOCALHOST}:{web_port}/{name}"
+            with urllib.request.urlopen(address, timeout=60) as answer, (folder / name).open("wb") as file:
                 shutil.copyfileobj(answer, file)
     except URLError as error:
         raise ViewerFilesError(
             f"The installed Rerun does not hand out its web viewer ({error.reason}); reinstall rerun-sdk."
         ) from None
     finally:
-        outputs.close()
+        server.terminate()
+        server.wait()

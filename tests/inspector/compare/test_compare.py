@@ -18,9 +18,9 @@ from inspector.cli.main import cli
 from inspector.compare.blueprint import make_comparison_blueprint
 from inspector.compare.comparison import Comparison
 from inspector.compare.table import comparison_table
+from inspector.programs import rerun_binary
 from inspector.read.run import RecordedRun, read_run
 from inspector.read.understood import RecordingError
-from inspector.record.outputs import rerun_binary
 from tests.support.layout import views
 
 Read = Callable[..., list[tuple[Any, Any]]]

@@ -11,11 +11,11 @@ import time
 import psutil
 import pytest
 
-from inspector.record.outputs import free_port
+from inspector.programs import free_port
 
 PARENT = """
 import sys, time
-from inspector.record.outputs import start_program
+from inspector.programs import start_program
 command = [sys.executable, "-m", "http.server", sys.argv[1], "--bind", "127.0.0.1"]
 print(start_program(command, int(sys.argv[1])).pid, flush=True)
 time.sleep(600)

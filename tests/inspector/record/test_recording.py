@@ -15,9 +15,9 @@ from rerun.chunk import RrdReader
 
 from calibnet.verdict import Cause
 from inspector import entities
+from inspector.programs import rerun_binary
 from inspector.read.run import RecordedRun, read_run
 from inspector.record import recording as recording_module
-from inspector.record.outputs import rerun_binary
 from inspector.record.tabs import cascade, cost_volumes
 from tests.support.judged import REASON, UNSURE
 

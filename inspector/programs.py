@@ -1,0 +1,102 @@
+"""Programs that are started here: Rerun's own binary, its viewer and its servers, and the ports that they listen on."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from calibnet.errors import ConfigError
+
+LOCALHOST = "127.0.0.1"
+START_TIMEOUT_S = 30.0
+SETTLE_S = 1.5
+PR_SET_PDEATHSIG = 1
+"""Of Linux's prctl: the signal that a process gets when its parent ends."""
+
+
+def rerun_binary() -> str:
+    """The viewer's own binary: the `rerun` on PATH is a script that would outlive its signals."""
+    package = importlib.util.find_spec("rerun_cli")
+    binary = Path(package.origin if package and package.origin else "").with_name(
+        "rerun.exe" if os.name == "nt" else "rerun"
+    )
+    if not binary.is_file():
+        raise ConfigError("The Rerun viewer is not installed; reinstall rerun-sdk, or use --save and --headless.")
+    return str(binary)
+
+
+def open_command(file: Path) -> str:
+    """What to type to look at a recording."""
+    program = "rerun"
+    if shutil.which(program) is None:
+        beside = Path(sys.executable).with_name(program)
+        program = os.path.relpath(beside) if Path.cwd() in beside.parents else str(beside)
+    return f"{program} {file}"
+
+
+def start_program(command: list[str], port: int, outlives_us: bool = False) -> subprocess.Popen[bytes]:
+    """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port.
+
+    Args:
+        command: the program.
+        port: that it opens.
+        outlives_us: it goes on when this process ends, as a window does; else Linux ends it even if this one is killed.
+    """
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        preexec_fn=None if outlives_us else end_with_parent(),
+    )
+    deadline = time.monotonic() + START_TIMEOUT_S
+    listening_since = None
+    # A viewer that finds no screen or graphics driver opens its port first and ends a moment later.
+    while listening_since is None or time.monotonic() < listening_since + SETTLE_S:
+        if process.poll() is not None or time.monotonic() > deadline:
+            process.kill()
+            raise ConfigError("The Rerun viewer did not start; use --headless and look at the file later.")
+        if listening_since is None and listening(LOCALHOST, port):
+            listening_since = time.monotonic()
+        time.sleep(0.05)
+    return process
+
+
+def end_with_parent() -> Callable[[], None] | None:
+    """What a child does before it becomes its program, so that it ends when we do; nothing where only Linux can."""
+    if sys.platform != "linux":
+        return None
+    import ctypes
+
+    libc, parent = ctypes.CDLL(None), os.getpid()
+
+    def bind() -> None:
+        libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent:  # it ended before the call
+            os._exit(1)
+
+    return bind
+
+
+def listening(host: str, port: int) -> bool:
+    """Whether a port can be connected to."""
+    try:
+        with socket.create_connection((host, port), timeout=2.0):
+            return True
+    except OSError:
+        return False
+
+
+def free_port() -> int:
+    """A port of this machine that nothing listens on."""
+    with socket.socket() as probe:
+        probe.bind((LOCALHOST, 0))
+        return int(probe.getsockname()[1])
