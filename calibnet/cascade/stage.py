@@ -148,7 +148,7 @@ class Stage:
 
     def _look(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         clock, camera = Clock(self.device), self.camera(frame)
-        lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
+        lidar = lidar_input(frame.points, before, camera, self.network.config.scales)
         if lidar.occupied.sum() < FEWEST_CELLS:
             why = suspicion(
                 frame.remarks,

@@ -135,7 +135,7 @@ def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -
     chosen = [frames[number % len(frames)] for number in range(size)]
     cameras = [stage.camera(frame) for frame in chosen]
     scans = [
-        lidar_input(frame.points, frame.camera_from_lidar, camera, stage.network.config.volume_scales)
+        lidar_input(frame.points, frame.camera_from_lidar, camera, stage.network.config.scales)
         for frame, camera in zip(chosen, cameras, strict=True)
     ]
     images = np.stack([resize_image(frame.image, camera) for frame, camera in zip(chosen, cameras, strict=True)])

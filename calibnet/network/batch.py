@@ -48,8 +48,9 @@ class NetworkInputs(NamedTuple):
         lidar: ``[B, 2, H', W]`` float32, sparse depth in metres (0 = empty) and intensity 0..1, of the lowest ``H'``
             rows of the image, see `Cut`.
         intrinsics: ``[B, 3, 3]`` float32.
-        cells: per scale, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR point of
-            each cell in the camera frame, zeros where there is none.
+        cells: per scale of `NetworkConfig.scales`, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR
+            point of each cell in the camera frame, zeros where there is none. Also of scales without a volume: rows
+            are cut by the coarsest, which the encoder reaches.
     """
 
     image: Tensor

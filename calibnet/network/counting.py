@@ -70,5 +70,5 @@ def empty_inputs(network: CalibrationNetwork, height: int, width: int) -> Networ
         image=torch.zeros(1, 3, height, width, device=device),
         lidar=torch.zeros(1, 2, height, width, device=device),
         intrinsics=torch.eye(3, device=device)[None],
-        cells=[torch.zeros(1, 3, height // s, width // s, device=device) for s in network.config.volume_scales],
+        cells=[torch.zeros(1, 3, height // s, width // s, device=device) for s in network.config.scales],
     )

@@ -78,7 +78,7 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
     sources, held_out = open_sources(options)
     frames = open_frames(sources, recipe, stage, options)
     draws = open_draws(options, recipe, frames, stage, start.to(fabric.device) if start else None)
-    samples: TrainingSamples | DeviceSamples = TrainingSamples(frames, draws, network.config.volume_scales)
+    samples: TrainingSamples | DeviceSamples = TrainingSamples(frames, draws, network.config.scales)
     if options.on_device:
         samples = DeviceSamples(samples, FrameStore.load(sources, fabric.device))
     return Training(

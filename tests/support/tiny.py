@@ -46,7 +46,7 @@ def random_inputs(config: NetworkConfig, height: int = 64, width: int = 128, bat
     generator = torch.Generator().manual_seed(3)
     intrinsics = torch.tensor([[0.7 * width, 0.0, width / 2], [0.0, 0.7 * width, height / 2], [0.0, 0.0, 1.0]])
     cells = []
-    for scale in config.volume_scales:
+    for scale in config.scales:
         v, u = torch.meshgrid(torch.arange(height // scale), torch.arange(width // scale), indexing="ij")
         pixel = (
             torch.stack([u * scale, v * scale, torch.ones_like(u)]).float()

@@ -67,7 +67,7 @@ class CalibNet2018(MethodNetwork):
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
         """Depth maps and clouds, as the estimate and as the truth move them."""
         estimate, truth = output.correction, target.correction
-        stride = self.config.volume_scales[0]
+        stride = self.config.scales[0]
         return told(
             estimate,
             truth,

@@ -20,7 +20,7 @@ class MethodConfig:
     input_height: int = 256
     input_width: int = 512
 
-    volume_scales: ClassVar[tuple[int, ...]] = (8, 16, 32)
+    scales: ClassVar[tuple[int, ...]] = (8, 16, 32)
     """Strides of the cells whose points losses are about."""
     trains_features: ClassVar[bool] = False
     """Whether batches are made that train features alone; it is our network that needs them."""

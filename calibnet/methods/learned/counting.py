@@ -23,7 +23,7 @@ def multiply_adds(network: MethodNetwork) -> int:
             image=torch.zeros(1, 3, height, width),
             lidar=torch.zeros(1, 2, height, width),
             intrinsics=torch.zeros(1, 3, 3),
-            cells=[torch.zeros(1, 3, height // s, width // s) for s in config.volume_scales],
+            cells=[torch.zeros(1, 3, height // s, width // s) for s in config.scales],
         )
         like(inputs)
     return int(counter.get_total_flops()) // 2

@@ -49,7 +49,7 @@ class MethodStage:
     def camera(self, frame: Frame) -> PinholeCamera:
         """The camera of this stage's image of a frame: of the input's area, in the frame's aspect."""
         config = self.network.config
-        return frame.camera.fitted(config.input_height, config.input_width, config.volume_scales[-1])
+        return frame.camera.fitted(config.input_height, config.input_width, config.scales[-1])
 
     def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
         """The frame's image as this stage sees it."""
@@ -83,7 +83,7 @@ class MethodStage:
             CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
         """
         clock, camera, name = Clock(self.device), self.camera(frame), self.network.NAME
-        lidar = lidar_input(frame.points, before, camera, self.network.config.volume_scales)
+        lidar = lidar_input(frame.points, before, camera, self.network.config.scales)
         if lidar.occupied.sum() < FEWEST_CELLS:
             why = suspicion(frame.remarks, "check that the extrinsic maps LiDAR points into the camera")
             raise CalibrationError(

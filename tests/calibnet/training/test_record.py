@@ -48,7 +48,7 @@ def training(recipe: Recipe = RECIPE, residuals: int = 0, **changes: Any) -> Tra
     frames = TrainingFrames([Source(Scenes(1), 1.0)], recipe, 64 * 128, options.batch, options.seed)
     draws = Draws(RANGES[2], recipe.draws, [miscalibration([1, 0, 0], [0, 0, 0])] * residuals, 0.4)
     stage = Stage(3, RANGES[2], network, StageSettings(1.4, 2, 1.5))
-    samples = TrainingSamples(frames, draws, network.config.volume_scales)
+    samples = TrainingSamples(frames, draws, network.config.scales)
     return Training(options, recipe, Fabric(accelerator="cpu", devices=1), stage, samples, None)
 
 

@@ -32,7 +32,7 @@ def batch(*turns: float) -> tuple[NetworkInputs, Target]:
     """Scenes, each turned by so many degrees of yaw."""
     deltas = [miscalibration([0.0, 0.0, turn], [0.05 * turn, 0.0, 0.0]) for turn in turns]
     frames = [make_frame(seed, 256, 96) for seed in range(len(turns))]
-    scales = MethodConfig.volume_scales
+    scales = MethodConfig.scales
     return collate([make_sample(f, delta, scales, RECIPE.sample) for f, delta in zip(frames, deltas, strict=True)])
 
 
