@@ -24,6 +24,9 @@ RUN = "run"
 PROVENANCE = "provenance"
 """Property: versions, records of the weights, and which stages the recording contains."""
 
+OUTCOME = "verdict"
+"""Property: the run's verdict in columns, for catalogues to sort and filter by."""
+
 SKIPPED = "skipped"
 """A line of text at every frame that could not be used: why."""
 VERDICT_FRAME = "verdict/frame"

@@ -38,6 +38,10 @@ FEWEST_CELLS = 20
 """Cells with a LiDAR point below which a pose of six parameters would be a guess."""
 
 
+_kept: dict[tuple[object, ...], Stage] | None = None
+"""Stages that are loaded already, after `keep_weights`; None where every cascade loads its own."""
+
+
 class View(NamedTuple):
     """A frame's image at the size a stage wants, ``[1, 3, H, W]``, and what its image branch makes of it.
 
@@ -233,6 +237,28 @@ def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
     path = folder / manifest.file(range_)
     if not os.path.lexists(path):
         return None
+    if _kept is None:
+        return _loaded(number, manifest, path)
+    key = (
+        number,
+        path.absolute(),
+        path.stat().st_mtime_ns,
+        repr(manifest.settings(range_)),
+        manifest.match_error_limit_px,
+    )
+    if key not in _kept:
+        _kept[key] = _loaded(number, manifest, path)
+    return _kept[key]
+
+
+def keep_weights() -> None:
+    """From now on load each stage once in this process; for workers that calibrate one drive after the other."""
+    global _kept
+    _kept = {} if _kept is None else _kept
+
+
+def _loaded(number: int, manifest: Manifest, path: Path) -> Stage:
+    range_ = RANGES[number - 1]
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = load_network(path).to(device)
     if network.range != range_:

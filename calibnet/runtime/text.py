@@ -6,8 +6,13 @@ terminal, in a comment of a file or in an attribute of XML such text would be re
 
 from __future__ import annotations
 
+import hashlib
+from urllib.parse import quote
+
 LONGEST = 2000
 """Characters of a text that are shown; the rest says nothing more to a reader."""
+LONGEST_NAME = 100
+"""Characters of a file's name that is made from foreign text."""
 
 
 def one_line(text: object, longest: int = LONGEST) -> str:
@@ -28,6 +33,19 @@ def one_line(text: object, longest: int = LONGEST) -> str:
 def lines(text: object) -> str:
     """The same of a text whose lines are our own: what stands between newlines is quoted."""
     return "\n".join(one_line(line, 10 * LONGEST) for line in str(text).split("\n"))
+
+
+def file_name(text: str) -> str:
+    """Foreign text as the name of one file or folder: no separator, nothing hidden, no parent, at most 100 characters.
+
+    Different texts have different names.
+    """
+    quoted = quote(text, safe=" ()+,=@", errors="surrogatepass")
+    quoted = f"%2E{quoted[1:]}" if quoted.startswith(".") else quoted
+    if 0 < len(quoted) <= LONGEST_NAME:
+        return quoted
+    mark = hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()[:16]
+    return f"{quoted[: LONGEST_NAME - 17]}~{mark}"
 
 
 def _escaped(character: str) -> str:

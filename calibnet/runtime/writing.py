@@ -42,6 +42,7 @@ class Kind(StrEnum):
     GIF = "a GIF picture"
     WEBP = "a WebP picture"
     WEIGHTS = "a safetensors file"
+    PARQUET = "a Parquet table"
     EMPTY = "empty"
     OTHER = "something else"
 
@@ -189,6 +190,7 @@ _STARTS = {
     b"\x89PNG": Kind.PNG,
     b"\xff\xd8\xff": Kind.JPEG,
     b"GIF8": Kind.GIF,
+    b"PAR1": Kind.PARQUET,
 }
 
 

@@ -10,8 +10,10 @@ import numpy as np
 from calibnet.datasets import Sequence, dataset_names
 from calibnet.datasets.discovery import find_sequences
 from calibnet.errors import ConfigError, DatasetError
+from calibnet.training.listed import LIST, open_list
 from calibnet.training.options import TrainingOptions
 from calibnet.training.synthetic_pool import SyntheticPool
+from calibnet.verdict import ACCEPTED
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ def open_data(spec: str) -> list[Sequence]:
     """All sequences, of all cameras, that ``DATASET:ROOT[:SEQUENCE]`` stands for.
 
     ``kitti-raw:DIR`` is every drive under DIR, ``kitti-raw:DIR:2011_09_26/0048`` one of them,
-    ``kitti-object:DIR:train`` a split, ``folder:DIR`` a plain folder or a folder of them.
+    ``kitti-object:DIR:train`` a split, ``folder:DIR`` a plain folder or a folder of them; ``list:fleet.parquet`` the
+    accepted drives of a fleet, ``list:fleet.parquet:cannot tell`` others.
 
     Raises:
         ConfigError: the text is not of this form.
@@ -73,6 +76,13 @@ def open_data(spec: str) -> list[Sequence]:
     """
     dataset, _, rest = spec.partition(":")
     root_text, _, name = rest.partition(":")
+    if dataset == LIST and root_text:
+        listed = list(open_list(Path(root_text), name))
+        if not listed:
+            raise DatasetError(
+                f"{root_text} lists no drive that is {name or ACCEPTED}; nothing of it can be trained on."
+            )
+        return listed
     if dataset not in dataset_names() or not root_text:
         raise ConfigError(
             f"Data {spec!r} is not of the form DATASET:FOLDER[:SEQUENCE] with DATASET one of "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 from collections.abc import Iterable
 from functools import lru_cache
@@ -37,6 +38,19 @@ def fingerprints(preset: str, folder: Path, ranges: Iterable[MiscalibrationRange
     if missing := ", ".join(range_.label for range_, mark in found.items() if not mark):
         raise WeightsError(f"There are no weights of {missing} in {folder}; train them with `calib-inspect train`.")
     return found
+
+
+def digest_of_set(preset: str, folder: Path) -> str:
+    """What every answer of a set of weights depends on: its manifest, what is fitted to it, and all its files.
+
+    Raises:
+        WeightsError: there is no file of that preset.
+    """
+    files = sorted(path for path in folder.glob(f"{glob.escape(preset)}*") if path.suffix in (".toml", ".safetensors"))
+    if not files:
+        raise WeightsError(f"There are no weights of {preset} in {folder}; train them with `calib-inspect train`.")
+    marks = [f"{path.name} {_digest(path, path.stat().st_mtime_ns)}" for path in files]
+    return hashlib.sha256("\n".join(marks).encode()).hexdigest()[:LENGTH]
 
 
 @lru_cache(maxsize=32)

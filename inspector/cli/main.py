@@ -50,6 +50,14 @@ COMMANDS = {
     "export": LazyCommand("inspector.cli.export:export", "The extrinsic for KITTI, ROS 2 or OpenCV, or as JSON."),
     "check": LazyCommand("inspector.cli.check:check", "Fail when a recording is rejected or exceeds limits; for CI."),
     "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
+    "fleet": LazyCommand("inspector.cli.fleet:fleet", "Many drives, on this machine or on a cluster, in one table."),
+    "fleet-report": LazyCommand("inspector.cli.fleet_views:report", "A page of a fleet, worst first."),
+    "fleet-view": LazyCommand(
+        "inspector.cli.fleet_views:view", "All recordings of a fleet in one catalogue of Rerun's."
+    ),
+    "fleet-simulate": LazyCommand(
+        "inspector.cli.fleet_views:simulate", "A fleet of synthetic drives, to try and measure."
+    ),
     "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
     "pack-training": LazyCommand(
         "inspector.cli.pack_training:pack_training", "Pack training frames, to train elsewhere."

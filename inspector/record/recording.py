@@ -22,6 +22,7 @@ from calibnet.verdict import BadFrame, Verdict
 from inspector import entities
 from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation
+from inspector.record.outcome import outcome_values
 from inspector.record.stream import Stream
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
@@ -97,6 +98,10 @@ class Recording:
         """Log whether the calibration that the run started from is good."""
         self._rec.log_once(entities.VERDICT_GIVEN, verdict_values(verdict))
         self._stream.flush()
+
+    def log_outcome(self, verdict: Verdict, reference: Extrinsic | None = None) -> None:
+        """Make the run's verdict a property, and how far off the reference what was found is, where that is known."""
+        self._stream.rec.send_property(entities.OUTCOME, outcome_values(verdict, reference))
 
     def log_drive(
         self,

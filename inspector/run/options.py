@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -59,6 +60,7 @@ class RunOptions:
         detail: how much of each frame is recorded; None for everything, or for what ``parts`` names.
         parts: with `Detail.CUSTOM`, what is recorded.
         color: of the points over the image.
+        labels: what else tells the run from others, for instance its car and drive in a fleet.
 
     Raises:
         OptionsError: two of them contradict each other.
@@ -86,6 +88,7 @@ class RunOptions:
     detail: Detail | None = None
     parts: frozenset[Part] | None = None
     color: Coloring = Coloring.DEPTH
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for wrong, sentence in (
@@ -216,6 +219,7 @@ class RunOptions:
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),
             "sequence_estimate": self.solves_drive,
+            **self.labels,
         }
 
 

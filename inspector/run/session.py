@@ -130,6 +130,8 @@ class Session:
                             self._no_drive(recording, summary, "The frames are of several mounts")
                     if summary.given_verdict is not None:
                         recording.log_given(summary.given_verdict)
+                    if summary.outcome is not None:
+                        recording.log_outcome(summary.outcome, reference)
         except KeyboardInterrupt:
             summary.interrupted = True
         except CalibnetError as error:

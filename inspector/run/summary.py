@@ -137,13 +137,16 @@ class Summary:
         return [f"camera_from_lidar (metres), {'the whole drive as one' if self.drive else 'of this frame'}:", *rows]
 
     @property
+    def outcome(self) -> Verdict | None:
+        """Its verdict on what was given, on the drive or on its only frame; None where several frames have each one."""
+        single = next(iter(self.verdicts.values())) if len(self.verdicts) == 1 else None
+        return self.given_verdict or self.drive_verdict or single
+
+    @property
     def verdict(self) -> str:
         """The last line of a run: its verdict on what was given, on the drive or on the frames; empty without any."""
-        of_run = self.given_verdict or self.drive_verdict
-        if of_run is not None:
-            return line(of_run)
-        if len(self.verdicts) == 1:
-            return line(*self.verdicts.values())
+        if self.outcome is not None:
+            return line(self.outcome)
         return counted(self.verdicts) if self.verdicts else ""
 
 

@@ -1,0 +1,96 @@
+"""Training frames of a fleet: a table of drives, of which those with a good calibration are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from calibnet.datasets.frame import Sequence
+from calibnet.datasets.registry import open_sequence
+from calibnet.datasets.selection import PickedFrames, select_frames
+from calibnet.errors import DatasetError
+from calibnet.runtime.reading import require_file
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import one_line
+from calibnet.verdict import ACCEPTED
+
+LIST = "list"
+"""What ``--data list:FILE`` begins with."""
+LARGEST = 1 << 30
+COLUMNS = ("car", "drive", "dataset", "path", "sequence", "camera", "selection", "options", "verdict")
+REMEDY = "give the fleet.parquet of `calib-inspect fleet`, or rows of it"
+
+
+@dataclass(frozen=True)
+class ListedDrive:
+    """A row of the table, as far as it says where the frames are."""
+
+    car: str
+    drive: str
+    dataset: str
+    path: str
+    sequence: str
+    camera: str
+    selection: str
+    options: str
+    verdict: str
+
+
+def open_list(file: Path, verdicts: str = "") -> Iterator[Sequence]:
+    """The drives of a list whose calibration has a verdict, accepted if nothing else is asked for.
+
+    Args:
+        file: a Parquet table with `COLUMNS`, more do not matter.
+        verdicts: words with commas between them.
+
+    Raises:
+        DatasetError: it cannot be read, is no such table, or a drive cannot be opened.
+    """
+    wanted = {word.strip() for word in verdicts.split(",")} if verdicts else {ACCEPTED}
+    for drive in read_list(file):
+        if drive.verdict in wanted:
+            yield _opened(drive, file)
+
+
+def read_list(file: Path) -> tuple[ListedDrive, ...]:
+    """The rows of a list.
+
+    Raises:
+        DatasetError: it cannot be read, or is no such table.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    require_file(file, "List", LARGEST, DatasetError, REMEDY)
+    try:
+        there = [name for name in COLUMNS if name in pq.read_schema(file).names]
+        rows = pq.read_table(file, columns=there).to_pylist()
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise DatasetError(f"{file} is no Parquet table ({one_line(str(error), 200)}); {REMEDY}.") from None
+    return validated(tuple[ListedDrive, ...], rows, f"List {file}", DatasetError, REMEDY)
+
+
+def _opened(drive: ListedDrive, file: Path) -> Sequence:
+    name = one_line(f"{drive.car}/{drive.drive}")
+    if "--guess" in drive.options or drive.dataset == "bag" or "://" in drive.path:
+        raise DatasetError(
+            f"{file}: {name} is a bag, lies elsewhere or has a calibration of its own (--guess), which training does "
+            "not read; leave it out of the list."
+        )
+    sequence = open_sequence(drive.dataset, drive.path, **_options(drive))
+    return PickedFrames(sequence, select_frames(sequence, drive.selection)) if drive.selection else sequence
+
+
+def _options(drive: ListedDrive) -> Mapping[str, Any]:
+    """Which sequence and camera of the dataset it is."""
+    words, kitti = drive.sequence.split(), drive.dataset.startswith("kitti-")
+    camera: Mapping[str, Any] = {}
+    if drive.camera or kitti:
+        camera = {"camera": int(drive.camera or 2) if kitti else drive.camera}
+    if drive.dataset == "kitti-raw":
+        return {"date": words[0], "drive": words[1], **camera}
+    if drive.dataset == "kitti-object":
+        return {"split": drive.sequence or "training", **camera}
+    return {"sequence": drive.sequence, **camera} if kitti else camera

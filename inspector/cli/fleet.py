@@ -1,0 +1,200 @@
+"""``calib-inspect fleet``, ``fleet-report``, ``fleet-view`` and ``fleet-simulate``: many drives."""
+
+from __future__ import annotations
+
+import secrets
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from calibnet.runtime.writing import OutputError
+from inspector.cli.errors import ExitCode
+from inspector.cli.options import DETAIL, FRAMES
+from inspector.cli.output import overwrite_option, say
+
+if TYPE_CHECKING:
+    from inspector.cli.fleet_drive import Task
+    from inspector.fleet.engine import Engine, Outcome
+    from inspector.fleet.table import Row
+    from inspector.record.contents import Detail
+
+LOOKING = 8
+"""Threads that look which drives are done: they mostly wait for file systems."""
+EVERY_S = 30.0
+"""Seconds between two writings of the table while drives are done."""
+STOPPING = "Stopping when the drives under way are done; once more gives them up."
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, metavar="DRIVES.csv | FOLDER...")
+@click.option("--out", required=True, metavar="DIR|URL", help="Folder of all results; the same one to go on.")
+@click.option(
+    "--workers",
+    type=click.IntRange(0, 1024),
+    metavar="N",
+    help="Processes on this machine; 0 does the drives in this one, without Dask.  [default: half of the cores]",
+)
+@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Do it on a Dask cluster that runs already.")
+@click.option(
+    "--memory",
+    default="auto",
+    show_default=True,
+    metavar="SIZE",
+    help="Of a worker, for instance 4GB; auto: its share.",
+)
+@click.option(
+    "--detail", type=DETAIL, default="overview", show_default=True, help="How much of each frame is recorded."
+)
+@click.option("--frames", type=FRAMES, help="Of every drive, where its row says nothing else; as `verify` has it.")
+@click.option(
+    "--options",
+    default="",
+    metavar="TEXT",
+    help="Further options of `verify` for every drive, for instance '--seed 1'.",
+)
+@click.option("--force", is_flag=True, help="Do again what is done.")
+@overwrite_option
+def fleet(
+    sources: tuple[str, ...],
+    out: str,
+    workers: int | None,
+    scheduler: str | None,
+    memory: str,
+    detail: Detail,
+    frames: str | None,
+    options: str,
+    force: bool,
+) -> int:
+    """Calibrate many drives, each as one, and verify the calibration that it had.
+
+    DRIVES.csv has a row a drive: path, and optionally car, drive, date, dataset, sequence, camera, frames and options.
+    A FOLDER is a drive of its own, with images/, clouds/ and calibration.yaml.
+
+    Each drive gets a folder with its report, recording and verdict, and a row in fleet.parquet. The same call again
+    does only what is missing or has changed. Ends with 0 when every drive has its row, whatever it says.
+    """
+    from calibnet.runtime.claim import Claim
+    from calibnet.runtime.writing import Kind
+    from inspector.cli.fleet_drive import Task, prepare_worker
+    from inspector.fleet.drives import find_drives
+    from inspector.fleet.engine import Engine
+    from inspector.fleet.extra import require_extra
+    from inspector.fleet.places import Store, is_url
+    from inspector.fleet.table import TABLE
+
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("Give --workers or --scheduler, not both.")
+    if any(map(is_url, (out, *sources))):
+        require_extra("fsspec")
+    common = f"--frames {shlex.quote(frames)} {options}" if frames else options
+    drives = find_drives(sources, common)
+    store = Store(out if is_url(out) else str(Path(out).absolute()))
+    run = secrets.token_hex(8)
+    tasks = [Task(drive, store, str(detail), force, run) for drive in drives]
+    store.check()
+    engine = Engine(default_workers() if workers is None else workers, scheduler, memory, prepare_worker)
+    claim = None if store.local is None else Claim(store.local / TABLE, Kind.PARQUET)
+    try:
+        return run_fleet(tasks, engine)
+    finally:
+        if claim is not None:
+            claim.release()
+
+
+def default_workers() -> int:
+    """A process for every two cores: a drive's network uses two well, and more do not help much."""
+    import os
+
+    return max(1, len(os.sched_getaffinity(0)) // 2) if hasattr(os, "sched_getaffinity") else 1
+
+
+def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
+    """Do the drives that are not done, and keep the table of all; returns the exit code."""
+    from calibnet.runtime.interruption import StopRequest
+    from inspector.cli.fleet_console import fleet_progress
+    from inspector.cli.fleet_drive import do_drive
+    from inspector.fleet.engine import EngineError, run_all
+    from inspector.fleet.ledger import counted
+    from inspector.fleet.table import TABLE
+
+    with ThreadPoolExecutor(LOOKING) as pool:  # whatever is wrong with an option is known here, before the work
+        looked = list(pool.map(needs_work_or_checked, tasks))
+    rows = {task.drive.folder: row for task, row in zip(tasks, looked, strict=True) if row is not None}
+    pieces = [task for task, row in zip(tasks, looked, strict=True) if row is None]
+    if rows:
+        say(f"{len(rows)} of {len(tasks)} drives are done already, on the same input, weights and options.", err=True)
+    interrupted, gone, started, written = False, "", time.monotonic(), time.monotonic()
+    store = tasks[0].store
+    try:
+        with StopRequest(STOPPING) as stop, fleet_progress(len(pieces)) as progress:
+            for outcome in run_all(engine, do_drive, pieces, stop, lambda text: say(text, err=True)) if pieces else ():
+                rows[outcome.work.drive.folder] = row = settled(outcome)
+                progress.advance(row)
+                if time.monotonic() - written > EVERY_S:
+                    keep_table(tasks, rows)
+                    written = time.monotonic()
+            interrupted = stop.requested and len(rows) < len(tasks)
+    except KeyboardInterrupt:
+        interrupted = True
+    except EngineError as error:
+        gone = str(error)
+    in_order = keep_table(tasks, rows)
+    seconds = time.monotonic() - started
+    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}; {len(pieces)} looked at in {seconds:.0f} s.")
+    say(f"Table: {store.root}/{TABLE}")
+    if interrupted or gone:
+        again = shlex.join(["calib-inspect", *sys.argv[1:]]) if "--force" not in sys.argv else "it without --force"
+        say(f"{gone or 'Interrupted.'} The others are left; to go on, call the same again: {again}", err=True)
+        return ExitCode.INTERRUPTED if interrupted else ExitCode.BAD_INPUT
+    say(f"A page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
+    return ExitCode.OK
+
+
+def needs_work_or_checked(task: Task) -> Row | None:
+    """The row of a drive that is done; None where it is not, and its options can be read."""
+    from inspector.cli.fleet_drive import check_options, needs_work
+
+    row = needs_work(task)
+    if row is None:
+        check_options(task)
+    return row
+
+
+def settled(outcome: Outcome[Task, Row]) -> Row:
+    """The row of a drive that a worker has done, or has failed to do."""
+    from inspector.cli.fleet_drive import DriveFailed, note_failure
+    from inspector.fleet.ledger import failed_row
+
+    if outcome.done is not None:
+        return outcome.done
+    task, error = outcome.work, outcome.error
+    if isinstance(error, DriveFailed):
+        return note_failure(task, error)
+    if type(error).__name__ == "KilledWorker":
+        sentence = (
+            "Its worker ended while doing it, twice; if that was for want of memory, give --memory or fewer --workers."
+        )
+        return failed_row(task.drive, sentence)
+    return failed_row(task.drive, f"The engine failed on it ({type(error).__name__}: {error}).")
+
+
+def keep_table(tasks: Sequence[Task], rows: dict[str, Row]) -> list[Row]:
+    """Write the rows that there are, in the order of the list, and hand them back."""
+    from inspector.fleet.table import TABLE, table_bytes, write_table
+
+    in_order = [rows[task.drive.folder] for task in tasks if task.drive.folder in rows]
+    store = tasks[0].store
+    try:
+        if store.local is not None:
+            write_table(in_order, store.local / TABLE)
+        else:
+            store.write(TABLE, table_bytes(in_order))
+    except OSError as error:
+        raise OutputError(f"{store.root}/{TABLE} cannot be written ({error.strerror}); free some space.") from None
+    return in_order

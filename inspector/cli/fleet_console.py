@@ -1,0 +1,43 @@
+"""How far a fleet is, on the terminal."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from inspector.cli.output import make_console
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from inspector.fleet.table import Row
+
+
+class FleetProgress:
+    """A bar that counts drives and their verdicts; a line for each that failed."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress, self._task = progress, task
+        self._counts: Counter[str] = Counter()
+
+    def advance(self, row: Row) -> None:
+        """Take in a drive that is done."""
+        self._counts[row.verdict] += 1
+        said = ", ".join(f"{count} {word}" for word, count in sorted(self._counts.items()))
+        self._progress.update(self._task, advance=1, said=said)
+        if row.verdict == "failed":
+            text = f"Failed: {row.name}: {row.reason}"
+            self._progress.console.print(text, style="yellow", markup=False, soft_wrap=True)
+
+
+@contextmanager
+def fleet_progress(total: int) -> Iterator[FleetProgress]:
+    """Show the bar while drives are done; nothing for none."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("drives"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"))
+    progress = Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=make_console(), disable=not total)
+    with progress:
+        yield FleetProgress(progress, progress.add_task("drives", total=total, said=""))

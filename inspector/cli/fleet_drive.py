@@ -1,0 +1,268 @@
+"""One drive of a fleet: `calib-inspect verify` on it in this process, its results in a folder of its own, its row."""
+
+from __future__ import annotations
+
+import json
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from calibnet.errors import CalibnetError, CalibrationError, ConfigError, DatasetError
+from calibnet.runtime.reading import protecting_inputs, read_file
+from calibnet.runtime.text import one_line
+from calibnet.runtime.writing import keeping_others
+from inspector.cli.errors import environment_sentence
+from inspector.cli.sequences import over_sequences
+from inspector.fleet.drives import Drive
+from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
+from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
+from inspector.fleet.table import FAILED, PAGE, RECORDING, VERDICT, Row, of_verdict, row_of
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+
+DECIDED = ("save", "headless", "serve", "bind", "connect", "report", "json_file", "overwrite", "per_frame")
+"""Options of `verify` that the fleet decides itself."""
+LOG = "log.txt"
+LONGEST_JSON = 64 << 20
+
+_one_at_a_time = Lock()
+"""What a run prints and reads is known for the whole process."""
+
+
+class DriveFailed(Exception):  # noqa: N818, it is what happened to the drive
+    """A drive could not be done.
+
+    Attributes:
+        sentence: why.
+        lasting: the input is to blame, so that another try on the same input fails alike.
+    """
+
+    def __init__(self, sentence: str, lasting: bool = False) -> None:
+        super().__init__(sentence, lasting)
+        self.sentence, self.lasting = sentence, lasting
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is sent.
+
+    Attributes:
+        drive: to do.
+        store: the fleet's folder.
+        detail: how much of each frame is recorded.
+        force: do it even where it is done.
+        run: of the command, to tell what it did itself: with a worker goes the result that it had, but not its entry.
+    """
+
+    drive: Drive
+    store: Store
+    detail: str = "overview"
+    force: bool = False
+    run: str = ""
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Of `calib-inspect verify`, without where results go; options of the drive come last and count more."""
+        command, *rest = self.drive.arguments()
+        return (command, "--detail", self.detail, *rest)
+
+
+def check_options(task: Task) -> dict[str, Any]:
+    """Read the options of a drive as its worker will, and hand them back.
+
+    Raises:
+        ConfigError: there is something wrong with them; the sentence says whose they are.
+    """
+    arguments = list(task.arguments)
+    group = _commands(lambda opening, **asked: 0)
+    command = group.commands[arguments[0]]
+    try:
+        context = command.make_context(arguments[0], arguments[1:])
+    except click.ClickException as error:
+        raise ConfigError(f"{task.drive.origin}: {one_line(error.format_message())}") from None
+    except (click.exceptions.Exit, click.Abort):
+        raise ConfigError(
+            f"{task.drive.origin}: its options ask for help; calib-inspect verify --help gives it."
+        ) from None
+    for name in DECIDED:
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            option = next(one.opts[0] for one in command.params if one.name == name)
+            raise ConfigError(f"{task.drive.origin}: {option} is not for a single drive; leave it out.")
+    return dict(context.params)
+
+
+def key_of(task: Task) -> Key:
+    """What its result will depend on, as far as a look from outside tells.
+
+    Raises:
+        ConfigError: something is wrong with its options.
+        DatasetError: its files cannot be listed.
+    """
+    asked = check_options(task)
+    weights = weights_digest(asked["preset"], asked["weights"])
+    return Key(task.arguments, weights, seen(items_of(task.drive)))
+
+
+def weights_digest(preset: str, folder: Path | None) -> str:
+    """What tells one set of weights, and the program that uses it, from another.
+
+    Raises:
+        WeightsError: there is none.
+    """
+    from calibnet import __version__
+    from calibnet.weights.fingerprint import digest_of_set
+    from calibnet.weights.manifest import PACKAGE
+
+    return f"{__version__} {digest_of_set(preset, folder or PACKAGE)}"
+
+
+def prepare_worker(threads: int = 0) -> None:
+    """Let this process load weights once and, with a number, compute with so many threads."""
+    from calibnet.cascade.stage import keep_weights
+    from calibnet.runtime.threads import limit_threads
+
+    keep_weights()
+    if threads:
+        limit_threads(threads)
+
+
+def do_drive(task: Task) -> Row:
+    """Calibrate a drive as one, verify what it had, keep recording, report and JSON, and note that it is done.
+
+    Raises:
+        DriveFailed: it cannot be done.
+    """
+    with _one_at_a_time:
+        started = time.monotonic()
+        try:
+            key = key_of(task)
+            with on_this_machine(task.drive) as path:
+                key = replace(key, content=content(path, task.drive))
+                entry = read_entry(task.store, task.drive)
+                wanted = entry is not None and (not task.force or entry.run == task.run)
+                if entry is not None and wanted and entry.key.is_same(key):  # it only looked different
+                    write_entry(task.store, task.drive, replace(entry, key=key))
+                    return entry.row
+                row = _verified(task, path, started)
+        except (CalibnetError, OSError) as error:
+            raise _failed(error) from None
+        write_entry(task.store, task.drive, Entry(key, row, task.run))
+        return row
+
+
+def _verified(task: Task, path: Path, started: float) -> Row:
+    """Run `verify` on a drive, with all output in its folder, and make its row."""
+    drive = task.drive
+    with task.store.workplace(drive.folder) as folder:
+        _clear(folder)
+        command, *arguments = drive.arguments(str(path))
+        results = ["--json", str(folder / VERDICT), "--report", str(folder)]
+        words = [command, "--detail", task.detail, *results, *arguments]
+        try:
+            with _logged(folder / LOG):
+                _commands(partial(_verify, labels=drive.labels)).main(words, "verify", standalone_mode=False)
+        except click.Abort:
+            raise KeyboardInterrupt from None  # click makes the one of the other
+        except Exception as error:
+            failed = _failed(error)
+            _record_sentence(drive, folder, FAILED, "", failed.sentence)
+            raise failed from None
+        said = json.loads(read_file(folder / VERDICT, "Verdict", LONGEST_JSON))
+        columns = of_verdict(said)
+        if not (folder / RECORDING).exists():
+            _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])
+        files = {"json": VERDICT, "report": PAGE, "recording": RECORDING}
+        there = {name: f"{drive.folder}/{file}" for name, file in files.items() if (folder / file).exists()}
+    return row_of(drive, **columns, **there, seconds=time.monotonic() - started)
+
+
+def _commands(act: Callable[..., int]) -> click.Group:
+    """The subcommands of `verify`, with another action."""
+    group = click.Group("verify")
+    over_sequences(group, act)
+    return group
+
+
+def _verify(opening: Callable[[], Sequence], **asked: Any) -> int:
+    from inspector.cli.verify import verify_sequence
+
+    return verify_sequence(opening, **asked)
+
+
+@contextmanager
+def _logged(file: Path) -> Iterator[None]:
+    """A context whose output goes to a file, and whose inputs and outputs are kept apart as in a command."""
+    log = file.open("w", encoding="utf-8", errors="backslashreplace")
+    with log, redirect_stdout(log), redirect_stderr(log), protecting_inputs(), keeping_others():
+        try:
+            yield
+        except Exception:
+            traceback.print_exc(file=log)
+            raise
+
+
+def _clear(folder: Path) -> None:
+    """Remove what an earlier run left: a drive that fails must not show another's report."""
+    pictures = folder / "pictures"
+    for path in (
+        *(folder / name for name in (ENTRY, VERDICT, PAGE, RECORDING, "metrics.json")),
+        *pictures.glob("*.jpg"),
+    ):
+        path.unlink(missing_ok=True)
+
+
+def _record_sentence(drive: Drive, folder: Path, word: str, cause: str, sentence: str) -> None:
+    from inspector.record.recording import RunDescription
+    from inspector.record.sentence import record_sentence
+
+    options = {"sequence": drive.name, "rig": "", **drive.labels}
+    record_sentence(folder / RECORDING, RunDescription(drive.name, options), word, cause, sentence)
+
+
+def _failed(error: BaseException) -> DriveFailed:
+    """What a user has to know of an error."""
+    if isinstance(error, DriveFailed):
+        return error
+    if isinstance(error, CalibnetError):
+        return DriveFailed(one_line(error), isinstance(error, DatasetError | CalibrationError))
+    if isinstance(error, click.ClickException):
+        return DriveFailed(one_line(error.format_message()))
+    if isinstance(error, MemoryError):
+        return DriveFailed("There is not enough memory for it.")
+    sentence = environment_sentence(error) if isinstance(error, OSError | ImportError) else None
+    fault = f"A fault of calib-inspect ended it ({one_line(f'{type(error).__name__}: {error}', 300)}); see {LOG}."
+    return DriveFailed(sentence or fault)
+
+
+def needs_work(task: Task) -> Row | None:
+    """The row of a drive that is done on what it is now; None where it has to be looked at by a worker."""
+    if task.force:
+        return None
+    entry = read_entry(task.store, task.drive)
+    if entry is None:
+        return None
+    try:
+        return entry.row if entry.key.is_same(key_of(task)) else None
+    except DatasetError:
+        return None
+
+
+def note_failure(task: Task, error: DriveFailed) -> Row:
+    """The row of a drive that failed; where its input is to blame that is noted, and not tried again on the same."""
+    drive = task.drive
+    recording = f"{drive.folder}/{RECORDING}"
+    row = row_of(drive, verdict=FAILED, reason=error.sentence, recording=recording if task.store.has(recording) else "")
+    if error.lasting:
+        with suppress(CalibnetError, OSError):
+            write_entry(task.store, drive, Entry(key_of(task), row))
+    return row

@@ -1,0 +1,228 @@
+"""The drives of a fleet: rows of DRIVES.csv, or folders, and the command line that calibrates each by hand."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import shlex
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path, PurePosixPath
+from typing import Annotated, ClassVar
+
+from annotated_types import Len
+
+from calibnet.datasets import dataset_names
+from calibnet.errors import ConfigError
+from calibnet.runtime.reading import TEXT_BYTES, read_text
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import file_name, one_line
+
+BAG = "bag"
+PATH_OPTIONS = ("--guess", "--weights")
+"""Options of a drive that name files: relative to its list, like its path."""
+COMMANDS = {"kitti-odometry": "seq", "kitti-raw": "raw", "kitti-object": "object", "kitti-tracking": "tracking"}
+"""Datasets that have a command of their own; ``folder`` reads all others."""
+MOST_DRIVES = 1_000_000
+REMEDY = "docs/fleet.md says what a list of drives holds"
+
+Name = Annotated[str, Len(1, 200)]
+Text = Annotated[str, Len(0, 4000)]
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """A row of the list as it stands in the file; everything but the path has a default."""
+
+    __pydantic_config__: ClassVar = {"extra": "forbid"}
+
+    path: Annotated[str, Len(1, 4000)]
+    car: Text = ""
+    drive: Text = ""
+    date: Text = ""
+    dataset: Text = ""
+    sequence: Text = ""
+    camera: Text = ""
+    frames: Text = ""
+    options: Text = ""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive of one camera: what is calibrated as one.
+
+    Attributes:
+        car: whose sensors these are.
+        drive: its name; with the car and the camera it is unique in a fleet.
+        date: when it was driven, ISO 8601, or empty; drives of a car are in this order.
+        dataset: a name of `calibnet.datasets.dataset_names`, or ``"bag"``.
+        path: folder or file, absolute, or a URL that fsspec knows.
+        sequence: of a dataset that has several below its folder: ``"04"``, ``"2011_09_26 0005"``, a split.
+        camera: which one, where there are several; empty for the default.
+        frames: which of them, as ``--frames`` has it; empty for the default.
+        options: further options of ``calib-inspect verify``, in words.
+        origin: where it is named, for messages.
+    """
+
+    car: str
+    drive: str
+    dataset: str
+    path: str
+    date: str = ""
+    sequence: str = ""
+    camera: str = ""
+    frames: str = ""
+    options: tuple[str, ...] = ()
+    origin: str = ""
+
+    @property
+    def name(self) -> str:
+        """For messages and titles."""
+        return f"{self.car}/{self.drive}" + (f", camera {self.camera}" if self.camera else "")
+
+    @property
+    def folder(self) -> str:
+        """Of its results, below the fleet's; foreign names are quoted."""
+        last = f"{self.drive}@{self.camera}" if self.camera else self.drive
+        return f"drives/{file_name(self.car)}/{file_name(last)}"
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What tells its recording from others."""
+        return {"car": self.car, "drive": self.drive, **({"date": self.date} if self.date else {})}
+
+    def arguments(self, path: str | None = None) -> list[str]:
+        """What follows ``calib-inspect verify`` to do by hand what the fleet does with it.
+
+        Args:
+            path: where its data lies, if that is not its own path.
+        """
+        path = self.path if path is None else path
+        command = BAG if self.dataset == BAG else COMMANDS.get(self.dataset, "folder")
+        if command in (BAG, "folder"):
+            arguments = [command, path]
+            arguments += [] if self.dataset in (BAG, "folder") else ["--dataset", self.dataset]
+        elif command == "object":
+            arguments = [command, "--split", self.sequence or "training", "--root", path]
+        else:
+            arguments = [command, *self.sequence.split(), "--root", path]
+        arguments += ["--camera", self.camera] if self.camera else []
+        arguments += ["--frames", self.frames] if self.frames else []
+        return [*arguments, *self.options]
+
+
+def find_drives(sources: Sequence[str], options: str = "") -> list[Drive]:
+    """The drives that a command's arguments name.
+
+    Args:
+        sources: one ``.csv`` file, or folders of the plain layout.
+        options: further options of every drive; those of a row follow them and count more.
+
+    Raises:
+        ConfigError: a row cannot be right, or two drives have one name.
+    """
+    common = _words(options, "--options", Path.cwd())
+    if len(sources) == 1 and sources[0].lower().endswith(".csv"):
+        drives = list(read_drives(Path(sources[0]), common))
+    else:
+        drives = [_of_folder(Path(source), common) for source in sources]
+    _check_distinct(drives)
+    return drives
+
+
+def read_drives(file: Path, common: Sequence[str] = ()) -> Iterator[Drive]:
+    """The rows of a list of drives.
+
+    Raises:
+        ConfigError: the file cannot be read, or a row cannot be right; the sentence names the row.
+    """
+    text = read_text(file, "List of drives", TEXT_BYTES, ConfigError, REMEDY)
+    reader = csv.DictReader(io.StringIO(text, newline=""), restkey="", strict=True)
+    count = 0
+    try:
+        for count, values in enumerate(reader, start=1):
+            yield _of_row(values, f"{file}, row {count} (line {reader.line_num})", file.parent, common)
+            if count > MOST_DRIVES:
+                raise ConfigError(f"{file} has more than {MOST_DRIVES:,} rows; split it.")
+    except csv.Error as error:
+        raise ConfigError(f"{file}, row {count + 1}: {error}; {REMEDY}.") from None
+    if not count:
+        raise ConfigError(f"{file} names no drive; {REMEDY}.")
+
+
+def _of_row(values: dict[str, str | list[str] | None], origin: str, base: Path, common: Sequence[str]) -> Drive:
+    if "" in values:
+        raise ConfigError(f"{origin}: it has more fields than the first line names; {REMEDY}.")
+    given = {str(name).strip(): str(value or "").strip() for name, value in values.items()}
+    row = validated(_Columns, given, origin, ConfigError, REMEDY)
+    dataset = row.dataset or "folder"
+    known = (*dataset_names(), BAG)
+    if dataset not in known:
+        raise ConfigError(f"{origin}: dataset {dataset!r} is unknown; choose one of {', '.join(known)}.")
+    if any(word.startswith("-") for word in row.sequence.split()):
+        raise ConfigError(f"{origin}: sequence {row.sequence!r} is none; {REMEDY}.")
+    if dataset in COMMANDS and dataset != "kitti-object" and not row.sequence:
+        raise ConfigError(f"{origin}: sequence is missing, which {dataset} needs; {REMEDY}.")
+    path = row.path if "://" in row.path else _absolute(base, row.path)
+    place = PurePosixPath(path.replace(os.sep, "/").rstrip("/"))
+    return Drive(
+        car=one_line(row.car or place.parent.name or "car"),
+        drive=one_line(row.drive or " ".join(part for part in (place.name, row.sequence) if part)),
+        date=_date(row.date, origin),
+        dataset=dataset,
+        path=path,
+        sequence=row.sequence,
+        camera=one_line(row.camera),
+        frames=row.frames,
+        options=(*common, *_words(row.options, f"{origin}: options", base)),
+        origin=origin,
+    )
+
+
+def _of_folder(folder: Path, common: Sequence[str]) -> Drive:
+    absolute = Path(_absolute(Path(), str(folder)))
+    if not absolute.is_dir():
+        raise ConfigError(f"{folder} is neither a folder nor a .csv file; give a list of drives, or folders of drives.")
+    car, drive = one_line(absolute.parent.name or "car"), one_line(absolute.name)
+    return Drive(car, drive, "folder", str(absolute), options=tuple(common), origin=str(folder))
+
+
+def _date(text: str, origin: str) -> str:
+    try:
+        return datetime.fromisoformat(text).isoformat() if text else ""
+    except ValueError:
+        raise ConfigError(f"{origin}: date {text!r} is none such as 2026-03-01 or 2026-03-01T14:05.") from None
+
+
+def _words(text: str, origin: str, base: Path) -> tuple[str, ...]:
+    """Options as words, with the files that they name made absolute."""
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise ConfigError(f"{origin} cannot be split into words ({error}).") from None
+    made: list[str] = []
+    for word in words:
+        option, equals, value = word.partition("=")
+        if made and made[-1] in PATH_OPTIONS:
+            word = _absolute(base, word)
+        elif equals and option in PATH_OPTIONS:
+            word = f"{option}={_absolute(base, value)}"
+        made.append(word)
+    return tuple(made)
+
+
+def _check_distinct(drives: Iterable[Drive]) -> None:
+    seen: dict[str, Drive] = {}
+    for drive in drives:
+        first = seen.setdefault(drive.folder, drive)
+        if first is not drive:
+            raise ConfigError(
+                f"{drive.origin} and {first.origin} are both called {drive.name}; give them different names."
+            )
+
+
+def _absolute(base: Path, path: str) -> str:
+    """A path from a folder, as it is on this machine; links are kept."""
+    return os.path.normpath(base.absolute() / path)

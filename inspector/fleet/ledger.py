@@ -1,0 +1,85 @@
+"""What is done: of each drive an entry in its folder, written last, that says of what input, weights and options."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated
+
+from annotated_types import Len
+
+from calibnet.errors import CalibnetError, DatasetError
+from calibnet.runtime.reading import parse_json
+from calibnet.runtime.schema import validated
+from inspector.fleet.drives import Drive
+from inspector.fleet.places import Store
+from inspector.fleet.table import FAILED, Row, row_of
+
+ENTRY = "drive.json"
+LARGEST = 1 << 20
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a result depends on.
+
+    Attributes:
+        arguments: of the command that does the same by hand, without where its results go.
+        weights: digest of the weights and of how they are used.
+        seen: digest of what the input's files look like, `inspector.fleet.places.seen`.
+        content: digest of what is in them; empty where that was not found out.
+    """
+
+    arguments: tuple[str, ...]
+    weights: Annotated[str, Len(1, 64)]
+    seen: Annotated[str, Len(0, 64)] = ""
+    content: Annotated[str, Len(0, 64)] = ""
+
+    def is_same(self, other: Key) -> bool:
+        """Whether it stands for the same result: input that looks the same is the same, else its content tells."""
+        if (self.arguments, self.weights) != (other.arguments, other.weights):
+            return False
+        return bool(self.seen and self.seen == other.seen) or bool(self.content and self.content == other.content)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A drive that is done, and the command that did it."""
+
+    key: Key
+    row: Row
+    run: Annotated[str, Len(0, 64)] = ""
+
+
+def read_entry(store: Store, drive: Drive) -> Entry | None:
+    """The entry of a drive; None where it is not done, or what it says is not there."""
+    data = store.read(f"{drive.folder}/{ENTRY}", LARGEST)
+    if data is None:
+        return None
+    try:
+        entry = validated(Entry, parse_json(data), ENTRY, DatasetError, "do it again")
+    except (CalibnetError, ValueError):
+        return None
+    files = (entry.row.recording, entry.row.report, entry.row.json)
+    if not all(store.has(file) for file in files if file):
+        return None
+    return replace(entry, row=replace(entry.row, date=drive.date))  # the list may know better by now
+
+
+def write_entry(store: Store, drive: Drive, entry: Entry) -> None:
+    """Note that a drive is done."""
+    store.write(f"{drive.folder}/{ENTRY}", json.dumps(asdict(entry), indent=1).encode())
+
+
+def failed_row(drive: Drive, sentence: str, seconds: float = 0.0, recording: str = "") -> Row:
+    """The row of a drive that could not be done."""
+    return row_of(drive, verdict=FAILED, reason=sentence, seconds=seconds, recording=recording)
+
+
+def counted(rows: Sequence[Row]) -> str:
+    """How many drives have each verdict, in words."""
+    from inspector.fleet.table import WORDS
+
+    counts = {word: sum(row.verdict == word for row in rows) for word in reversed(WORDS)}
+    return ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "none"

@@ -1,0 +1,125 @@
+"""The page of a fleet: what became of its cars, and every drive, worst first; one HTML file beside the table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+from string import Template
+from urllib.parse import quote
+
+from calibnet.runtime.text import one_line
+from calibnet.runtime.writing import Kind, write_whole
+from inspector.fleet.history import History, histories
+from inspector.fleet.ledger import counted
+from inspector.fleet.table import FAILED, TABLE, WORDS, Row, worst_first
+from inspector.report.page import stylesheet
+
+PAGE = "index.html"
+MOST_ROWS, MOST_CARS = 1000, 300
+"""Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
+GRADES = {"accepted": "good", "cannot tell": "fair", "rejected": "bad", FAILED: "none"}
+HEADS = ("car", "drive", "date", "verdict", "cause", "moved", "", "sigma", "frames", "why", "picture", "")
+PICTURES = tuple(f"pictures/{name}_corrected.jpg" for name in ("median", "best", "worst"))
+"""Of a drive's report: its middle frame as it was corrected or, where there are few, another one."""
+
+
+def write_page(rows: Sequence[Row], folder: Path) -> Path:
+    """Write the page of a fleet beside its table.
+
+    Args:
+        rows: of the table.
+        folder: of the fleet.
+
+    Returns:
+        The page.
+    """
+    page = make_page(rows, folder)
+    write_whole(folder / PAGE, page.encode(errors="backslashreplace"), Kind.PAGE)
+    return folder / PAGE
+
+
+def make_page(rows: Sequence[Row], folder: Path) -> str:
+    """The page; links lead below its folder."""
+    cars, worst = histories(rows), worst_first(rows)
+    moved = sum(bool(car.moves) for car in cars)
+    template = Template(resources.files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        style=stylesheet(),
+        headline=escape(f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"),
+        about=escape(f"{moved} {'car has a mount' if moved == 1 else 'cars have a mount'} that moved between drives."),
+        cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
+        more_cars=_more(len(cars), MOST_CARS, "cars"),
+        heads="".join(_head(name) for name in HEADS),
+        rows="\n".join(_row(row, folder) for row in worst[:MOST_ROWS]),
+        more_rows=_more(len(worst), MOST_ROWS, "drives"),
+        table=f'<a href="{TABLE}">{TABLE}</a>',
+    )
+
+
+def _car(car: History) -> str:
+    after = {move.after.folder for move in car.moves}
+    squares = "".join(_square(row, row.folder in after) for row in car.rows)
+    text = escape(one_line(car.sentence))
+    return f'<li><b>{escape(car.name)}</b><span class="strip">{squares}</span><span>{text}</span></li>'
+
+
+def _square(row: Row, moved: bool) -> str:
+    css = GRADES[row.verdict] + (" moved" if moved else "")
+    title = escape(f"{row.drive} {row.date[:10]}: {row.verdict}")
+    if not row.report:
+        return f'<span class="{css}" title="{title}"></span>'
+    return f'<a class="{css}" href="{_link(row.report)}" title="{title}" aria-label="{title}"></a>'
+
+
+def _head(name: str) -> str:
+    return f'<th><button type="button">{name}</button></th>' if name not in ("", "picture") else f"<th>{name}</th>"
+
+
+def _row(row: Row, folder: Path) -> str:
+    drive = escape(f"{row.drive}, camera {row.camera}" if row.camera else row.drive)
+    linked = f'<a href="{_link(row.report)}">{drive}</a>' if row.report else drive
+    recording = f'<a href="{_link(row.recording)}">recording</a>' if row.recording else ""
+    word = f'<td class="word {GRADES[row.verdict]}" data-key="{WORDS.index(row.verdict)}">{row.verdict}</td>'
+    used = f"{row.frames}" + (f" ({row.skipped} skipped)" if row.skipped else "")
+    sigma = "" if row.sigma_deg is None or row.sigma_cm is None else f"{row.sigma_deg:.2f}° / {row.sigma_cm:.1f} cm"
+    cells = [
+        f"<td>{escape(row.car)}</td>",
+        f"<td>{linked}</td>",
+        f"<td>{escape(row.date[:10])}</td>",
+        word,
+        f"<td>{escape(row.cause)}</td>",
+        _number(row.moved_deg, 2, "°"),
+        _number(row.moved_cm, 1, " cm"),
+        f'<td class="number" data-key="{"" if row.sigma_deg is None else row.sigma_deg}">{sigma}</td>',
+        f'<td class="number" data-key="{row.frames}">{used}</td>',
+        f'<td class="reason">{escape(one_line(row.reason, 600))}</td>',
+        f"<td>{_picture(row, folder)}</td>",
+        f"<td>{recording}</td>",
+    ]
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _number(value: float | None, digits: int, unit: str) -> str:
+    if value is None:
+        return '<td class="number" data-key=""></td>'
+    return f'<td class="number" data-key="{value}">{value:.{digits}f}{unit}</td>'
+
+
+def _picture(row: Row, folder: Path) -> str:
+    """The report's own overlay, small."""
+    there = [path for path in (f"{row.folder}/{name}" for name in PICTURES) if (folder / path).is_file()]
+    if not row.report or not there:
+        return ""
+    picture = f'<img loading="lazy" src="{_link(there[0])}" alt="Points over a frame">'
+    return f'<a href="{_link(row.report)}">{picture}</a>'
+
+
+def _link(path: str) -> str:
+    """A path below the page's folder as an address: what is quoted in a name is quoted once more."""
+    return escape(quote(path))
+
+
+def _more(count: int, shown: int, what: str) -> str:
+    return f'<p class="about">{count - shown} more {what} are in the table.</p>' if count > shown else ""

@@ -1,0 +1,260 @@
+"""Folders on this machine and in buckets alike: what a drive is read from, and where its results go (fsspec)."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+import stat
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from io import BufferedReader
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, cast
+
+from calibnet.errors import ConfigError, DatasetError
+from calibnet.runtime.reading import open_file
+from calibnet.runtime.text import file_name, one_line
+from calibnet.runtime.writing import write_whole
+from inspector.fleet.drives import Drive
+
+PATTERNS = {
+    "kitti-odometry": ("sequences/{0}",),
+    "kitti-raw": ("{0}/{0}_drive_{1}_*", "{0}/calib_*.txt"),
+    "kitti-tracking": ("training/*/{0}", "training/*/{0}.txt"),
+}
+"""What belongs to one drive below the folder of a dataset that has many; all of it elsewhere."""
+
+
+def is_url(path: str) -> bool:
+    """Whether a path is for fsspec."""
+    return "://" in path
+
+
+@dataclass(frozen=True)
+class Item:
+    """A file of a drive: its path below the drive's, how large it is, and what changes when it is written."""
+
+    path: str
+    size: int
+    mark: str
+
+
+def patterns_of(drive: Drive) -> tuple[str, ...]:
+    """Which files below a drive's path belong to it."""
+    words = [glob.escape(word) for word in drive.sequence.split()]
+    return tuple(pattern.format(*words, "", "") for pattern in PATTERNS.get(drive.dataset, ("",)))
+
+
+def items_of(drive: Drive) -> list[Item]:
+    """The files that a drive is made of, by name; those that its options name among them.
+
+    Raises:
+        DatasetError: the place cannot be listed.
+    """
+    try:
+        items = _remote_items(drive) if is_url(drive.path) else _local_items(Path(drive.path), patterns_of(drive))
+        items += [item for named in _named(drive.options) for item in _local_items(Path(named), ("",), named)]
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{drive.path} cannot be listed ({_reason(error)}); check the path.") from None
+    return sorted(items, key=lambda item: item.path)
+
+
+def seen(items: Sequence[Item]) -> str:
+    """A digest of what the files look like from outside: quick, and another after every change."""
+    digest = hashlib.sha256()
+    for item in items:
+        digest.update(f"{item.path}\0{item.size}\0{item.mark}\n".encode(errors="surrogatepass"))
+    return digest.hexdigest()
+
+
+def content(folder: Path, drive: Drive) -> str:
+    """A digest of what is in the files of a drive, wherever they lie and whenever they were written.
+
+    Args:
+        folder: where its path lies on this machine.
+        drive: whose files.
+
+    Raises:
+        DatasetError: a file cannot be read.
+    """
+    digest = hashlib.sha256()
+    found = [(item.path, folder / item.path) for item in _local_items(folder, patterns_of(drive))]
+    found += [(named, Path(named)) for named in _named(drive.options)]
+    for name, path in sorted(found):
+        digest.update(name.encode(errors="surrogatepass") + b"\0")
+        if not path.is_file():  # a fifo that nobody writes to is not waited for
+            continue
+        try:
+            with open_file(path, remember=False) as file:
+                digest.update(hashlib.file_digest(cast(BufferedReader, file), "sha256").digest())
+        except OSError as error:
+            raise DatasetError(f"{path} cannot be read ({_reason(error)}); restore it.") from None
+    return digest.hexdigest()
+
+
+@contextmanager
+def on_this_machine(drive: Drive) -> Iterator[Path]:
+    """Where a drive's path lies on this machine: itself, or a copy of what belongs to it, removed in the end.
+
+    Raises:
+        DatasetError: it cannot be copied.
+    """
+    if not is_url(drive.path):
+        yield Path(drive.path)
+        return
+    with tempfile.TemporaryDirectory(prefix="calib-inspect-drive-") as temporary:
+        system, root = _system(drive.path)
+        copy = Path(temporary) / file_name(root.rpartition("/")[2])  # its last name is in titles
+        try:
+            for item in _remote_items(drive):
+                if ".." in Path(item.path).parts:
+                    raise ValueError(f"a file is called {item.path}")
+                target = copy / item.path
+                target.parent.mkdir(parents=True, exist_ok=True)
+                system.get_file(f"{root}/{item.path}".rstrip("/"), str(target))
+        except Exception as error:  # every file system has errors of its own
+            raise DatasetError(f"{drive.path} cannot be copied to this machine ({_reason(error)}).") from None
+        yield copy
+
+
+@dataclass(frozen=True)
+class Store:
+    """The fleet's folder: a path on this machine, or a URL that fsspec knows."""
+
+    root: str
+
+    @property
+    def local(self) -> Path | None:
+        """The folder, where it is on this machine."""
+        return None if is_url(self.root) else Path(self.root)
+
+    def check(self) -> None:
+        """Create it.
+
+        Raises:
+            ConfigError: it cannot be written.
+        """
+        try:
+            if self.local is not None:
+                self.local.mkdir(parents=True, exist_ok=True)
+                with tempfile.TemporaryFile(dir=self.local):
+                    return
+            system, root = _system(self.root)
+            system.makedirs(root, exist_ok=True)
+        except Exception as error:
+            raise ConfigError(f"{self.root} cannot be written ({_reason(error)}); choose another --out.") from None
+
+    def read(self, name: str, largest: int) -> bytes | None:
+        """A file, or None where there is none that can be read."""
+        with suppress(Exception):
+            if self.local is not None:
+                with open_file(self.local / name, largest, remember=False) as file:
+                    return file.read(largest + 1)
+            system, root = _system(self.root)
+            return bytes(system.cat_file(f"{root}/{name}", 0, largest))
+        return None
+
+    def has(self, name: str) -> bool:
+        """Whether there is such a file."""
+        if self.local is not None:
+            return (self.local / name).is_file()
+        system, root = _system(self.root)
+        return bool(system.exists(f"{root}/{name}"))
+
+    def write(self, name: str, data: bytes) -> None:
+        """Write a file of the fleet's bookkeeping whole."""
+        if self.local is not None:
+            write_whole(self.local / name, data)
+            return
+        system, root = _system(self.root)
+        system.makedirs(f"{root}/{name}".rpartition("/")[0], exist_ok=True)
+        system.pipe_file(f"{root}/{name}", data)
+
+    @contextmanager
+    def workplace(self, name: str) -> Iterator[Path]:
+        """A folder to write results into: itself, or one on this machine whose files are copied there in the end."""
+        if self.local is not None:
+            folder = self.local / name
+            folder.mkdir(parents=True, exist_ok=True)
+            yield folder
+            return
+        with tempfile.TemporaryDirectory(prefix="calib-inspect-result-") as temporary:
+            yield Path(temporary)
+            system, root = _system(self.root)
+            for path in sorted(path for path in Path(temporary).rglob("*") if path.is_file()):
+                target = f"{root}/{name}/{path.relative_to(temporary).as_posix()}"
+                system.makedirs(target.rpartition("/")[0], exist_ok=True)
+                system.put_file(str(path), target)
+
+
+def _system(url: str) -> tuple[Any, str]:
+    """The file system of a URL, and its path there.
+
+    Raises:
+        ConfigError: fsspec does not know it, or lacks what it needs.
+    """
+    import fsspec
+
+    try:
+        system, root = fsspec.core.url_to_fs(url)
+    except (ValueError, ImportError) as error:
+        raise ConfigError(f"{url} cannot be opened ({_reason(error)}).") from None
+    return system, str(root).rstrip("/")
+
+
+def _local_items(root: Path, patterns: Sequence[str], prefix: str = "") -> list[Item]:
+    found: dict[str, Item] = {}
+    for pattern in patterns:
+        for start in sorted(root.glob(pattern)) if pattern else [root]:
+            for path in _files(start):
+                status = path.stat()
+                relative = prefix if path == root else (Path(prefix) / path.relative_to(root)).as_posix()
+                special = "" if stat.S_ISREG(status.st_mode) else f"{status.st_mode} "
+                mark = f"{special}{status.st_mtime_ns} {status.st_ctime_ns}"
+                found[relative] = Item(relative, status.st_size, mark)
+    return list(found.values())
+
+
+def _files(start: Path) -> Iterator[Path]:
+    """All files below a folder, those in folders that are linked included, or the file itself."""
+    if not start.is_dir():
+        if os.path.lexists(start):
+            yield start
+        return
+    been: set[tuple[int, int]] = set()
+    for folder, below, names in os.walk(start, followlinks=True):
+        status = Path(folder).stat()
+        if (status.st_dev, status.st_ino) in been:  # a link back up
+            below.clear()
+            continue
+        been.add((status.st_dev, status.st_ino))
+        yield from (Path(folder) / name for name in names if (Path(folder) / name).exists())
+
+
+def _remote_items(drive: Drive) -> list[Item]:
+    system, root = _system(drive.path)
+    found: dict[str, Item] = {}
+    for pattern in patterns_of(drive):
+        for start in sorted(system.glob(f"{root}/{pattern}")) if pattern else [root]:
+            for name, info in system.find(start, detail=True).items():
+                relative = name[len(root) :].lstrip("/")
+                changed = (
+                    info.get(key) for key in ("ETag", "etag", "md5", "mtime", "LastModified", "updated", "created")
+                )
+                mark = next((str(one) for one in changed if one is not None), "")
+                found[relative] = Item(relative, int(info.get("size") or 0), mark)
+    return list(found.values())
+
+
+def _named(options: Sequence[str]) -> list[str]:
+    """Files that options name: those of the initial guess."""
+    named = [value for option, value in pairwise(options) if option == "--guess"]
+    return named + [word.removeprefix("--guess=") for word in options if word.startswith("--guess=")]
+
+
+def _reason(error: BaseException) -> str:
+    return one_line(getattr(error, "strerror", None) or str(error) or type(error).__name__, 200)

@@ -1,0 +1,181 @@
+"""The fleet's table: one row a drive, in a Parquet file that everything reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from annotated_types import Len
+
+from calibnet.errors import DatasetError
+from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.runtime.reading import require_file
+from calibnet.runtime.schema import validated
+from calibnet.runtime.text import one_line
+from calibnet.runtime.writing import Kind, write_whole
+from calibnet.verdict import CAUSES
+from inspector.fleet.drives import Drive
+
+TABLE = "fleet.parquet"
+FAILED = "failed"
+WORDS = (FAILED, "rejected", "cannot tell", "accepted")
+"""Worst first."""
+RECORDING, VERDICT, PAGE = "recording.rrd", "verdict.json", "index.html"
+"""Files of a drive, in its folder."""
+LARGEST = 1 << 30
+
+Sixteen = Annotated[tuple[float, ...], Len(16, 16)]
+ThirtySix = Annotated[tuple[float, ...], Len(36, 36)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """What came of one drive.
+
+    Attributes:
+        car, drive, date, dataset, path, sequence, camera: as of `Drive`.
+        selection: which of its frames were run, as ``--frames`` has it; empty for the default.
+        options: further ones, as one text.
+        verdict: on the calibration that it had: accepted, rejected, cannot tell; or failed.
+        cause: names of what is wrong with the input, with commas; empty where the mount moved or nothing is wrong.
+        reason: a sentence.
+        moved_deg, moved_cm: from the calibration that it had to what was found.
+        sigma_deg, sigma_cm: standard deviation of what was found, over all axes.
+        frames, skipped: how many were used, and left out.
+        seconds: that it took.
+        camera_from_lidar: what was found, 16 numbers row by row.
+        covariance: of it, 36 numbers row by row, ``(translation m, rotation rad)``.
+        folder: of its results, below the fleet's.
+        recording, report, json: files in the fleet's folder; empty where there is none.
+    """
+
+    car: str
+    drive: str
+    date: str
+    dataset: str
+    path: str
+    sequence: str
+    camera: str
+    selection: str
+    options: str
+    verdict: Literal["accepted", "rejected", "cannot tell", "failed"]
+    cause: str = ""
+    reason: str = ""
+    moved_deg: float | None = None
+    moved_cm: float | None = None
+    sigma_deg: float | None = None
+    sigma_cm: float | None = None
+    frames: int = 0
+    skipped: int = 0
+    seconds: float = 0.0
+    camera_from_lidar: Sixteen | None = None
+    covariance: ThirtySix | None = None
+    folder: str = ""
+    recording: str = ""
+    report: str = ""
+    json: str = ""
+
+    @property
+    def extrinsic(self) -> Extrinsic | None:
+        """What was found, 4x4."""
+        return None if self.camera_from_lidar is None else np.reshape(self.camera_from_lidar, (4, 4))
+
+    @property
+    def uncertainty(self) -> Matrix6 | None:
+        """Covariance of it, 6x6."""
+        return None if self.covariance is None else np.reshape(self.covariance, (6, 6))
+
+    @property
+    def name(self) -> str:
+        """For pages and messages."""
+        return f"{self.car}/{self.drive}" + (f", camera {self.camera}" if self.camera else "")
+
+
+def row_of(drive: Drive, **what_came: Any) -> Row:
+    """The row of a drive."""
+    return Row(
+        car=drive.car,
+        drive=drive.drive,
+        date=drive.date,
+        dataset=drive.dataset,
+        path=one_line(drive.path, 4000),
+        sequence=one_line(drive.sequence),
+        camera=drive.camera,
+        selection=one_line(drive.frames),
+        options=one_line(" ".join(drive.options)),
+        folder=drive.folder,
+        **what_came,
+    )
+
+
+def of_verdict(content: dict[str, Any]) -> dict[str, Any]:
+    """The columns that the JSON of a verdict fills, as `calibnet.verdict.Verdict.as_dict` writes it."""
+    sigma = content["sigma"] or {"rotation_deg": None, "translation_cm": None, "covariance": None}
+    return {
+        "verdict": content["verdict"],
+        "cause": ", ".join(cause["name"] for cause in content["causes"] if cause["name"] in CAUSES),
+        "reason": one_line(content["reason"]),
+        "moved_deg": content["moved"]["rotation_deg"],
+        "moved_cm": content["moved"]["translation_cm"],
+        "sigma_deg": sigma["rotation_deg"],
+        "sigma_cm": sigma["translation_cm"],
+        "camera_from_lidar": _flat(content["camera_from_lidar"]),
+        "covariance": _flat(sigma["covariance"]),
+        "frames": content["frames"]["used"],
+        "skipped": len(content["frames"]["skipped"]),
+    }
+
+
+def worst_first(rows: Iterable[Row]) -> list[Row]:
+    """Failed, rejected, cannot tell, accepted; among equals those that moved most, against what is tolerated."""
+    return sorted(rows, key=lambda row: (WORDS.index(row.verdict), -off(row), row.car, row.date, row.drive))
+
+
+def off(row: Row) -> float:
+    """How far off a drive's calibration is, in tolerances of `calibnet.judging.verify.DRIVE`."""
+    return max((row.moved_deg or 0.0) / 0.5, (row.moved_cm or 0.0) / 15.0)
+
+
+def table_bytes(rows: Sequence[Row]) -> bytes:
+    """The rows as a Parquet file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    number, count, numbers = pa.float64(), pa.int64(), pa.list_(pa.float64())
+    types = {"float": number, "float | None": number, "int": count}
+    types |= {"Sixteen | None": numbers, "ThirtySix | None": numbers}
+    schema = pa.schema([(one.name, types.get(str(one.type), pa.string())) for one in fields(Row)])
+    table = pa.Table.from_pylist([vars(row) for row in rows], schema)
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def write_table(rows: Sequence[Row], file: Path) -> None:
+    """Write the table, whole or not at all."""
+    write_whole(file, table_bytes(rows), Kind.PARQUET)
+
+
+def read_table(file: Path) -> list[Row]:
+    """The rows of a table.
+
+    Raises:
+        DatasetError: it cannot be read, or is no such table.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    require_file(file, "Table", LARGEST, DatasetError, "make it with `calib-inspect fleet`")
+    try:
+        rows = pq.read_table(file).to_pylist()
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        said = one_line(str(error), 200)
+        raise DatasetError(f"{file} is no Parquet table ({said}); make it with `calib-inspect fleet`.") from None
+    return list(validated(tuple[Row, ...], rows, str(file), DatasetError, "make it with `calib-inspect fleet`"))
+
+
+def _flat(matrix: Sequence[Sequence[float]] | None) -> tuple[float, ...] | None:
+    return None if matrix is None else tuple(float(value) for line in matrix for value in line)

@@ -1,0 +1,159 @@
+"""Drives on Dask: another worker takes over from one that is killed, failures are tried twice, a stop is orderly."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from calibnet.errors import ConfigError
+from calibnet.runtime.interruption import StopRequest
+from inspector.fleet import engine as module
+from inspector.fleet.engine import Engine, run_all
+
+pytest.importorskip("distributed", reason="the extra [fleet] is not installed")
+
+
+def note(folder: Path, line: str) -> None:
+    """Add a line to a file that all workers share."""
+    with (folder / "log.txt").open("a") as file:
+        file.write(f"{line}\n")
+
+
+def square(piece: tuple[Path, int]) -> int:
+    folder, number = piece
+    note(folder, f"{number} {os.getpid()}")
+    return number * number
+
+
+def die_once(piece: tuple[Path, int]) -> int:
+    """Number 1 ends its worker as the kernel does, the first time."""
+    folder, number = piece
+    note(folder, f"{number}")
+    if number == 1 and not (folder / "died").exists():
+        (folder / "died").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def always_die(piece: tuple[Path, int]) -> int:
+    folder, number = piece
+    note(folder, f"{number}")
+    if number == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def fail(piece: tuple[Path, int]) -> int:
+    folder, number = piece
+    note(folder, f"{number}")
+    raise ValueError(f"no {number}")
+
+
+def slow(piece: tuple[Path, int]) -> int:
+    folder, number = piece
+    note(folder, f"{number}")
+    time.sleep(1.0)
+    return number
+
+
+def lines(folder: Path) -> list[str]:
+    return (folder / "log.txt").read_text().splitlines()
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_every_piece_is_done_once(tmp_path: Path, workers: int) -> None:
+    pieces = [(tmp_path, number) for number in range(6)]
+    done = {outcome.work[1]: outcome.done for outcome in run_all(Engine(workers), square, pieces, StopRequest())}
+    assert done == {number: number * number for number in range(6)}
+    assert sorted(line.split()[0] for line in lines(tmp_path)) == list("012345")
+    processes = {line.split()[1] for line in lines(tmp_path)}
+    assert (str(os.getpid()) in processes) == (workers == 0)
+
+
+def test_a_worker_that_is_killed_loses_only_what_it_was_doing(tmp_path: Path) -> None:
+    pieces = [(tmp_path, number) for number in range(6)]
+    done = sorted(outcome.done or 0 for outcome in run_all(Engine(2), die_once, pieces, StopRequest()))
+    assert done == list(range(6))
+    assert sorted(lines(tmp_path)) == ["0", "1", "1", "2", "3", "4", "5"], "nothing twice but what was lost"
+
+
+def test_what_kills_two_workers_is_given_up(tmp_path: Path) -> None:
+    pieces = [(tmp_path, number) for number in range(4)]
+    outcomes = {outcome.work[1]: outcome for outcome in run_all(Engine(1), always_die, pieces, StopRequest())}
+    assert type(outcomes[1].error).__name__ == "KilledWorker"
+    assert [outcomes[number].done for number in (0, 2, 3)] == [0, 2, 3]
+    assert lines(tmp_path).count("1") == 2
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_what_fails_is_tried_twice(tmp_path: Path, workers: int) -> None:
+    (outcome,) = run_all(Engine(workers), fail, [(tmp_path, 7)], StopRequest())
+    assert str(outcome.error) == "no 7"
+    assert lines(tmp_path) == ["7", "7"]
+
+
+def test_a_stop_ends_after_what_is_under_way(tmp_path: Path) -> None:
+    stop, done = StopRequest(), []
+    for outcome in run_all(Engine(1), slow, [(tmp_path, number) for number in range(20)], stop):
+        done.append(outcome.done)
+        stop.requested = True
+    assert 1 <= len(done) <= 2
+    assert len(lines(tmp_path)) == len(done)
+
+
+def test_servers_listen_on_this_machine_only(tmp_path: Path) -> None:
+    with module._client(Engine(1)) as client:
+        addresses = [client.scheduler_info()["address"], *client.scheduler_info()["workers"]]
+        assert client.dashboard_link.startswith("http://127.0.0.1:")
+        nannies = [worker["nanny"] for worker in client.scheduler_info()["workers"].values()]
+        assert all(address.startswith("tls://127.0.0.1:") for address in [*addresses, *nannies])
+
+
+def test_a_cluster_of_two_processes_is_used_by_its_address(tmp_path: Path) -> None:
+    address, root = f"tcp://127.0.0.1:{module_port()}", Path(__file__).resolve().parents[3]
+    environment = os.environ | {"PYTHONPATH": str(root)}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment, "cwd": root}
+    scheduler = ["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]
+    worker = [
+        "worker",
+        address,
+        "--host",
+        "127.0.0.1",
+        "--nthreads",
+        "1",
+        "--nworkers",
+        "1",
+        "--no-dashboard",
+        "--no-nanny",
+    ]
+    running = [
+        subprocess.Popen([sys.executable, "-m", "dask", *arguments], **quiet)  # type: ignore[call-overload]
+        for arguments in (scheduler, worker, worker)
+    ]
+    try:
+        engine = Engine(0, address)
+        done = sorted(one.done or 0 for one in run_all(engine, slow, [(tmp_path, n) for n in range(3)], StopRequest()))
+        assert done == [0, 1, 2]
+    finally:
+        for process in running:
+            process.kill()
+        for process in running:
+            process.wait(30)
+
+
+def test_no_scheduler_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "PATIENCE_S", 1.0)
+    with pytest.raises(ConfigError, match=r"No scheduler answers at tcp://127\.0\.0\.1"):
+        list(run_all(Engine(0, f"tcp://127.0.0.1:{module_port()}"), square, [], StopRequest()))
+
+
+def module_port() -> int:
+    from inspector.record.outputs import free_port
+
+    return free_port()

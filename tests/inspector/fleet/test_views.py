@@ -1,0 +1,156 @@
+"""What is made of a fleet: the history of a mount, the page, the catalogue, and a list to train on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibnet.errors import DatasetError
+from calibnet.geometry import miscalibration
+from calibnet.training.data import open_data
+from inspector.fleet.drives import Drive
+from inspector.fleet.history import histories
+from inspector.fleet.page import make_page
+from inspector.fleet.table import FAILED, TABLE, Row, read_table, row_of, worst_first, write_table
+from tests.inspector.fleet.conftest import Invoke, rows_of
+from tests.support.fakes import REFERENCE
+from tests.support.judged_drives import COVARIANCE, JudgedCascade
+
+MOVED = miscalibration([0.0, 2.0, 0.0], [0.0, 0.0, 0.0]) @ REFERENCE
+
+
+def row(drive: str, verdict: str = "accepted", found: np.ndarray = REFERENCE, **more: object) -> Row:
+    of = row_of(
+        Drive(str(more.pop("car", "a")), drive, "folder", "/data", date=str(more.pop("date", ""))),
+        verdict=verdict,
+        camera_from_lidar=tuple(found.ravel().tolist()),
+        covariance=tuple(COVARIANCE.ravel().tolist()),
+        sigma_deg=0.09,
+        sigma_cm=1.7,
+        moved_deg=0.0,
+        moved_cm=0.0,
+    )
+    return replace(of, **more)  # type: ignore[arg-type]
+
+
+def test_a_mount_that_moved_is_found_between_its_drives() -> None:
+    rows = [
+        row("d4", "rejected", MOVED, date="2026-01-04"),
+        row("d1", date="2026-01-01"),
+        row("d2", date="2026-01-02"),
+        row("d3", "rejected", MOVED, date="2026-01-03"),
+    ]
+    (history,) = histories(rows)
+    (move,) = history.moves
+    assert (move.before.drive, move.after.drive) == ("d2", "d3")
+    assert move.rotation_deg == pytest.approx(2.0, abs=1e-6)
+    assert history.sentence.startswith("The mount moved between d2 (2026-01-02) and d3 (2026-01-03), by 2.00°")
+
+
+def test_a_wrong_camera_is_no_mount_that_moved() -> None:
+    (history,) = histories([row("d1"), row("d2", "rejected", MOVED, cause="focal-length"), row("d3")])
+    assert history.moves == ()
+    assert history.sentence == "1 drive with wrong input (focal-length)."
+
+
+def test_a_calibration_that_was_always_off_has_not_moved() -> None:
+    (history,) = histories([row("d1", "rejected", MOVED), row("d2", "rejected", MOVED)])
+    assert history.moves == ()
+    assert "off on 2 drives" in history.sentence
+
+
+def test_a_move_within_the_tolerance_is_none() -> None:
+    little = miscalibration([0.0, 0.3, 0.0], [0.0, 0.0, 0.0]) @ REFERENCE
+    (history,) = histories([row("d1"), row("d2", found=little)])
+    assert history.moves == ()
+
+
+def test_the_worst_comes_first() -> None:
+    rows = [
+        row("good"),
+        row("off", "rejected", moved_deg=1.0),
+        row("lost", FAILED),
+        row("far", "rejected", moved_deg=9.0),
+    ]
+    assert [one.drive for one in worst_first(rows)] == ["lost", "far", "off", "good"]
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    rows = [row("one"), replace(row("two", FAILED), camera_from_lidar=None, covariance=None, moved_deg=None)]
+    write_table(rows, tmp_path / TABLE)
+    assert read_table(tmp_path / TABLE) == rows
+
+
+@pytest.mark.parametrize("data", [b"", b"PAR1 and nothing more", b"{}"])
+def test_what_is_no_table_is_a_sentence(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / TABLE).write_bytes(data)
+    with pytest.raises(DatasetError, match="is no Parquet table"):
+        read_table(tmp_path / TABLE)
+
+
+def test_a_table_of_something_else_is_a_sentence(tmp_path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table({"a": [1]}), tmp_path / TABLE)
+    with pytest.raises(DatasetError, match="car is missing"):
+        read_table(tmp_path / TABLE)
+
+
+def test_foreign_names_are_text_on_the_page(tmp_path: Path) -> None:
+    page = make_page([row("<script>alert(1)</script>", car='"><img src=x>', reason="<b>")], tmp_path)
+    assert "<script>alert" not in page
+    assert "<img src=x>" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+
+
+def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
+    import re
+    from urllib.parse import unquote
+
+    Path("DRIVES.csv").write_text("path,car,drive\ncar-a/monday,50% <a>,x/y?z#w\n")
+    assert invoke("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")[0] == 0
+    code, out, _ = invoke("fleet-report", "all")
+    assert code == 0
+    assert out.startswith("Page: all/index.html")
+    page = Path("all/index.html").read_text()
+    links = set(re.findall(r'(?:href|src)="([^"]+)"', page)) - {"data:,"}
+    assert len(links) == 4, "report, recording, picture, table"
+    assert [link for link in links if not (Path("all") / unquote(link)).is_file()] == []
+
+
+def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Path, cascade: JudgedCascade) -> None:
+    pytest.importorskip("datafusion", reason="the extra [fleet] is not installed")
+    from rerun.catalog import CatalogClient
+
+    from inspector.fleet.catalogue import serve
+
+    for scan in (cars / "tuesday" / "clouds").iterdir():
+        scan.write_bytes(scan.read_bytes()[:1001])
+    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0")
+    with serve(list(rows_of(Path("all")).values()), Path("all").absolute()) as catalogue:
+        address, _, entry = catalogue.address.partition("/entry/")
+        assert address.startswith("rerun+http://127.0.0.1:")
+        (dataset,) = (one for one in CatalogClient(address).datasets() if str(one.id) == entry)
+        table = dataset.segment_table().to_pydict()
+        names = [one[0] for one in table["property:run:drive"]]
+        words = [one[0] for one in table["property:verdict:word"]]
+        assert len(dataset.blueprints()) == 2
+        assert dataset.default_blueprint() is not None
+    assert dict(zip(names, words, strict=True)) == {"monday": "accepted", "tuesday": "failed"}
+
+
+def test_a_list_gives_training_the_drives_with_a_good_calibration(invoke: Invoke, cars: Path) -> None:
+    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0", "--frames", "0:1")
+    file = Path("all") / TABLE
+    rows = [replace(one, verdict="rejected") if one.drive == "tuesday" else one for one in read_table(file)]
+    write_table([replace(one, selection="0:1") for one in rows], file)
+    (good,) = open_data(f"list:{file}")
+    assert (good.name, len(good)) == ("folder/monday", 1)
+    (bad,) = open_data(f"list:{file}:rejected")
+    assert bad.name == "folder/tuesday"
+    with pytest.raises(DatasetError, match="lists no drive that is failed"):
+        open_data(f"list:{file}:failed")
