@@ -22,6 +22,7 @@ from inspector.report.metrics import Figures, misplacement_cm
 from inspector.report.pictures import PICTURE_WIDTH, draw_overlay
 from inspector.report.verdict import findings, headline, verdict
 from inspector.report.write import write_report
+from tests.support.browser import chromium
 
 
 @pytest.fixture(scope="module")
@@ -240,3 +241,14 @@ def test_a_full_disk_is_one_sentence_and_leaves_no_halves(
         write_report(known, tmp_path)
     assert not (tmp_path / "index.html").exists()
     assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_on_a_phone_no_table_is_cut(known: RecordedRun, unknown: RecordedRun, tmp_path: Path) -> None:
+    wider = "table => table.getBoundingClientRect().right > innerWidth"
+    with chromium() as browser:
+        for name, run_ in (("known", known), ("unknown", unknown)):
+            page_of(moved(run_, [3.456] * len(run_.frames)), tmp_path / name)
+            page = browser.new_page(viewport={"width": 390, "height": 844})
+            page.goto((tmp_path / name / "index.html").as_uri())
+            assert page.locator("table.figures").count() >= 1
+            assert page.evaluate(f"Array.from(document.querySelectorAll('table')).filter({wider}).length") == 0
