@@ -1,4 +1,8 @@
-"""What a recorded run has to stand: its verdict, and limits on its errors; as text and as JUnit XML."""
+"""What a recorded run has to stand: its verdict, and limits; as text and as JUnit XML.
+
+Limits on errors need a reference. Those on what a run says of itself do not: how sure it is, how far its frames lie
+apart, how many it could not use, and how well picture and scan fit.
+"""
 
 from __future__ import annotations
 
@@ -6,34 +10,65 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
+import numpy as np
+
 from calibnet.evaluation.metrics import Distribution, Metrics
+from calibnet.geometry import pose_error
+from calibnet.geometry.median import median_pose
 from calibnet.runtime.text import one_line
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from inspector.read.run import RecordedRun
 from inspector.read.understood import RecordingError
+from inspector.record.tabs.overview import fit_stage
 from inspector.verdicts import explained
 
 SUITE = "calib-inspect check"
 STATISTICS = {"median": "median", "p95": "95th percentile", "max": "largest", "drive": "the drive's"}
+KINDS = {
+    "rotation": ("rotation error", "°"),
+    "translation": ("translation error", " cm"),
+    "sigma_rotation": ("stated uncertainty of the rotation, 1σ,", "°"),
+    "sigma_translation": ("stated uncertainty of the translation, 1σ,", " cm"),
+    "scatter_rotation": ("rotation between a frame and all frames' median", "°"),
+    "scatter_translation": ("distance between a frame and all frames' median", " cm"),
+    "unused": ("share of rejected and skipped frames", " %"),
+    "fit": ("error expected of the matches", " px"),
+}
+"""Of limits, with their units."""
+ERRORS, OF_THE_RUN = ("rotation", "translation"), ("sigma_rotation", "sigma_translation", "unused")
+"""Those that need a reference, and those that are one figure of a run and no statistic over its frames."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The largest value allowed of one kind of error.
+    """The largest value allowed of something.
 
     Attributes:
-        kind: ``"rotation"`` or ``"translation"``.
-        largest: in degrees or centimetres.
-        statistic: one of `STATISTICS`, that must not exceed it: over the frames, or of the drive's one extrinsic.
+        kind: one of `KINDS`.
+        largest: in its unit.
+        statistic: one of `STATISTICS`, that must not exceed it: over the frames or, of an error, of the drive's one
+            extrinsic; what is no error takes the median then.
     """
 
     kind: str
     largest: float
     statistic: str
 
+    @property
+    def name(self) -> str:
+        """What is limited."""
+        if self.kind in OF_THE_RUN:
+            return KINDS[self.kind][0]
+        return f"{STATISTICS[self.statistic if self.kind in ERRORS else self.over_frames]} {KINDS[self.kind][0]}"
+
+    @property
+    def over_frames(self) -> str:
+        """The statistic of what is no error."""
+        return "median" if self.statistic == "drive" else self.statistic
+
     def say(self, value: float) -> str:
         """A value with its unit."""
-        return f"{value:.4g}°" if self.kind == "rotation" else f"{value:.4g} cm"
+        return f"{value:.4g}{KINDS[self.kind][1]}"
 
 
 @dataclass(frozen=True)
@@ -52,30 +87,63 @@ class Outcome:
     def sentence(self) -> str:
         """What was found, and by how much it is too much."""
         limit = self.limit
-        found = f"{STATISTICS[limit.statistic]} {limit.kind} error {limit.say(self.value)}"
+        found = f"{limit.name} {limit.say(self.value)}"
         if self.passed:
             return f"{found} (allowed {limit.say(limit.largest)})"
         return f"{found} exceeds {limit.say(limit.largest)} by {limit.say(self.value - limit.largest)}"
 
 
 def check_run(run: RecordedRun, limits: Sequence[Limit]) -> list[Outcome]:
-    """Hold the corrected extrinsics of all frames against limits; none need no reference.
+    """Hold a run against limits.
 
     Raises:
-        RecordingError: the recording has no reference to measure errors against.
+        RecordingError: the recording has nothing to hold against one of them, such as a reference.
     """
-    if not limits:
-        return []
-    if not run.has_reference:
+    if not run.has_reference and any(limit.kind in ERRORS for limit in limits):
         raise RecordingError(
-            f"{run.path} has no reference extrinsic, so its errors are unknown; check it without limits, check a run "
-            "on calibrated data, or give the folder command --range to take its calibration for the reference."
+            f"{run.path} has no reference extrinsic, so its errors are unknown; limit --max-sigma-rotation, "
+            "--max-scatter-rotation, --max-unused or --max-fit instead, check a run on calibrated data, or give the "
+            "folder command --range to take its calibration for the reference."
         )
     return [Outcome(limit, _value(run, limit)) for limit in limits]
 
 
 def _value(run: RecordedRun, limit: Limit) -> float:
     """What is held against a limit."""
+    if limit.kind in ERRORS:
+        return _error(run, limit)
+    if limit.kind.startswith("sigma"):
+        verdict = run.verdict
+        sigma = verdict.sigma_rotation_deg if limit.kind == "sigma_rotation" else verdict.sigma_translation_cm
+        if sigma is None:
+            raise RecordingError(f"{run.path} states no uncertainty of its result; record a drive, or a single frame.")
+        return sigma
+    if limit.kind == "unused":
+        unused = sum(frame.rejected for frame in run.frames) + len(run.skipped)
+        return 100 * unused / (len(run.frames) + len(run.skipped))
+    values = _fits(run) if limit.kind == "fit" else _scatter(run, limit.kind)
+    shares = {"median": 50.0, "p95": 95.0, "max": 100.0}
+    return float(np.percentile(values, shares[limit.over_frames]))
+
+
+def _scatter(run: RecordedRun, kind: str) -> list[float]:
+    """How far every frame that is not rejected lies from the median of all of them."""
+    if len(run.results) < 2:
+        raise RecordingError(f"{run.path} has one frame that is not rejected, which cannot scatter; record several.")
+    middle = median_pose(run.results)
+    apart = [pose_error(result, middle) for result in run.results]
+    return [one.rotation_deg if kind == "scatter_rotation" else one.translation_cm for one in apart]
+
+
+def _fits(run: RecordedRun) -> list[float]:
+    """What error the last stage expects of the matches of every frame, in pixels of its image."""
+    values = run.scalars(fit_stage(run.stages[-1].number))
+    if not values:
+        raise RecordingError(f"{run.path} has no curves of how well frames fit; record them (--log curves).")
+    return values
+
+
+def _error(run: RecordedRun, limit: Limit) -> float:
     if limit.statistic == "drive":
         of_drive = run.drive_error
         if of_drive is None:
@@ -114,7 +182,7 @@ def junit(run: RecordedRun, outcomes: Sequence[Outcome]) -> bytes:
     _add_verdict(suite, run)
     for outcome in outcomes:
         limit = outcome.limit
-        name = f"{STATISTICS[limit.statistic]} {limit.kind} error is at most {limit.say(limit.largest)}"
+        name = f"{limit.name} is at most {limit.say(limit.largest)}"
         case = _case(suite, run, name)
         if outcome.passed:
             ElementTree.SubElement(case, "system-out").text = f"{run.title}: {outcome.sentence}"

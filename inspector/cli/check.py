@@ -19,35 +19,45 @@ LIMIT = NumberRange(min=0.0)
 @click.argument("recording", type=RECORDING, metavar="RUN.rrd")
 @click.option("--max-rotation", type=LIMIT, metavar="DEG", help="Largest rotation error allowed, in degrees.")
 @click.option("--max-translation", type=LIMIT, metavar="CM", help="Largest translation error allowed, in centimetres.")
+@click.option("--max-sigma-rotation", type=LIMIT, metavar="DEG", help="Largest uncertainty that it may state, 1σ.")
+@click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="Likewise of the translation.")
+@click.option(
+    "--max-scatter-rotation", type=LIMIT, metavar="DEG", help="Farthest that frames may lie off their median."
+)
+@click.option("--max-scatter-translation", type=LIMIT, metavar="CM", help="Likewise of the translation.")
+@click.option("--max-unused", type=LIMIT, metavar="PERCENT", help="Largest share of rejected and skipped frames.")
+@click.option(
+    "--max-fit", type=LIMIT, metavar="PX", help="Largest error that the last stage may expect of its matches."
+)
 @click.option(
     "--statistic",
     type=click.Choice(["median", "p95", "max", "drive"]),
     default="median",
     show_default=True,
-    help="Which error must keep the limits: over the frames, or that of the drive's one extrinsic.",
+    help="What must keep the limits: over the frames, or the error of the drive's one extrinsic.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")
 @overwrite_option
 def check(
     recording: Path,
-    max_rotation: float | None,
-    max_translation: float | None,
     statistic: str,
     json_file: str | None,
     junit_file: Path | None,
+    **largest: float | None,
 ) -> int:
-    """Hold a recorded run against its verdict and, where they are given, against limits on its errors.
+    """Hold a recorded run against its verdict and, where they are given, against limits.
 
     Exits with 1 when the verdict is rejected or a limit is exceeded, and with 4 when it cannot be told. The verdict is
     that of the drive; of a run without one it is on the frames: rejected if half of them or more are, accepted if
-    more than half are. Errors are those of the frames' corrected extrinsics against the reference.
+    more than half are. Errors are those of the frames' corrected extrinsics against the reference. Without a reference
+    there are limits on what the run says of itself: --max-sigma-..., --max-scatter-..., --max-unused and --max-fit.
     """
-    from inspector.check import Limit, check_run, junit, summary
+    from inspector.check import KINDS, Limit, check_run, junit, summary
     from inspector.verdicts import line
 
-    largest = {"rotation": max_rotation, "translation": max_translation}
-    limits = [Limit(kind, value, statistic) for kind, value in largest.items() if value is not None]
+    given = {option.removeprefix("max_"): value for option, value in largest.items() if value is not None}
+    limits = [Limit(kind, given[kind], statistic) for kind in KINDS if kind in given]
     prepare_json(json_file)
     prepare(junit_file, Kind.JUNIT)
     run = open_run(recording)

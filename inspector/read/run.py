@@ -159,6 +159,12 @@ class RecordedRun:
     def _pictures(self) -> RecordedPictures:
         return RecordedPictures(self._file)
 
+    def scalars(self, path: str) -> list[float]:
+        """A curve's values, of every frame that has one, in their order."""
+        rows = [row for chunk in self.chunks(path) for row in chunk.to_record_batch().to_pylist()]
+        known = sorted((row[entities.FRAME], row["Scalars:scalars"][0]) for row in rows if row.get("Scalars:scalars"))
+        return [float(value) for _, value in known]
+
     def chunks(self, *paths: str) -> Iterator[Chunk]:
         """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
         return self._file.chunks(*paths)

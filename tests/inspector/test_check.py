@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -11,12 +12,33 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from calibnet.verdict import Cause
+from calibnet.geometry import miscalibration, pose_error
+from calibnet.geometry.median import median_pose
+from calibnet.verdict import Cause, Verdict
 from inspector.check import Limit, Outcome, check_run
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.read.run import read_run
+from tests.support.fakes import FakeCascade
 from tests.support.judged import REASON
+
+
+@pytest.fixture(scope="module")
+def own_drive(record: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four frames without a reference, solved as a drive, of which one is rejected."""
+    file = tmp_path_factory.mktemp("own") / "own.rrd"
+    record(
+        file, length=4, detail="overview", strides=(32,), as_is=True, drive=True, doubted=(1,), cascade_type=Scattered
+    )
+    return file
+
+
+class Scattered(FakeCascade):
+    """Leaves every frame elsewhere, and the last stages not sure of it."""
+
+    def calibrate(self, frame: Any, initial: Any, detail: bool = True) -> Any:
+        start = miscalibration([0.1 * frame.index, 0.0, 0.0], [0.02 * frame.index, 0.0, 0.0]) @ initial
+        return replace(super().calibrate(frame, start, detail), initial=initial)
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -112,6 +134,56 @@ def test_json_is_the_verdict_alone_on_stdout(
     assert code == 1 and json.loads(out) == frame.verdict.as_dict()
     assert json.loads(out)["causes"] == [causes[0].as_dict()]
     assert err == f"Verdict: rejected. {REASON} The picture looks mirrored.\n"
+
+
+@pytest.mark.parametrize(
+    ("option", "found"),
+    [
+        ("--max-scatter-rotation", "largest rotation between a frame and all frames' median {}°"),
+        ("--max-scatter-translation", "largest distance between a frame and all frames' median {} cm"),
+        ("--max-unused", "share of rejected and skipped frames {} %"),
+        ("--max-fit", "largest error expected of the matches {} px"),
+    ],
+)
+def test_limits_on_what_a_run_says_of_itself_need_no_reference(
+    own_drive: Path, capsys: pytest.CaptureFixture[str], option: str, found: str
+) -> None:
+    recorded = read_run(own_drive)
+    apart = [
+        pose_error(frame.corrected, median_pose(recorded.results)) for frame in recorded.frames if not frame.rejected
+    ]
+    expected = {
+        "--max-scatter-rotation": max(one.rotation_deg for one in apart),
+        "--max-scatter-translation": max(one.translation_cm for one in apart),
+        "--max-unused": 25.0,  # of four frames one is rejected
+        "--max-fit": max(recorded.scalars("fit/stage_5")),
+    }[option]
+    assert expected > 0
+    for share, passes in ((1.01, True), (0.99, False)):
+        _, out, err = call(capsys, own_drive, "--statistic", "max", option, share * expected)
+        assert err == "" and out.startswith("Passed: " if passes else "Failed: ")
+        assert found.format(f"{expected:.4g}") in out
+
+
+def test_the_stated_uncertainty_is_limited_as_it_is_stated(own_drive: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recorded = read_run(own_drive)
+    covariance = np.diag([0.04, 0.03, 0.0, 0.003, 0.0, 0.004]) ** 2
+    sure = Verdict("accepted", "Fine.", recorded.frames[0].corrected, covariance=covariance)
+    limits = [Limit("sigma_rotation", 0.3, "median"), Limit("sigma_translation", 4.9, "median")]
+    rotation, translation = check_run(replace(recorded, drive_verdict=sure), limits)
+    assert (rotation.value, translation.value) == pytest.approx((np.degrees(0.005), 5.0))
+    assert rotation.passed and not translation.passed
+    assert translation.sentence == "stated uncertainty of the translation, 1σ, 5 cm exceeds 4.9 cm by 0.1 cm"
+    code, _, err = call(capsys, own_drive, "--max-sigma-rotation", 1)  # the fake drive states none
+    assert code == 3 and "states no uncertainty" in err
+
+
+def test_one_frame_does_not_scatter(
+    record: Callable[..., Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(tmp_path / "own.rrd", length=1, detail="overview", as_is=True)
+    code, _, err = call(capsys, tmp_path / "own.rrd", "--max-scatter-rotation", 1)
+    assert code == 3 and "which cannot scatter" in err
 
 
 def test_without_reference_it_is_one_sentence(
