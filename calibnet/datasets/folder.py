@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
-from calibnet.datasets.images import read_image
+from calibnet.datasets.development import Development, Levels
+from calibnet.datasets.images import BY_ITSELF, read_image, read_levels
 from calibnet.datasets.lens import LOOKED_AT, Lens, Picture
 from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.pairing import Pair, pair
@@ -26,6 +27,8 @@ from calibnet.geometry.types import Extrinsic
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
+DEPTHS_LOOKED_AT = 6
+"""Pictures of a drive that tell how many bits a camera gives."""
 PERIOD = 0.1
 """Seconds between two frames: a plain folder records no time."""
 LARGEST_NUMBER = 10**10
@@ -71,7 +74,9 @@ class Folder(PairedSequence):
         real, extrinsic = self.calibration.camera, self.calibration.camera_from_lidar
         remarks = [*of_lens(real), *of_camera(central(real).pinhole), *of_extrinsic(extrinsic)]
         refuse(remarks, f"Calibration {calibration_path(root)}")
-        self._lens = Lens.of(real, extrinsic, looked_at(list(images.values()), real))
+        paths = list(images.values())
+        self._development = development_of(paths, real, self.calibration.bayer)
+        self._lens = Lens.of(real, extrinsic, looked_at(paths, real, self._development))
         self.cloud_columns = self.calibration.cloud_columns
         self.known = known_of(self.calibration, calibration_path(root))
         self._fixed = Calibration(self._lens.pinhole.matrix, extrinsic)
@@ -85,15 +90,26 @@ class Folder(PairedSequence):
 
     def _picture(self, files: FrameFiles) -> Picture:
         camera = self._lens.camera
-        return self._lens(read_image(files.needed.image, (camera.width, camera.height)))
+        return self._lens(read_image(files.needed.image, (camera.width, camera.height), self._development))
 
 
-def looked_at(images: list[Path], camera: CameraModel) -> list[NDArray[np.uint8]]:
+def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -> Development:
+    """How the pictures of a drive become eight bits; more than one is looked at where these have more."""
+    pictures = list[Levels]()
+    for position in spread(len(images), DEPTHS_LOOKED_AT):
+        with suppress(DatasetError):  # each frame says it of itself
+            pictures.append(read_levels(images[position], (camera.width, camera.height)))
+            if pictures[0].dtype == np.uint8:
+                break
+    return Development.of(pictures, bayer)
+
+
+def looked_at(images: list[Path], camera: CameraModel, development: Development = BY_ITSELF) -> list[NDArray[np.uint8]]:
     """Some pictures from all over a drive, of those that can be read; none of a pinhole's."""
     pictures = list[NDArray[np.uint8]]()
     for position in spread(len(images), 0 if camera.is_pinhole else LOOKED_AT):
         with suppress(DatasetError):
-            pictures.append(read_image(images[position], (camera.width, camera.height)))
+            pictures.append(read_image(images[position], (camera.width, camera.height), development))
     return pictures
 
 

@@ -12,8 +12,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, TiffImagePlugin
 
+from calibnet.datasets.development import Development, ImageError, Levels
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import MEGABYTE, read_file
@@ -26,8 +27,10 @@ MOST_PIXELS = 100_000_000
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
 DEPTHS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "I;16", "I;16B", "I;16L"}
 """Kinds of pixels, as Pillow calls them, that are a camera's; others have 32 bits."""
-BITS_PER_SAMPLE = 258
-"""TIFF's tag."""
+IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, SAMPLE_FORMAT = 256, 257, 258, 339
+"""TIFF's tags."""
+FLOATS = 3
+"""Sample format of TIFF."""
 MISSING, MISSING_ROWS = 128, 8
 """What a JPEG decoder puts where data is missing, and rows of it at the end that are no accident."""
 _END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
@@ -39,29 +42,45 @@ ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (
 """Column and row that each pass of an interlaced PNG starts at, and steps from one to the next."""
 
 
-class ImageError(ValueError):
-    """What is wrong with a picture, in words that continue a sentence."""
+BY_ITSELF = Development()
+"""Each picture developed as it is, without others of its drive."""
 
 
-def read_image(path: Path, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
+def read_image(
+    path: Path, size: tuple[int, int] | None = None, development: Development = BY_ITSELF
+) -> NDArray[np.uint8]:
     """Read an image as ``[H, W, 3]`` uint8 RGB; see `decode_image`.
 
     Args:
         path: the file.
         size: width and height that the calibration is for, if it says.
+        development: of the drive.
 
     Raises:
         DatasetError: the file is missing, truncated, no image, or of another size.
     """
+    try:
+        return development(read_levels(path, size))
+    except ImageError as error:
+        raise DatasetError(f"Image {path} {error}.") from None
+
+
+def read_levels(path: Path, size: tuple[int, int] | None = None) -> Levels:
+    """Read an image as it is stored; see `read_image`."""
     data = read_file(path, "Image", LARGEST_BYTES)
     try:
-        return decode_image(data, size)
+        return decode_levels(data, size)
     except ImageError as error:
         raise DatasetError(f"Image {path} {error}.") from None
 
 
 def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """An image as ``[H, W, 3]`` uint8 RGB; grey images get three equal channels, 16 bits become `eight_bits`.
+    """An image as ``[H, W, 3]`` uint8 RGB, developed by itself; see `decode_levels`."""
+    return BY_ITSELF(decode_levels(data, size))
+
+
+def decode_levels(data: bytes, size: tuple[int, int] | None = None) -> Levels:
+    """An image ``[H, W, 3]`` RGB of the depth that it is stored in; grey images get three equal channels.
 
     An orientation tag is ignored: a calibration is of the pixels as they are stored. The size is taken from the header,
     before any pixel is decoded.
@@ -73,6 +92,10 @@ def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np
     Raises:
         ImageError: it is truncated, damaged, no image, too large, or of another size.
     """
+    floats = _size_of_floats(data)
+    if floats is not None:
+        _check_size(*floats, size)
+        return _floats(data)
     damaged, truncated = (f"is {what}; copy or download it again" for what in ("damaged or not an image", "truncated"))
     if any(data.startswith(start) and data.rfind(end) < 0 for start, end in _END_OF_FILE.items()):
         raise ImageError(truncated)
@@ -84,15 +107,7 @@ def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np
             raise ImageError(f"has more than {MOST_PIXELS // 10**6} million pixels; resize it") from None
         except Exception:  # a header is parsed by many hands, which fail in as many ways
             raise ImageError(damaged) from None
-        if image.width * image.height > MOST_PIXELS:
-            raise ImageError(
-                f"is {image.width}x{image.height}, more than {MOST_PIXELS // 10**6} million pixels; resize it"
-            )
-        if size is not None and image.size != size:
-            raise ImageError(
-                f"is {image.width}x{image.height} and its calibration is for {size[0]}x{size[1]}; calibrate at the "
-                "images' size or resize them"
-            )
+        _check_size(image.width, image.height, size)
         if image.mode not in DEPTHS:
             raise ImageError(f"has pixels of an unusual kind ({image.mode}); store 8 or 16 bits a channel")
         try:
@@ -106,6 +121,45 @@ def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np
     if image.format in ("JPEG", "MPO") and (eight[-MISSING_ROWS:] == MISSING).all():
         raise ImageError("is truncated, its lower part is missing; copy or download it again")
     return _sixteen(data, damaged) if _is_deep(image, data) else eight
+
+
+def _check_size(width: int, height: int, size: tuple[int, int] | None) -> None:
+    """Hold a picture's size against what can be read, and against its calibration's."""
+    if width * height > MOST_PIXELS:
+        raise ImageError(f"is {width}x{height}, more than {MOST_PIXELS // 10**6} million pixels; resize it")
+    if size is not None and (width, height) != size:
+        raise ImageError(
+            f"is {width}x{height} and its calibration is for {size[0]}x{size[1]}; calibrate at the images' size or "
+            "resize them"
+        )
+
+
+def _size_of_floats(data: bytes) -> tuple[int, int] | None:
+    """Width and height of a TIFF whose pixels are floats; None of anything else."""
+    if data[:4] not in (b"II*\0", b"MM\0*"):
+        return None
+    try:
+        tags = TiffImagePlugin.ImageFileDirectory_v2(data[:8])
+        file = io.BytesIO(data)
+        file.seek(tags.next)
+        tags.load(file)
+        kinds = tags.get(SAMPLE_FORMAT, (1,))
+        is_float = set(kinds if isinstance(kinds, tuple) else (kinds,)) == {FLOATS}
+        return (int(tags[IMAGE_WIDTH]), int(tags[IMAGE_LENGTH])) if is_float else None
+    except Exception:  # it is damaged, which is told where it is decoded
+        return None
+
+
+def _floats(data: bytes) -> Levels:
+    """A TIFF of floats, of one channel or three, whose size was looked at."""
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
+    if image is None or image.dtype.kind != "f" or (image.ndim == 3 and image.shape[2] != 3):
+        raise ImageError("is damaged, or has float pixels of an unusual kind; store one channel or three")
+    floats = image.astype(np.float32)
+    return np.repeat(floats[..., None], 3, axis=2) if floats.ndim == 2 else np.ascontiguousarray(floats[..., ::-1])
 
 
 def _ends_flat(image: Image.Image) -> bool:
@@ -137,7 +191,7 @@ def _is_deep(image: Image.Image, data: bytes) -> bool:
     return bool(image.format == "PNG" and data[24] > 8)
 
 
-def _sixteen(data: bytes, damaged: str) -> NDArray[np.uint8]:
+def _sixteen(data: bytes, damaged: str) -> Levels:
     """A picture of 16 bits a channel, which is known to be whole."""
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), AS_STORED)
@@ -145,13 +199,7 @@ def _sixteen(data: bytes, damaged: str) -> NDArray[np.uint8]:
         image = None
     if image is None or image.dtype != np.uint16:
         raise ImageError(damaged)
-    return cv2.cvtColor(eight_bits(np.asarray(image, np.uint16)), cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-
-
-def eight_bits(image: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """The upper eight of the bits that a picture uses: cameras give 10 or 12 of them, and files 16 to hold them."""
-    used = next(bits for bits in (8, 10, 12, 14, 16) if image.max() < 1 << bits)
-    return (image >> (used - 8)).astype(np.uint8)
+    return cv2.cvtColor(np.asarray(image, np.uint16), cv2.COLOR_BGR2RGB)
 
 
 def resize_image(image: NDArray[np.uint8], camera: PinholeCamera) -> NDArray[np.uint8]:

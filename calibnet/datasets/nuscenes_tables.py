@@ -85,7 +85,7 @@ def find_tables(root: Path, version: str = "") -> Path:
         raise DatasetError(f"{root} has no tables; unpack nuScenes's metadata there: v1.0-mini/*.json, for instance.")
     for name in NEEDED:
         if not (found[0] / f"{name}.json").exists():
-            raise DatasetError(f"{found[0]} has no {name}.json; {REMEDY}.")
+            raise DatasetError(f"Table {found[0] / name}.json does not exist; {REMEDY}.")
     return found[0]
 
 

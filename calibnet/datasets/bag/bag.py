@@ -16,8 +16,8 @@ from calibnet.datasets.bag.messages import (
     TRANSFORMS,
     camera_info_of,
     columns_of,
+    levels_of,
     links_of,
-    picture_of,
 )
 from calibnet.datasets.bag.moments import STILL_M, change, periods, stillest
 from calibnet.datasets.bag.recording import BagRecording, Stamped
@@ -25,8 +25,9 @@ from calibnet.datasets.bag.topics import found_topic, info_of
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
 from calibnet.datasets.calibration_files.frames import camera_from_lidar
 from calibnet.datasets.cloud_table import CloudError
+from calibnet.datasets.development import Development, ImageError, Levels
+from calibnet.datasets.folder import DEPTHS_LOOKED_AT
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import ImageError
 from calibnet.datasets.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
@@ -110,8 +111,11 @@ class Bag:
         remarks = [*of_lens(camera), *of_camera(central(camera).pinhole), *of_extrinsic(self.camera_from_lidar)]
         refuse(remarks, f"Calibration of {self.image} in {self._bag}")
         looked_at = list[NDArray[np.uint8]]()
+        self._development = Development()
         with suppress(ImageError):  # each frame says it of itself
-            looked_at = [picture_of(first_image)]
+            first = levels_of(first_image)
+            self._development = Development.of([first] if first.dtype == np.uint8 else self._some_levels(images))
+            looked_at = [self._development(first)]
         if camera.is_pinhole or any(one.shape[:2] != (camera.height, camera.width) for one in looked_at):
             looked_at = []
         self._lens = Lens.of(camera, self.camera_from_lidar, looked_at)
@@ -140,7 +144,7 @@ class Bag:
         moment, camera = self.moments[position], self._lens.camera
         where = f"{self._bag}, {self.image} at {moment.image.seconds:.3f} s"
         try:
-            taken = picture_of(self._bag.message(self.image, moment.image.recorded).content)
+            taken = self._development(levels_of(self._bag.message(self.image, moment.image.recorded).content))
         except ImageError as error:
             raise DatasetError(f"The image of {where} {error}.") from None
         if taken.shape[:2] != (camera.height, camera.width):
@@ -163,6 +167,14 @@ class Bag:
             original=original,
             faces=faces,
         )
+
+    def _some_levels(self, images: Sequence[Stamped]) -> list[Levels]:
+        """Some pictures from all over the bag, as they are stored."""
+        found = list[Levels]()
+        for position in spread(len(images), DEPTHS_LOOKED_AT):
+            with suppress(ImageError):
+                found.append(levels_of(self._bag.message(self.image, images[position].recorded).content))
+        return found
 
     def _scan(self, at: Stamped) -> NDArray[np.float32]:
         """Clean points ``[N, 4]`` of one message."""

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.calibration_files.frames import Link
 from calibnet.datasets.cloud_table import MOST_POINTS, CloudError, Columns
-from calibnet.datasets.images import ImageError, decode_image, eight_bits
+from calibnet.datasets.development import ImageError, Levels
+from calibnet.datasets.images import decode_levels
 from calibnet.geometry import transform
 from calibnet.geometry.types import Rotation
 
@@ -62,14 +63,14 @@ def stamp_of(data: bytes, is_ros2: bool) -> float:
     return float(seconds + 1e-9 * nanoseconds)
 
 
-def picture_of(message: Any) -> NDArray[np.uint8]:
-    """``[H, W, 3]`` RGB of an image, compressed or raw.
+def levels_of(message: Any) -> Levels:
+    """``[H, W, 3]`` RGB of an image, compressed or raw, of the depth that it has.
 
     Raises:
         ImageError: it is damaged, or of an encoding that is not known here.
     """
     if not hasattr(message, "encoding"):
-        return decode_image(bytes(message.data))
+        return decode_levels(bytes(message.data))
     encoding = str(message.encoding)
     known = CHANNELS.get(encoding) or CHANNELS.get(encoding.lower())
     if known is None:
@@ -81,10 +82,9 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
         raise ImageError("has fewer bytes than its size promises")
     rows = np.asarray(message.data, np.uint8)[: message.step * message.height].reshape(message.height, message.step)
     pixels = np.ascontiguousarray(rows[:, :row]).view(dtype).reshape(message.height, message.width, channels)
-    if dtype.itemsize == 2:
-        pixels = eight_bits(pixels.astype(np.uint16))
+    pixels = pixels.astype(dtype.newbyteorder("="), copy=False)
     rgb = pixels if code is None else cv2.cvtColor(pixels if channels > 1 else pixels[..., 0], code)
-    return np.ascontiguousarray(rgb, np.uint8)
+    return np.ascontiguousarray(rgb)
 
 
 def columns_of(message: Any) -> Columns:

@@ -40,6 +40,7 @@ def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
         None if rig is None else values.pose(rig, path, "rig_from_camera"),
         None if columns is None else _columns(columns, path),
         {key: str(content[key]) for key in KNOWN if content.get(key) is not None},
+        None if content.get("bayer") is None else _bayer(content["bayer"], path),
     )
 
 
@@ -58,6 +59,17 @@ def _camera(content: Mapping[Any, Any], path: Path) -> CameraModel | None:
     matrix = values.numbers(content["camera_matrix"], "camera_matrix", path, (3, 3))
     coefficients = values.coefficients_with(content, model, content.get("distortion"), path, "distortion")
     return values.camera(size, matrix, model, coefficients, path, "distortion")
+
+
+def _bayer(pattern: Any, path: Path) -> str:
+    from calibnet.datasets.development import BAYER  # loads OpenCV
+
+    name = str(pattern).lower()
+    if name not in BAYER:
+        raise DatasetError(
+            f"Calibration {path}: bayer is {pattern!r}; give one of {', '.join(BAYER)}, or leave it out."
+        )
+    return name
 
 
 def _columns(columns: Any, path: Path) -> tuple[str, ...]:

@@ -43,6 +43,8 @@ class Layout:
     calibration: Path | None = None
     pixels: list[np.ndarray] = field(default_factory=list)
     points: list[np.ndarray] = field(default_factory=list)
+    stored: Callable[[np.ndarray], np.ndarray] = field(default=lambda points: points)
+    """Points as a scan's file has them."""
 
 
 def exact_extrinsic(rectifying: np.ndarray) -> np.ndarray:

@@ -90,16 +90,21 @@ def of_pose(pose: np.ndarray) -> dict[str, Any]:
     return {"translation": pose[:3, 3].tolist(), "rotation": wxyz.tolist()}
 
 
+def in_their_axes(points: np.ndarray) -> np.ndarray:
+    """Five columns, x to the right and y ahead."""
+    return np.column_stack([-points[:, 1], points[:, 0], points[:, 2:], np.zeros(len(points))]).astype(np.float32)
+
+
 def write_nuscenes(root: Path, world_from_later: np.ndarray | None = None) -> Layout:
     """Two scenes, of which the second is opened; its car stands, unless it is somewhere else when images are taken."""
     expected = np.linalg.inv(CAR_FROM_CAMERA) @ CAR_FROM_LIDAR @ THEIRS_FROM_OURS
     layout = Layout(opener("nuscenes", root, scene="scene-0103"), root, [0, 1, 2], K, expected)
     stems = [f"n015__{name}__{n}" for n, name in enumerate("abc")]
     write_frames(layout, root / "samples" / "CAM_FRONT", root / "samples" / "LIDAR_TOP", stems)
+    layout.stored = in_their_axes
     for scan, points in zip(layout.scans, layout.points, strict=True):
-        theirs = np.column_stack([-points[:, 1], points[:, 0], points[:, 2:], np.zeros(len(points))])
         scan.unlink()
-        theirs.astype(np.float32).tofile(scan.with_suffix(".pcd.bin"))
+        in_their_axes(points).tofile(scan.with_suffix(".pcd.bin"))
     layout.scans = [scan.with_suffix(".pcd.bin") for scan in layout.scans]
     world_from_car = rigid(small_turn(0.7, 2), [400.0, 1100.0, 0.0])
     later = world_from_car if world_from_later is None else world_from_later

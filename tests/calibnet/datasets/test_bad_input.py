@@ -12,6 +12,10 @@ from calibnet.errors import DatasetError
 
 ON_FILES = list(DATASETS.own)
 """The datasets that read images and scans from files."""
+NOT_PAIRED_BY_FOLDER = {
+    "kitti-360": "what has no partner is counted and left out, see test_kitti360.py",
+    "nuscenes": "its tables say what belongs together, see test_nuscenes.py",
+}
 
 
 def read_all(layout) -> str:
@@ -52,6 +56,8 @@ class TestEveryLayout:
 
     @pytest.mark.parametrize("kind", ["images", "scans"])
     def test_count_mismatch_names_the_missing_file(self, dataset, kind, write_layout):
+        if dataset in NOT_PAIRED_BY_FOLDER:
+            pytest.skip(NOT_PAIRED_BY_FOLDER[dataset])
         layout = write_layout(dataset)
         missing = getattr(layout, kind)[1]
         missing.unlink()
@@ -62,6 +68,8 @@ class TestEveryLayout:
             assert "2" in message
 
     def test_same_count_of_other_frames(self, dataset, write_layout):
+        if dataset in NOT_PAIRED_BY_FOLDER:
+            pytest.skip(NOT_PAIRED_BY_FOLDER[dataset])
         layout = write_layout(dataset)
         layout.scans[2].rename(layout.scans[2].with_stem("0000000042"))
         message = read_all(layout)
@@ -103,7 +111,7 @@ class TestEveryLayout:
         layout = write_layout(dataset)
         points = layout.points[1].copy()
         points[3, 1], points[10, 3], points[20, 0] = np.nan, np.nan, np.inf
-        points.tofile(layout.scans[1])
+        layout.stored(points).tofile(layout.scans[1])
         points[10, 3] = 0.0  # a point without intensity is a point
         expected = np.delete(points, [3, 20], axis=0)
         np.testing.assert_array_equal(layout.open()[1].points, expected)

@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from calibnet.conformance import check_dataset
 from calibnet.datasets.bag import Bag, BagOptions
-from calibnet.datasets.bag.messages import columns_of, picture_of
+from calibnet.datasets.bag.messages import columns_of, levels_of
 from calibnet.datasets.calibration_files import FrameChoice
+from calibnet.datasets.development import Development
 from calibnet.errors import DatasetError
 from tests.support.bags import BagWriter, write_bag
 from tests.support.fakes import make_frame
@@ -183,7 +184,7 @@ RGB = FRAMES[1].image
 )
 def test_raw_images_of_colour(encoding: str, stored: np.ndarray, tmp_path: Path) -> None:
     message = BagWriter(tmp_path / "a", "mcap").raw(stored, encoding, 1.0)
-    assert_array_equal(picture_of(message), RGB)
+    assert_array_equal(Development()(levels_of(message)), RGB)
 
 
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
@@ -192,7 +193,7 @@ def test_bayer_patterns_have_the_names_of_ros(pattern: str, tmp_path: Path) -> N
     mosaic = np.zeros((32, 32), np.uint8)
     row, column = divmod(pattern.index("r"), 2)
     mosaic[row::2, column::2] = 200
-    picture = picture_of(BagWriter(tmp_path / "a", "mcap").raw(mosaic, f"bayer_{pattern}8", 1.0))
+    picture = levels_of(BagWriter(tmp_path / "a", "mcap").raw(mosaic, f"bayer_{pattern}8", 1.0))
     assert_allclose(picture[4:-4, 4:-4].reshape(-1, 3).mean(axis=0), [200, 0, 0], atol=1)
 
 
@@ -200,8 +201,9 @@ def test_a_grey_image_of_twelve_bits(tmp_path: Path) -> None:
     grey = (np.arange(64, dtype=np.uint16) * 64).reshape(8, 8)
     bag = BagWriter(tmp_path / "a", "mcap")
     expected = np.repeat((grey >> 4).astype(np.uint8)[..., None], 3, axis=2)
-    assert_array_equal(picture_of(bag.raw(grey, "mono16", 1.0)), expected)
-    assert_array_equal(picture_of(bag.raw(grey.astype(">u2"), "mono16", 1.0, bigendian=True)), expected)
+    assert_array_equal(Development()(levels_of(bag.raw(grey, "mono16", 1.0))), expected)
+    other_way_round = bag.raw(grey.astype(">u2"), "mono16", 1.0, bigendian=True)
+    assert_array_equal(Development()(levels_of(other_way_round)), expected)
 
 
 def test_points_in_rows_with_something_behind_them(tmp_path: Path) -> None:
