@@ -19,7 +19,7 @@ from calibnet.runtime.text import one_line
 from inspector import entities
 from inspector.fleet.extra import require_extra
 from inspector.fleet.table import Row
-from inspector.record.outputs import LOCALHOST
+from inspector.programs import LOCALHOST
 
 DATASET = "fleet"
 RUN, OUTCOME = f"property:{entities.RUN}", f"property:{entities.OUTCOME}"

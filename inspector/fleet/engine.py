@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.interruption import StopRequest
 from inspector.fleet.extra import require_extra
-from inspector.record.outputs import LOCALHOST
+from inspector.programs import LOCALHOST
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from urllib.parse import quote
 
 from calibnet.errors import ConfigError
-from inspector.record.outputs import LOCALHOST, free_port, has_display, rerun_binary, start_program
+from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
+from inspector.record.outputs import has_display
 
 
 @contextmanager

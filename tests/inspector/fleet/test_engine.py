@@ -154,6 +154,6 @@ def test_no_scheduler_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def module_port() -> int:
-    from inspector.record.outputs import free_port
+    from inspector.programs import free_port
 
     return free_port()
