@@ -96,5 +96,9 @@ def restore(tensors: dict[str, Tensor], model: nn.Module, average: nn.Module, op
             index, _, key = name.partition(".")
             moments.setdefault(int(index), {})[key] = tensor
         optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
+        for parameter, of in optimizer.state.items():  # a fused step needs moments to lie in memory as weights do
+            for key, moment in of.items():
+                if moment.shape == parameter.shape:
+                    of[key] = torch.empty_like(parameter).copy_(moment)
     except (RuntimeError, ValueError, KeyError):  # lists every name and shape
         raise WeightsError("The checkpoint does not fit the network of this run; remove it to start again.") from None
