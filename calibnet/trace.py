@@ -251,6 +251,7 @@ class DriveEstimate(Estimate):
         verdict: whether the estimate is good; None from a method that does not say.
         networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
             frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
+        free: what the frames say without what is known beforehand of the extrinsic; None where nothing is.
         looks: what each frame says by itself, relative to ``looked_from``.
         looked_from: ``camera_from_lidar`` that the last look started from; None from a method without looks.
         traces: of the frames by their index, from a method that tells something of whole drives alone: each goes from
@@ -263,4 +264,5 @@ class DriveEstimate(Estimate):
     verdict: Verdict | None = None
     looks: tuple[DriveLook, ...] = field(repr=False, default=())
     looked_from: Extrinsic | None = field(repr=False, default=None)
+    free: Estimate | None = field(repr=False, default=None)
     traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)

@@ -159,7 +159,7 @@ class Cascade:
                 stages = self._run(self.stages, views, before[-1].after, detail, held)
                 trace = CascadeTrace(start, stages, clock.parts, limit, before)
             trace = replace(trace, again=self._again(views, trace, held))
-            verdict = judge(views.frame, start, trace, self.coefficients)
+            verdict = judge(views.frame, start, trace, self.coefficients, known=self.known.words)
             if held is not None and verdict.covariance is not None:
                 narrowed = held.narrowed(verdict.covariance, verdict.camera_from_lidar)
                 verdict = replace(verdict, covariance=narrowed)
@@ -192,6 +192,7 @@ class Cascade:
                 match_error_of(self.stages[0]),
                 misfit_of(self.calibrate),
                 None if lags is None else (lags, reach_of(self.calibrate)),
+                self.known.words,
             )
         return upright.undo_verdict(verdict)
 

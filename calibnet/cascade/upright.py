@@ -115,6 +115,7 @@ class Upright:
             self._real(estimate),
             history=history,
             networks=networks,
+            free=None if estimate.free is None else self._real(estimate.free),
             verdict=verdict,
             looks=looks,
             looked_from=looked_from,

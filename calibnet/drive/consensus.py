@@ -69,6 +69,11 @@ class Consensus:
             mean, covariance = self.held.fused(mean, inverse(covariance + self.common), self.before)
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
+    def free_estimate(self) -> Estimate:
+        """What the frames agree on, without what is known beforehand."""
+        mean, covariance = self.agreed()
+        return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
+
     def agreed(self) -> tuple[Vector6, Matrix6]:
         """The correction of all frames, without what is known beforehand, and its covariance."""
         if not self._vectors:

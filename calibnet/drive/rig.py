@@ -152,6 +152,10 @@ def solve_rig(
     told = look(stages[-1], everything, last=True)
     mean, covariance = joined(told, rig, held, tolerance)
     of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
+    opened = None
+    if held is not None:
+        free, spread_of_free = joined(told, rig, None, tolerance)
+        opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(looks))
     if aligns:
         too_far = (
             of_networks.rotation_deg > FARTHEST_ROTATION_DEG
@@ -168,6 +172,7 @@ def solve_rig(
         networks=of_networks if aligns else None,
         looks=tuple(looks),
         looked_from=rig,
+        free=opened,
         cameras=tuple(_of_cameras(cameras, told, found, of_camera, tolerance)),
     )
 

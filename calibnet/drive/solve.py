@@ -123,6 +123,7 @@ def solve_drive(
         networks=of_networks if aligns else None,
         looks=tuple(looks),
         looked_from=extrinsic,
+        free=None if held is None else consensus.free_estimate(),
     )
 
 

@@ -27,7 +27,8 @@ class DriveWitnesses:
         match_error: logarithm of the median match error of the last look, in pixels.
         misfit: logarithm of the frames' median misfit.
         lens: median logarithm of the cost of frames' matches with another lens, relative to that with the pose alone.
-        stated: logarithm of the deviation of the translation, in centimetres, on which the frames agree.
+        stated: logarithm of the deviation of the translation, in centimetres, on which the frames agree; without what
+            is known beforehand, which would make any drive look sure.
         scatter: logarithm of how far a frame is from what all say, in centimetres, in the median.
         halves: logarithm of how far the first half of the drive is from the second.
         aligned: logarithm of how far the alignment of edges went from what the networks say.
@@ -66,7 +67,7 @@ def drive_witnesses(
         match_error=_log(np.median([look.match_error_px for look in looks])),
         misfit=_log(np.median([look.misfit for look in looks])),
         lens=float(np.median(lens)),
-        stated=_log(networks.translation_cm),
+        stated=_log((estimate.free or networks).translation_cm),
         scatter=_log(np.median([apart(look.offset, whole) for look in looks])),
         halves=_log(apart(agreed(looks[:middle]), agreed(looks[middle:]))),
         aligned=_log(_distance(networks.camera_from_lidar, estimate.camera_from_lidar)),

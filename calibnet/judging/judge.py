@@ -30,6 +30,7 @@ def judge(
     match_error: Measure | None = None,
     misfit: Measure | None = None,
     lag: tuple[Search, Measure] | None = None,
+    known: str = "",
 ) -> Verdict:
     """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
 
@@ -41,14 +42,16 @@ def judge(
         match_error: where picture and scan do not fit, finds out why by `calibnet.judging.causes.PICTURE_AND_SCAN`.
         lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
             far a run goes.
+        known: what was known of the extrinsic beforehand, as the user said it. The doubt is fitted to runs in which all
+            axes are open, which go wrong mostly in what may be known here: it accepts then, and never rejects.
         misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
     of_scan = ranges(frame.points), up(frame.points)
     checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan, bit_depth(frame.image)]
     seen = [remark for remark in checks if remark is not None]
-    known = {remark.name for remark in seen}
-    remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in known)]  # those of when it was read
+    said = {remark.name for remark in seen}
+    remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in said)]  # those of when it was read
     suspects = tuple(map(_suspect, remarks))
 
     def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
@@ -97,6 +100,12 @@ def judge(
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "What the network tells of its matches is not enough to judge them.", suspects)
     reason = f"Picture and scan fit, but not as well as in runs that end right (an error is {wrong:.0%} likely)."
+    if known:
+        reason = (
+            "Picture and scan fit, but not as well as in runs that end right (if no axis were known, an error would be "
+            f"{wrong:.0%} likely; with {known} it is less so, how much cannot be told)."
+        )
+        return verdict(CANNOT_TELL, reason, why(LENSES, misfit))
     return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why(LENSES, misfit))
 
 

@@ -82,3 +82,12 @@ def test_witnesses_of_a_drive() -> None:
     lone = replace(estimate(), looks=estimate().looks[:1])
     assert drive_witnesses(lone, REFERENCE, RANGES[2]) is None
     assert judge_drive(lone, REFERENCE, RANGES[2], DOUBT).word == "cannot tell"
+
+
+def test_what_is_known_beforehand_does_not_make_a_drive_look_sure() -> None:
+    """With its place fixed a drive states no deviation of it; what its frames would say alone is the witness."""
+    free = estimate(centimetres=3.0)
+    held = replace(estimate(centimetres=1e-4), free=free)
+    alone, fixed = (drive_witnesses(one, REFERENCE, RANGES[2]) for one in (free, held))
+    assert alone is not None and fixed is not None
+    assert fixed.stated == pytest.approx(alone.stated)

@@ -45,6 +45,18 @@ def test_what_fits_less_well_cannot_be_told_and_then_is_rejected() -> None:
     assert words == [ACCEPTED, CANNOT_TELL, REJECTED]
 
 
+def test_what_is_known_beforehand_is_never_rejected_by_doubt_alone() -> None:
+    """It was fitted to runs whose axes are all open; what speaks against picture and scan does so as ever."""
+    fixed = "x, y, z fixed"
+    verdicts = [
+        judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), DOUBT, known=fixed) for error in (1.4, 2.0, 4.2)
+    ]
+    assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, CANNOT_TELL]
+    assert "81% likely; with x, y, z fixed it is less so" in verdicts[2].reason
+    lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), DOUBT, known=fixed)
+    assert lost.word == REJECTED
+
+
 def test_a_trace_without_matches_cannot_be_told() -> None:
     verdict = judge(
         FRAME, GUESS, run(GUESS, REFERENCE, None, match_error=1.2), fitted(Doubt(0.0, {"misfit": 1.0}, 0.6, 0.8))
