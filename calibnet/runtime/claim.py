@@ -9,6 +9,7 @@ import contextlib
 import itertools
 import os
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -37,16 +38,7 @@ class Claim:
         self.earlier: Path | None = None
         self._lock: FileLock | None = None
         check_output(path, kind)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=PATIENCE_S)
-            lock.acquire()
-        except Timeout:
-            raise BusyError(f"{path} is being written by another run; choose another name, or wait for it.") from None
-        except OSError as error:
-            reason = os.strerror(error.errno) if error.errno else str(error)
-            raise OutputError(f"{path} cannot be written ({reason}); choose another path.") from None
-        self._lock = lock
+        self._lock = _lock(path)
 
     @classmethod
     def of_new(cls, path: Path, kind: Kind) -> Claim:
@@ -94,10 +86,42 @@ class Claim:
         """Let others write the file; an earlier one stays where it was put."""
         lock, self._lock = self._lock, None
         if lock is not None:
-            with contextlib.suppress(OSError):
-                Path(lock.lock_file).unlink()  # while it is held: whoever waits for it opens a new one
-            lock.release()
+            _unlock(lock)
 
 
 class BusyError(OutputError):
     """Another process writes the file."""
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Be the only process that writes a file, which is replaced as a whole again and again, while this lasts.
+
+    Raises:
+        BusyError: another process has it.
+        OutputError: the folder cannot be written.
+    """
+    lock = _lock(path)
+    try:
+        yield
+    finally:
+        _unlock(lock)
+
+
+def _lock(path: Path) -> FileLock:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=PATIENCE_S)
+        lock.acquire()
+    except Timeout:
+        raise BusyError(f"{path} is being written by another run; choose another name, or wait for it.") from None
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise OutputError(f"{path} cannot be written ({reason}); choose another path.") from None
+    return lock
+
+
+def _unlock(lock: FileLock) -> None:
+    with contextlib.suppress(OSError):
+        Path(lock.lock_file).unlink()  # while it is held: whoever waits for it opens a new one
+    lock.release()

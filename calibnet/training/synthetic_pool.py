@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import io
+import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 
 from calibnet.datasets import Frame
+from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
+from calibnet.runtime.reading import MEGABYTE, read_file
 from calibnet.runtime.writing import write_whole
 
+LARGEST = 64 * MEGABYTE
+"""Of a scene's file, packed or not; one has 3 to 5."""
 ROBOT_EVERY = 4
 """One of so many scenes is a robot's, mostly in a hall, instead of a car's."""
 
@@ -36,10 +41,16 @@ class SyntheticPool:
         """Scene ``position``; rendered if no earlier run left it in the folder."""
         robot = position % ROBOT_EVERY == ROBOT_EVERY - 1
         path = self.folder / f"{self.seed}-{position:06d}{'-robot' if robot else ''}.npz"
-        if path.exists():
+        if os.path.lexists(path):
             try:
                 return _unpack(path)
-            except (ValueError, OSError, KeyError, EOFError, BadZipFile):  # cut short: draw it again
+            except (
+                ValueError,
+                DatasetError,
+                KeyError,
+                EOFError,
+                BadZipFile,
+            ):  # cut short, or not of ours: draw it again
                 path.unlink(missing_ok=True)
         from calibnet.datasets.synthetic import sample_frame, sample_robot_frame
 
@@ -61,7 +72,12 @@ def _pack(frame: Frame) -> bytes:
 
 
 def _unpack(path: Path) -> Frame:
-    with np.load(path, allow_pickle=False) as file:
-        image = file["image"]
+    data = io.BytesIO(read_file(path, "Synthetic scene", LARGEST, remedy="remove it"))
+    if sum(member.file_size for member in ZipFile(data).infolist()) > LARGEST:
+        raise ValueError("unpacked it is larger than any scene")
+    with np.load(data, allow_pickle=False) as file:
+        image, points = file["image"], file["points"]
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or points.ndim != 2:
+            raise ValueError("no picture and no points")
         camera = PinholeCamera(image.shape[1], image.shape[0], file["matrix"])
-        return Frame(0, 0.0, image, file["points"], camera, file["camera_from_lidar"], str(path))
+        return Frame(0, 0.0, image, points, camera, file["camera_from_lidar"], str(path))

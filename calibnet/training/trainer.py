@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import cast
@@ -16,6 +17,7 @@ from calibnet.errors import CalibrationError, ConfigError
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.claim import locked
 from calibnet.runtime.interruption import StopRequest
 from calibnet.runtime.writing import Kind, check_output
 from calibnet.training.batches import Batch, next_batch, open_batches
@@ -88,9 +90,14 @@ class Trainer:
 
         Raises:
             KeyboardInterrupt: a signal ended the run; its checkpoint is written.
+            BusyError: another process trains this stage into this folder.
             ConfigError: the budget ended within the warm-up, so that there is no pose to write.
             CalibrationError: the loss is no number any more.
         """
+        with locked(self.checkpoint) if self.fabric.is_global_zero else nullcontext():
+            return self._run()
+
+    def _run(self) -> Path:
         options = self.options
         batches = open_batches(self.fabric, self.training.samples, self.steps, options.batch, options.workers)
         self.model.train()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import urllib.request
 from pathlib import Path
 from urllib.error import URLError
 
 from calibnet.errors import CalibnetError
+from calibnet.runtime.writing import write_whole
 from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
@@ -30,8 +30,8 @@ def fetch_viewer(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name in VIEWER_FILES:
             address = f"http://{LOCALHOST}:{web_port}/{name}"
-            with urllib.request.urlopen(address, timeout=60) as answer, (folder / name).open("wb") as file:
-                shutil.copyfileobj(answer, file)
+            with urllib.request.urlopen(address, timeout=60) as answer:
+                write_whole(folder / name, answer.read())
     except URLError as error:
         raise ViewerFilesError(
             f"The installed Rerun does not hand out its web viewer ({error.reason}); reinstall rerun-sdk."

@@ -12,6 +12,7 @@ from calibnet.datasets.synthetic.sequence import SyntheticSequence
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert
 from calibnet.geometry.types import Floats, Transform
+from calibnet.runtime.writing import Kind, write_whole
 
 
 def write_kitti_odometry(
@@ -48,9 +49,9 @@ def write_kitti_odometry(
         projection = np.column_stack([sequence.mount.camera.matrix, np.zeros(3)])
         extrinsic = sequence.mount.camera_from_lidar[:3]
         rows = [*(f"P{camera}: {_numbers(projection)}" for camera in range(4)), f"Tr: {_numbers(extrinsic)}"]
-        (folder / "calib.txt").write_text("\n".join(rows) + "\n")
-        (folder / "times.txt").write_text("\n".join(times) + "\n")
-        poses.write_text("\n".join(_numbers(pose[:3]) for pose in _camera_poses(sequence)) + "\n")
+        write_whole(folder / "calib.txt", ("\n".join(rows) + "\n").encode())
+        write_whole(folder / "times.txt", ("\n".join(times) + "\n").encode())
+        write_whole(poses, ("\n".join(_numbers(pose[:3]) for pose in _camera_poses(sequence)) + "\n").encode())
     except OSError as error:
         where = error.filename or folder
         raise DatasetError(f"{where} cannot be written ({error.strerror}); choose another folder.") from None
@@ -62,8 +63,8 @@ def _write_frame(frame: Frame, folder: Path) -> None:
 
     stem = f"{frame.index:06d}"
     png = cv2.imencode(".png", cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR))[1]
-    (folder / "image_2" / f"{stem}.png").write_bytes(png.tobytes())
-    (folder / "velodyne" / f"{stem}.bin").write_bytes(frame.points.astype("<f4").tobytes())
+    write_whole(folder / "image_2" / f"{stem}.png", png.tobytes(), Kind.PNG)
+    write_whole(folder / "velodyne" / f"{stem}.bin", frame.points.astype("<f4").tobytes())
 
 
 def _camera_poses(sequence: SyntheticSequence) -> list[Transform]:

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -38,6 +41,39 @@ def test_a_scene_cut_short_is_drawn_again(tmp_path: Path, monkeypatch: pytest.Mo
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:keep])
     assert np.array_equal(pool[0].points, expected)
+
+
+def bomb(path: Path) -> None:
+    """Half a megabyte that unpacks to 500 MB."""
+    with ZipFile(path, "w", ZIP_DEFLATED, compresslevel=9) as file:
+        file.writestr("image.npy", bytes(500 << 20))
+
+
+@pytest.mark.parametrize(
+    "put",
+    [
+        os.mkfifo,
+        lambda path: path.symlink_to("/dev/zero"),
+        lambda path: path.symlink_to("nowhere"),
+        bomb,
+        lambda path: np.savez(path, image=np.zeros((4, 4)), points=np.zeros((2, 4))),
+        lambda path: np.savez(path, image=np.zeros((4, 4, 3), np.uint8), points=np.array([print], object)),
+    ],
+)
+def test_what_is_no_scene_gives_way_to_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, put: Callable[[Path], object]
+) -> None:
+    """The cache lies in a folder that others can write to."""
+    from calibnet.datasets import synthetic
+
+    monkeypatch.setattr(synthetic, "sample_frame", lambda seed: make_frame(1))
+    pool = SyntheticPool(5, 2, tmp_path)
+    expected = pool[0].points
+    (file,) = tmp_path.iterdir()
+    file.unlink()
+    put(file)
+    assert np.array_equal(pool[0].points, expected)
+    assert file.is_file() and not file.is_symlink()
 
 
 def test_one_scene_of_four_is_a_robots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

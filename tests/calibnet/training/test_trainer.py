@@ -21,6 +21,7 @@ from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsErr
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.network.efficientnet import load_weights
 from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.claim import BusyError, locked
 from calibnet.training import build as build_module
 from calibnet.training import trainer as trainer_module
 from calibnet.training.losses import cosines_loss
@@ -63,6 +64,14 @@ def test_training_teaches_the_features_to_match(tiny_world: Scenes, tmp_path: Pa
     assert held_out_matching(trainer.network) > guessing
     trainer.run()
     assert held_out_matching(trainer.network) < guessing - 0.2
+
+
+def test_two_runs_of_a_stage_do_not_write_one_folder(tiny_world: Scenes, tmp_path: Path) -> None:
+    first, second = (trainer_of(options(tmp_path, batches=2)) for _ in range(2))
+    with locked(first.checkpoint), pytest.raises(BusyError, match=r"checkpoint is being written by another run"):
+        second.run()
+    assert not list(tmp_path.iterdir()), "nothing of the second is written"
+    first.run()
 
 
 def test_a_run_ends_with_weights_a_record_and_figures(tiny_world: Scenes, tmp_path: Path) -> None:
