@@ -1,4 +1,4 @@
-"""Checkpoints: what is restored goes on as if nothing had happened, with fused steps and weights in channels-last too."""
+"""Checkpoints: what is restored goes on as if nothing had happened, with fused steps and channels-last weights too."""
 
 from __future__ import annotations
 
