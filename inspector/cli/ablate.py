@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,14 +24,13 @@ from inspector.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.console import Console
 
     from calibnet.geometry import MiscalibrationRange
 
 FILE = click.Path(dir_okay=False, path_type=Path)
-COLUMNS = ("preset", "without", "rig", "parameters", "multiply-adds", "latency", "rotation", "translation")
-NAMES = 3
-"""Columns that are names; the others are numbers."""
+NAMES = ("without", "rig")
+COLUMNS = (*NAMES, "parameters", "multiply-adds", "latency", "rotation", "translation")
 
 
 @click.command()
@@ -90,9 +89,7 @@ def ablate(
             presets or ("compact", "paper"), range_, weights, data, frames, repeats, seed, timed, threads
         )
     if json_file != "-":
-        console_beside(json_file).print(ablation_table(content))
-        for why in dict.fromkeys(row["why"] for row in content["rows"] if "why" in row):
-            say(why)
+        print_ablation(content, console_beside(json_file))
     write_json(json_file, content)
     if markdown_file is not None:
         write(markdown_file, as_markdown(content).encode(), Kind.EXPORT)
@@ -174,45 +171,51 @@ def cells(row: dict[str, Any]) -> tuple[str, ...]:
     claim, took = CLAIMS[row["name"]], row["latency_ms"]
     rotation, translation = row.get("rotation_deg"), row.get("translation_cm")
     return (
-        row["preset"],
-        "(nothing: full)" if row["name"] == "full" else row["name"],
+        "– (full)" if row["name"] == "full" else row["name"],
         row.get("rig", ""),
         f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
         f"{row['multiply_adds'] / 1e9:.2f} G ({claim.flops_g:g})",
         "" if took is None else f"{took:.0f} ms ({claim.latency_ms:g})",
-        "" if rotation is None else f"{rotation['mean']:.2f}° ({claim.rotation_deg:g}°)",
-        "" if translation is None else f"{translation['mean']:.1f} cm ({claim.translation_cm:g} cm)",
+        "" if rotation is None else f"{rotation['mean']:.2f}° ({claim.rotation_deg:g})",
+        "" if translation is None else f"{translation['mean']:.1f} cm ({claim.translation_cm:g})",
     )
 
 
-def ablation_table(content: dict[str, Any]) -> Table:
-    """A line a row, for the terminal."""
+def tables(content: dict[str, Any]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """A table for each preset: its name, the heads of the columns that have something in them, and its lines."""
+    for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
+        lines = [cells(row) for row in content["rows"] if row["preset"] == preset]
+        used = [position for position in range(len(COLUMNS)) if any(line[position] for line in lines)]
+        yield preset, tuple(COLUMNS[k] for k in used), [tuple(line[k] for k in used) for line in lines]
+
+
+def print_ablation(content: dict[str, Any], console: Console) -> None:
+    """The tables on the terminal, and why rows have no errors."""
     from rich.table import Table
 
-    table = Table(title=title(content))
-    for position, name in enumerate(COLUMNS):
-        table.add_column(name, justify="left" if position < NAMES else "right", overflow="fold")
-    before = ""
-    for row in content["rows"]:
-        if before and row["preset"] != before:
-            table.add_section()
-        before = row["preset"]
-        table.add_row(*cells(row))
-    return table
+    for preset, heads, lines in tables(content):
+        table = Table(title=f"{preset}: {title(content)}")
+        for head in heads:
+            table.add_column(head, justify="left" if head in NAMES else "right", overflow="fold")
+        for line in lines:
+            table.add_row(*line)
+        console.print(table)
+    for why in dict.fromkeys(row["why"] for row in content["rows"] if "why" in row):
+        say(why, err=console.stderr)
 
 
 def as_markdown(content: dict[str, Any]) -> str:
     """The same for documents."""
+    parts = [f"# {title(content)}"]
+    for preset, heads, lines in tables(content):
+        marks = "".join("---|" if head in NAMES else "---:|" for head in heads)
+        table = ["| " + " | ".join(heads) + " |", "|" + marks, *("| " + " | ".join(line) + " |" for line in lines)]
+        parts += [f"## {preset}", "\n".join(table)]
     of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
-    lines = [
-        f"{title(content)}.",
-        "",
-        "| " + " | ".join(COLUMNS) + " |",
-        "|" + "---|" * NAMES + "---:|" * (len(COLUMNS) - NAMES),
-        *("| " + " | ".join(cells(row)) + " |" for row in content["rows"]),
-        "",
+    parts.append(
         f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "
         f"multiply-adds at {content['input'][0]} x {content['input'][1]}; latency of one look on "
-        f"{content['processor']}, {content['threads']} threads. Made by calib-inspect ablate.",
-    ]
-    return "\n".join(lines) + "\n"
+        f"{content['processor']}, {content['threads']} threads. Made by calib-inspect ablate."
+    )
+    parts += dict.fromkeys(row["why"] for row in content["rows"] if "why" in row)
+    return "\n\n".join(parts) + "\n"

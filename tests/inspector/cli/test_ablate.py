@@ -27,7 +27,9 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
     assert rows["full"]["latency_ms"] is None
     assert capsys.readouterr().out.count("train --preset compact --ablation ROW --range 5/0.5") == 1
     assert run(cli, ["ablate", "--from", str(out), "--markdown", str(page)]) == 0
-    assert "| compact | (nothing: full) |  | 2.65 M (20.5) |" in page.read_text()
+    written = page.read_text()
+    assert "## compact" in written and "| without | parameters | multiply-adds |\n" in written
+    assert "| – (full) | 2.65 M (20.5) | 3.13 G (78.3) |" in written
 
 
 @pytest.mark.parametrize(
