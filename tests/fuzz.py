@@ -93,6 +93,25 @@ def _manifest(data: bytes) -> object:
     return _as_file("compact.toml", data, lambda path: load_manifest("compact", path.parent))
 
 
+def _drives(data: bytes) -> object:
+    from inspector.fleet.drives import find_drives
+
+    return _as_file("d.csv", data, lambda path: find_drives([str(path)]))
+
+
+def _fleet_table(data: bytes) -> object:
+    from inspector.fleet.table import read_table
+
+    return _as_file("fleet.parquet", data, read_table)
+
+
+def _table_seed() -> bytes:
+    from inspector.fleet.drives import Drive
+    from inspector.fleet.table import row_of, table_bytes
+
+    return table_bytes([row_of(Drive("a", "b", "folder", "/d"), verdict="accepted", camera_from_lidar=(1.0,) * 16)])
+
+
 def _preset(data: bytes) -> object:
     from calibnet.network.config import parse_config
     from calibnet.runtime.reading import parse_toml
@@ -167,6 +186,8 @@ TARGETS: dict[str, Target] = {
     "manifest": Target(
         _manifest, ((weights.PACKAGE / "compact.toml").read_bytes(),), (b"nan", b"inf", b"[[stages]]", b"looks = ")
     ),
+    "drives": Target(_drives, (b"path,car,drive,date,dataset,options\nx,a,b,2026-01-01,folder,--seed 1\n",), WORDS),
+    "fleet table": Target(_fleet_table, (_table_seed(),)),
     "preset": Target(
         _preset, ((weights.PACKAGE.parent / "network/presets/compact.toml").read_bytes(),), (b"nan", b"[", b"999999999")
     ),

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 from unittest import mock
 
-from tests.hostile import calibrations, clouds, names, options, outputs, pictures, recordings, texts, weights
+from tests.hostile import calibrations, clouds, fleets, names, options, outputs, pictures, recordings, texts, weights
 
 ROWS = list(
     itertools.chain(
@@ -22,6 +22,7 @@ ROWS = list(
         outputs.rows(),
         names.rows(),
         options.rows(),
+        fleets.rows(),
     )
 )
 

@@ -1,0 +1,45 @@
+"""Lists of drives, and tables of a fleet, that are not what they should be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+from tests.hostile.rows import FINE, Row, dangling, endless, fifo, folder, giant, loop
+
+LIST, TABLE = "DRIVES.csv", "fleet.parquet"
+LISTS = {
+    "nothing": (b"", "names no drive"),
+    "no text": (b"path\n\xff\xfe\n", "not a text file"),
+    "a null in a name": (b"path,car\nx,a\0b\n", ""),
+    "a drive of the fleet's own folder": (b"path,options\nx,--report /tmp/elsewhere\n", "not for a single drive"),
+    "an option that writes": (b"path,options\nx,--save=/tmp/elsewhere.rrd\n", "not for a single drive"),
+    "an option that there is not": (b"path,options\nx,--shell\n", "row 1"),
+    "an option as a path": (b"path,dataset,sequence\nx,kitti-raw,2011_09_26 --help\n", "row 1"),
+    "a field that is too long": (b"path,car\nx," + b"a" * 5000 + b"\n", "row 1"),
+}
+
+
+def rows() -> Iterator[Row]:
+    """Every list, and every table."""
+    for what, (data, words) in LISTS.items():
+
+        def write(root: Path, data: bytes = data) -> list[str]:
+            (root / LIST).write_bytes(data)
+            return _fleet()
+
+        code = FINE if not words else 3
+        yield Row(f"list of drives: {what}", write, code, (words,) if words else (), ("out",))
+    for make in (fifo, endless, dangling, loop, folder, giant):
+        yield Row(f"list of drives: {make.__name__}", partial(_at, make, LIST, _fleet()), 3, (LIST,), ("out",))
+        yield Row(f"table of a fleet: {make.__name__}", partial(_at, make, TABLE, ["fleet-report", "."]), 3, (TABLE,))
+
+
+def _fleet() -> list[str]:
+    return ["fleet", LIST, "--out", "out", "--workers", "0"]
+
+
+def _at(make: Callable[[Path], None], name: str, command: list[str], root: Path) -> list[str]:
+    make(root / name)
+    return command
