@@ -142,6 +142,8 @@ def do_drive(task: Task) -> Row:
     Raises:
         DriveFailed: it cannot be done.
     """
+    from inspector.record.stream import release_closed
+
     with _one_at_a_time:
         started = time.monotonic()
         try:
@@ -156,6 +158,8 @@ def do_drive(task: Task) -> Row:
                 row = _verified(task, path, started)
         except (CalibnetError, OSError) as error:
             raise _failed(error) from None
+        finally:
+            release_closed()
         write_entry(task.store, task.drive, Entry(key, row, task.run))
         return row
 

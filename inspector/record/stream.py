@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from datetime import timedelta
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
+import rerun_bindings
 
 from calibnet.errors import CalibnetError, ConfigError
 from inspector.record.flushing import RecordingLostError, flush
@@ -111,3 +113,12 @@ def _growing(path: Path) -> rr.FileSink:
         return rr.FileSink(path, write_footer=False)
     except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
         raise ConfigError(f"{path} cannot be written: {error}.") from None
+
+
+def release_closed() -> None:
+    """Let go of the threads and the memory of streams that are closed; for processes that record again and again.
+
+    Of each recording Rerun 0.41 still keeps its layout, 7 MB and two threads, until the process ends.
+    """
+    gc.collect()
+    rerun_bindings.flush_and_cleanup_orphaned_recordings()

@@ -62,6 +62,17 @@ def slow(piece: tuple[Path, int]) -> int:
     return number
 
 
+kept: list[bytearray] = []
+
+
+def hoard(piece: tuple[Path, int]) -> int:
+    """Keeps 100 MB of every piece."""
+    folder, number = piece
+    note(folder, f"{number} {os.getpid()}")
+    kept.append(bytearray(os.urandom(1 << 20) * 100))
+    return number
+
+
 def lines(folder: Path) -> list[str]:
     return (folder / "log.txt").read_text().splitlines()
 
@@ -89,6 +100,14 @@ def test_what_kills_two_workers_is_given_up(tmp_path: Path) -> None:
     assert type(outcomes[1].error).__name__ == "KilledWorker"
     assert [outcomes[number].done for number in (0, 2, 3)] == [0, 2, 3]
     assert lines(tmp_path).count("1") == 2
+
+
+def test_a_worker_whose_memory_fills_starts_anew_between_two_pieces(tmp_path: Path) -> None:
+    pieces = [(tmp_path, number) for number in range(6)]
+    done = sorted(outcome.done or 0 for outcome in run_all(Engine(1, memory="600MB"), hoard, pieces, StopRequest()))
+    assert done == list(range(6))
+    processes = [line.split()[1] for line in lines(tmp_path)]
+    assert len(set(processes)) >= 2
 
 
 @pytest.mark.parametrize("workers", [0, 1])
