@@ -21,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import FrameType
+from types import FrameType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -282,11 +282,10 @@ def _guided(atheris: Any, name: str, seconds: float, corpus: Path | None) -> int
     folder.mkdir(parents=True, exist_ok=True)
     for number, seed in enumerate(target.seeds):
         (folder / f"seed-{number}").write_bytes(seed)
-    with atheris.instrument_imports(
-        include=["calibnet.runtime", "calibnet.datasets", "calibnet.weights", "inspector.read"]
-    ):
-        for seed in target.seeds:  # imports what the target imports lazily
-            try_one(name, seed)
+    for seed in target.seeds:  # imports what the target imports lazily
+        try_one(name, seed)
+    for function in _functions(("calibnet.runtime", "calibnet.datasets", "calibnet.weights", "inspector.read")):
+        atheris.instrument_func(function)
 
     def one(data: bytes) -> None:
         nonlocal count
@@ -303,6 +302,18 @@ def _guided(atheris: Any, name: str, seconds: float, corpus: Path | None) -> int
     atheris.Setup([sys.argv[0], *options, "-print_final_stats=1", str(folder)], one, enable_python_coverage=True)
     atheris.Fuzz()
     return count
+
+
+def _functions(packages: tuple[str, ...]) -> list[FunctionType]:
+    """Every function of the modules of some packages that are imported by now, as many are before atheris is."""
+    found = []
+    for module in [module for name, module in sys.modules.items() if name.startswith(packages)]:
+        for one in list(vars(module).values()):
+            for function in [one, *(vars(one).values() if isinstance(one, type) else ())]:
+                plain = getattr(function, "__func__", getattr(function, "__wrapped__", function))
+                if isinstance(plain, FunctionType) and plain.__module__ == module.__name__:
+                    found.append(plain)
+    return list(dict.fromkeys(found))
 
 
 def _hang(_: int, __: FrameType | None) -> None:

@@ -131,6 +131,10 @@ def environment_sentence(error: OSError | ImportError) -> str | None:
         package = SYSTEM_PACKAGES.get(name)
         how = f"; on Debian: apt-get install -y {package}" if package else " with your system's package manager"
         return f"The system library {name} is missing, install it{how}."
+    if isinstance(error, ImportError) and "shared object" in str(error):
+        return (
+            f"A library cannot be loaded ({error}): there is too little memory for it, or it has to be installed again."
+        )
     if not isinstance(error, OSError) or error.errno is None:
         return None
     where = f"{os.fsdecode(error.filename)}: " if isinstance(error.filename, str | bytes) else ""

@@ -17,6 +17,8 @@ import pytest
 
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind, OutputError, write_whole
+from inspector.read.run import read_run
+from tests import kills
 
 SIZE = 4_000_000
 WRITE_FOR_EVER = """
@@ -90,6 +92,13 @@ def test_a_killed_recording_leaves_itself_and_the_earlier_one(tmp_path: Path) ->
         contents = [path.read_bytes() for path in [file, *aside] if path.exists()]
         assert contents.count(b"RRF2 earlier") == 1, f"after {number} kills"
         assert all(content[:4] in (b"RRF2", b"") for content in contents)
+
+
+@pytest.mark.parametrize("kind", ["recording", "indexing"])
+def test_a_killed_run_leaves_every_frame_that_was_recorded(kind: str, tmp_path: Path) -> None:
+    """Many more by hand: ``python -m tests.kills``."""
+    kills.killed(kills.KINDS[kind], tmp_path, random.Random(3))
+    assert read_run(tmp_path / "run.rrd").frames
 
 
 def test_two_processes_on_one_recording(tmp_path: Path) -> None:

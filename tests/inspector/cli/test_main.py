@@ -82,6 +82,7 @@ def test_wrong_usage_exits_2(arguments: list[str], capsys: pytest.CaptureFixture
             "apt-get install -y libusb-1.0-0",
         ),
         (ImportError("libfoo.so.2: cannot open shared object file"), 3, "libfoo.so.2 is missing, install it with"),
+        (ImportError("cv2.so: failed to map segment from shared object"), 3, "cannot be loaded (cv2.so: failed to map"),
         (KeyboardInterrupt(), 130, "Interrupted."),
         (click.Abort(), 130, "Interrupted."),
     ],

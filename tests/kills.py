@@ -1,0 +1,141 @@
+"""Kill -9 at random moments of recording, indexing, reporting and exporting, and what is left.
+
+    python -m tests.kills [--times 5] [--seed 0] [KIND ...]
+
+A few of each are in the tests (`tests/hostile/test_kills.py`); many are for the hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+RECORD = """
+import sys
+from pathlib import Path
+from inspector.record.contents import Contents, Detail
+from inspector.record.observation import Layout
+from inspector.record.outputs import Outputs
+from inspector.record.recording import Recording, RunDescription
+from tests.inspector.record.long_run import at, observations
+made = observations(small=True)
+outputs = Outputs(Path(sys.argv[1]))
+outputs.check()
+layout = Layout.of(made[0], Contents.of(Detail.OVERVIEW))
+recording = Recording(outputs.open(), RunDescription("killed", {"seed": 0}), layout)
+for index in range(int(sys.argv[2])):
+    recording.log(at(made[index % len(made)], index))
+    print(index, flush=True)
+print("indexing", flush=True)
+recording.close()
+outputs.complete()
+"""
+COMMAND = (
+    "import sys; print('begun', flush=True); from inspector.cli.main import main; sys.argv[0] = 'calib-inspect'; main()"
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is killed.
+
+    Attributes:
+        command: to run in a folder, which holds ``whole.rrd``.
+        since: the line of its output after which it is killed.
+        within: seconds after that.
+        check: looks at what is left, given the lines that were said; raises ``AssertionError``.
+    """
+
+    command: list[str]
+    since: str
+    within: float
+    check: Callable[[Path, list[str]], None]
+
+
+def killed(kind: Kind, folder: Path, draw: random.Random) -> bool:
+    """Run and kill once; returns whether it was still running."""
+    process = subprocess.Popen(kind.command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    assert process.stdout is not None
+    said = []
+    for line in process.stdout:
+        said.append(line.strip())
+        if said[-1] == kind.since:
+            break
+    time.sleep(draw.uniform(0, kind.within))
+    running = process.poll() is None
+    process.kill()
+    said += [line.strip() for line in process.stdout]
+    process.wait()
+    kind.check(folder, said)
+    return running
+
+
+def check_recording(folder: Path, said: list[str]) -> None:
+    """Every frame that was said to be recorded is read."""
+    from inspector.read.run import read_run
+
+    logged = [int(line) for line in said if line.isdigit()]
+    found = [frame.index for frame in read_run(folder / "run.rrd").frames]
+    assert found[: len(logged)] == logged, f"{len(logged)} frames were recorded, {len(found)} are there"
+
+
+def check_report(folder: Path, _: list[str]) -> None:
+    """What is there of a report is whole."""
+    report = folder / "report"
+    if (report / "metrics.json").exists():
+        json.loads((report / "metrics.json").read_text())
+    if (report / "index.html").exists():
+        assert (report / "index.html").read_text().rstrip().endswith("</html>")
+
+
+def check_export(folder: Path, _: list[str]) -> None:
+    """The export is the earlier one or the new one."""
+    if (folder / "out.json").exists():
+        json.loads((folder / "out.json").read_text())
+
+
+KINDS = {
+    "recording": Kind([sys.executable, "-c", RECORD, "run.rrd", "1000"], "2", 3.0, check_recording),
+    "indexing": Kind([sys.executable, "-c", RECORD, "run.rrd", "25"], "indexing", 0.6, check_recording),
+    "reporting": Kind(
+        [sys.executable, "-c", COMMAND, "report", "whole.rrd", "--out", "report"], "begun", 12.0, check_report
+    ),
+    "exporting": Kind(
+        [sys.executable, "-c", COMMAND, "export", "whole.rrd", "--format", "json", "--output", "out.json"],
+        "begun",
+        6.0,
+        check_export,
+    ),
+}
+
+
+def main() -> None:
+    """Kill every kind so many times."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(KINDS))
+    parser.add_argument("--times", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    draw = random.Random(asked.seed)
+    with tempfile.TemporaryDirectory() as base:
+        folder = Path(base)
+        subprocess.run([sys.executable, "-c", RECORD, "whole.rrd", "3"], cwd=folder, check=True, capture_output=True)
+        for name in asked.kinds or KINDS:
+            running = sum(killed(KINDS[name], folder, draw) for _ in range(asked.times))
+            left = sorted(path.name for path in folder.iterdir() if path.name.endswith(".partial"))
+            sys.stdout.write(
+                f"{name}: {asked.times} kills, {running} of them while it ran; nothing lost; left {left}\n"
+            )
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
