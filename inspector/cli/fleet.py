@@ -146,7 +146,8 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
         gone = str(error)
     in_order = keep_table(tasks, rows)
     seconds = time.monotonic() - started
-    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}; {len(pieces)} looked at in {seconds:.0f} s.")
+    new = len(in_order) - (len(tasks) - len(pieces))
+    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {new} of them done now, in {seconds:.0f} s.")
     say(f"Table: {store.root}/{TABLE}")
     if interrupted or gone:
         again = shlex.join(["calib-inspect", *sys.argv[1:]]) if "--force" not in sys.argv else "it without --force"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,20 +75,20 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     files = [folder / row.recording for row in rows if row.recording and (folder / row.recording).is_file()]
     if not files:
         raise ConfigError(f"{folder} holds no recording of the drives in its table; run `calib-inspect fleet` again.")
-    with tempfile.TemporaryDirectory(prefix="calib-inspect-") as layouts:
+    with ExitStack() as stack:
+        layouts = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
         try:
-            with rr.server.Server(host=LOCALHOST, datasets={DATASET: list(files)}) as server:
-                dataset = server.client().get_dataset(DATASET)
-                columns = {field.name for field in dataset.segment_table().schema()}
-                table = Path(layouts) / "table.rbl"
-                table_layout(columns).save(entities.APPLICATION_ID, table)
-                dataset.register_blueprint(table.as_uri(), segment_table=True)
-                layout = max(files, key=lambda file: file.stat().st_size)  # one that failed has no layout of a drive
-                dataset.register_blueprint(layout.as_uri())
-                yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
+            server = stack.enter_context(rr.server.Server(host=LOCALHOST, datasets={DATASET: list(files)}))
+            dataset = server.client().get_dataset(DATASET)
+            columns = {field.name for field in dataset.segment_table().schema()}
+            table_layout(columns).save(entities.APPLICATION_ID, layouts / "table.rbl")
+            dataset.register_blueprint((layouts / "table.rbl").as_uri(), segment_table=True)
+            layout = max(files, key=lambda file: file.stat().st_size)  # one that failed has no layout of a drive
+            dataset.register_blueprint(layout.as_uri())
         except (RuntimeError, ValueError, LookupError, OSError) as error:
             said = one_line(str(error), 300)
             raise ConfigError(f"Rerun's server does not take the recordings of {folder} ({said}).") from None
+        yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
 
 
 def table_layout(columns: set[str]) -> Any:

@@ -62,7 +62,8 @@ class History:
             causes = ", ".join(dict.fromkeys(row.cause for row in wrong))
             parts.append(f"{_drives(len(wrong))} with wrong input ({causes}).")
         if off:
-            parts.append(f"The calibration is off on {_drives(len(off))}, by the same on all that can be compared.")
+            same = ", by the same on all" if len(off) > 1 else ""
+            parts.append(f"The calibration is off on {_drives(len(off))}{same}.")
         if failed:
             parts.append(f"{_drives(len(failed))} failed.")
         if not parts and not any(believed(row) for row in self.rows):

@@ -13,14 +13,14 @@ from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted
-from inspector.fleet.table import FAILED, TABLE, WORDS, Row, worst_first
+from inspector.fleet.table import FAILED, TABLE, WORDS, Row, off, worst_first
 from inspector.report.page import stylesheet
 
 PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", "rejected": "bad", FAILED: "none"}
-HEADS = ("car", "drive", "date", "verdict", "cause", "moved", "", "sigma", "frames", "why", "picture", "")
+HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "frames", "why", "picture")
 PICTURES = tuple(f"pictures/{name}_corrected.jpg" for name in ("median", "best", "worst"))
 """Of a drive's report: its middle frame as it was corrected or, where there are few, another one."""
 
@@ -43,12 +43,11 @@ def write_page(rows: Sequence[Row], folder: Path) -> Path:
 def make_page(rows: Sequence[Row], folder: Path) -> str:
     """The page; links lead below its folder."""
     cars, worst = histories(rows), worst_first(rows)
-    moved = sum(bool(car.moves) for car in cars)
     template = Template(resources.files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
     return template.substitute(
         style=stylesheet(),
         headline=escape(f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"),
-        about=escape(f"{moved} {'car has a mount' if moved == 1 else 'cars have a mount'} that moved between drives."),
+        about=escape(_moved(sum(bool(car.moves) for car in cars))),
         cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
         more_cars=_more(len(cars), MOST_CARS, "cars"),
         heads="".join(_head(name) for name in HEADS),
@@ -56,6 +55,12 @@ def make_page(rows: Sequence[Row], folder: Path) -> str:
         more_rows=_more(len(worst), MOST_ROWS, "drives"),
         table=f'<a href="{TABLE}">{TABLE}</a>',
     )
+
+
+def _moved(cars: int) -> str:
+    if not cars:
+        return "No mount is seen to have moved between drives."
+    return f"{'1 car has a mount' if cars == 1 else f'{cars} cars have a mount'} that moved between drives."
 
 
 def _car(car: History) -> str:
@@ -80,31 +85,28 @@ def _head(name: str) -> str:
 def _row(row: Row, folder: Path) -> str:
     drive = escape(f"{row.drive}, camera {row.camera}" if row.camera else row.drive)
     linked = f'<a href="{_link(row.report)}">{drive}</a>' if row.report else drive
-    recording = f'<a href="{_link(row.recording)}">recording</a>' if row.recording else ""
-    word = f'<td class="word {GRADES[row.verdict]}" data-key="{WORDS.index(row.verdict)}">{row.verdict}</td>'
-    used = f"{row.frames}" + (f" ({row.skipped} skipped)" if row.skipped else "")
-    sigma = "" if row.sigma_deg is None or row.sigma_cm is None else f"{row.sigma_deg:.2f}° / {row.sigma_cm:.1f} cm"
+    recording = f'<br><a class="about" href="{_link(row.recording)}">recording</a>' if row.recording else ""
+    cause = f"<br>{escape(row.cause)}" if row.cause else ""
+    used = f"{row.frames}" + (f"<br>{row.skipped} skipped" if row.skipped else "")
     cells = [
         f"<td>{escape(row.car)}</td>",
-        f"<td>{linked}</td>",
+        f"<td>{linked}{recording}</td>",
         f"<td>{escape(row.date[:10])}</td>",
-        word,
-        f"<td>{escape(row.cause)}</td>",
-        _number(row.moved_deg, 2, "°"),
-        _number(row.moved_cm, 1, " cm"),
-        f'<td class="number" data-key="{"" if row.sigma_deg is None else row.sigma_deg}">{sigma}</td>',
+        f'<td class="word {GRADES[row.verdict]}" data-key="{WORDS.index(row.verdict)}">{row.verdict}{cause}</td>',
+        _pair(row.moved_deg, row.moved_cm, off(row)),
+        _pair(row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
         f'<td class="number" data-key="{row.frames}">{used}</td>',
         f'<td class="reason">{escape(one_line(row.reason, 600))}</td>',
         f"<td>{_picture(row, folder)}</td>",
-        f"<td>{recording}</td>",
     ]
     return f"<tr>{''.join(cells)}</tr>"
 
 
-def _number(value: float | None, digits: int, unit: str) -> str:
-    if value is None:
+def _pair(degrees: float | None, centimetres: float | None, key: float) -> str:
+    """Rotation and translation in one cell, and what it is sorted by."""
+    if degrees is None or centimetres is None:
         return '<td class="number" data-key=""></td>'
-    return f'<td class="number" data-key="{value}">{value:.{digits}f}{unit}</td>'
+    return f'<td class="number" data-key="{key:.4f}">{degrees:.2f}°<br>{centimetres:.1f} cm</td>'
 
 
 def _picture(row: Row, folder: Path) -> str:
