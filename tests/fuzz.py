@@ -164,12 +164,28 @@ WORDS = tuple(
     b"FIELDS|SIZE|TYPE|COUNT|WIDTH|HEIGHT|POINTS|DATA|ascii|binary|binary_compressed|_|F|U|4294967296|-1|nan|inf|1e400|"
     b"element vertex|property float|property list uchar int|end_header|format|0|99999999999".split(b"|")
 )
+
+
+def _nuscenes(data: bytes) -> object:
+    from calibnet.datasets.nuscenes_tables import records
+
+    return _as_file("scene.json", data, lambda path: list(records(path.parent, "scene")))
+
+
+def _small_floats() -> bytes:
+    """A TIFF of floats."""
+    import cv2
+
+    encoded: bytes = cv2.imencode(".tiff", np.linspace(0, 1, 48, dtype=np.float32).reshape(6, 8))[1].tobytes()
+    return encoded
+
+
 TARGETS: dict[str, Target] = {
     **{
         f"scan{suffix}": Target(partial(_scan, suffix), _seeds_of_scans(suffix), WORDS)
         for suffix in (".pcd", ".ply", ".npy", ".bin", ".feather", ".parquet")
     },
-    "image": Target(_image, tuple(_small(form) for form in ("PNG", "JPEG", "BMP", "TIFF", "WEBP"))),
+    "image": Target(_image, (*(_small(form) for form in ("PNG", "JPEG", "BMP", "TIFF", "WEBP")), _small_floats())),
     "calibration": Target(
         _calibration,
         (
@@ -177,10 +193,12 @@ TARGETS: dict[str, Target] = {
             calibrations.BOMB.encode(),
             b'{"width": 400, "height": 120}',
             b"%YAML:1.0\n---\n",
+            b"mirror_parameters: {xi: 2}\nprojection_parameters: {gamma1: 1, gamma2: 1, u0: 1, v0: 1}\n",
         ),
         (b"&a ", b"*a", b"!!int ", b"!!opencv-matrix", b"<<: ", b"camera_matrix: ", b".nan", b"2011-01-01", b"[[[["),
     ),
     "kitti calib": Target(_kitti, (b"P2: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n",), WORDS),
+    "nuscenes table": Target(_nuscenes, (b'[\n{\n"token": "a",\n"translation": [1.0, 2.0, 3.0]\n},\n{}\n]',), WORDS),
     "kitti times": Target(_times, (b"0.0\n0.104\n0.207\n",), WORDS),
     "weights": Target(_weights, (weights.file(lambda _: None)[: 1 << 15],)),
     "manifest": Target(
