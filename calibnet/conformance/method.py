@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from calibnet.conformance.requirement import require, require_definite, require_rigid
-from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator
-from calibnet.trace import CascadeTrace
+from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only
+from calibnet.trace import CascadeTrace, DriveEstimate
 
 
-def check_method(calibrator: Calibrator, frame: Frame | None = None) -> None:
+def check_method(calibrator: Calibrator, frame: Frame | None = None, drive: Frames | None = None) -> None:
     """Hold a method to the promises of `Calibrator` and, where it is one, of `DriveCalibrator`.
 
     Whether it is any good is for `calibnet.evaluation.measure` to say.
@@ -23,11 +23,19 @@ def check_method(calibrator: Calibrator, frame: Frame | None = None) -> None:
     Args:
         calibrator: ready to use.
         frame: one that it can calibrate from 1° and 5 cm off; a synthetic one by default.
+        drive: frames likewise, of a method that solves drives; twice the frame by default. One that tells something of
+            drives alone is held to the promises on these, and needs frames that move.
 
     Raises:
         AssertionError: one of them is not kept; the sentence says which.
     """
     require(isinstance(calibrator, Calibrator), "A method has calibrate(frame, initial, detail=False).")
+    if drives_only(calibrator):
+        require(drive is not None, "A method that tells something of drives alone is tested with a drive.")
+        assert isinstance(calibrator, DriveCalibrator)
+        assert drive is not None
+        _check_drives_only(calibrator, drive)
+        return
     chosen = synthetic_frame() if frame is None else frame
     initial = miscalibration([0.6, -0.6, 0.5], [0.03, -0.03, 0.03]) @ chosen.camera_from_lidar
     before, start = copy.deepcopy(chosen), initial.copy()
@@ -43,7 +51,7 @@ def check_method(calibrator: Calibrator, frame: Frame | None = None) -> None:
     check_trace(shown, start)
     _check_exhibits(shown)
     if isinstance(calibrator, DriveCalibrator):
-        _check_drive(calibrator, chosen, initial)
+        _check_drive(calibrator, drive or [chosen, replace(chosen, index=chosen.index + 1)], initial)
 
 
 def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
@@ -82,10 +90,21 @@ def _check_exhibits(trace: CascadeTrace) -> None:
             require(finite, f"{curve.name!r} is no curve of finite numbers.")
 
 
-def _check_drive(calibrator: DriveCalibrator, frame: Frame, initial: Extrinsic) -> None:
-    """The same frame twice is a drive of two frames."""
+def _check_drives_only(calibrator: DriveCalibrator, drive: Frames) -> None:
+    """The drive's promises, and those of what is shown of its frames."""
+    initial = miscalibration([0.6, -0.6, 0.5], [0.03, -0.03, 0.03]) @ drive[0].camera_from_lidar
+    estimate = _check_drive(calibrator, drive, initial)
+    require(bool(estimate.traces), "Nothing is told of the drive's frames: the estimate has no traces.")
+    for trace in estimate.traces.values():
+        check_trace(trace, initial)
+        _check_exhibits(trace)
+        ends = bool(np.allclose(trace.arrived, estimate.camera_from_lidar))
+        require(ends, "A frame's trace does not end at the drive's result.")
+
+
+def _check_drive(calibrator: DriveCalibrator, frames: Frames, initial: Extrinsic) -> DriveEstimate:
+    """The promises of an estimate, and that the observer hears of every frame."""
     told: list[tuple[int, int]] = []
-    frames = [frame, replace(frame, index=frame.index + 1)]
     estimate = calibrator.calibrate_drive(frames, initial, lambda read, total: told.append((read, total)))
     require_rigid(estimate.camera_from_lidar, "the drive's extrinsic")
     require_definite(estimate.covariance, "the covariance of the drive's extrinsic")
@@ -93,6 +112,7 @@ def _check_drive(calibrator: DriveCalibrator, frame: Frame, initial: Extrinsic) 
     reads, totals = [read for read, _ in told], {total for _, total in told}
     require(reads == list(range(len(reads))), f"The observer hears of {reads} frames read.")
     require(totals == {len(reads)}, f"The observer hears of {totals} frames to read, and {len(reads)} were read.")
+    return estimate
 
 
 def synthetic_frame() -> Frame:

@@ -28,6 +28,7 @@ METHODS = Registry(
         "calibformer": "calibnet.methods.learned.method:CalibFormerMethod",
         "information-distance": "calibnet.methods.information_distance:InformationDistance",
         "calib-anything": "calibnet.methods.calib_anything:CalibAnything",
+        "pcba": "calibnet.methods.pcba:PCBA",
     },
 )
 

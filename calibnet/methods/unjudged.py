@@ -42,6 +42,8 @@ class Unjudged:
         if own is not None and own.word == REJECTED:
             return own
         reason = f"{self.name} finds an extrinsic and does not judge it: only results of the cascade can be accepted."
+        if own is not None and own.word == CANNOT_TELL:
+            reason = f"{reason} {own.reason}"
         stated = None if own is None else own.covariance
         return Verdict(CANNOT_TELL, reason, found, moved(initial, found), covariance=stated)
 

@@ -1,0 +1,74 @@
+"""How the car moves: every scan of a drive registered onto those before it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.geometry.se3 import invert, pose_vector, transform_points
+from calibnet.geometry.types import Transform
+from calibnet.judging.lag import registered
+
+BEFORE = 5
+"""Scans that the next one is registered onto. Onto one alone, the rings on the road pull at each other and make the way
+too short: by 3.5 % in the synthetic world, with these by less than 0.1 %."""
+POINT_M, VOXEL_M = 0.25, 1.0
+"""Sides of the cells in which points are averaged, and of those whose points make a Gaussian to be registered onto."""
+FARTHEST_M = 2.0
+FEWEST_POINTS = 500
+"""That have to agree for a registration to be believed."""
+
+
+def longest_run(scans: Sequence[NDArray[np.float32]]) -> tuple[int, list[Transform]]:
+    """The longest run of scans ``[N, 4]`` that can be registered one after the other.
+
+    Each registration begins with the motion before it, since a car goes on as it goes.
+
+    Returns:
+        The position of its first scan, and ``world_from_lidar`` of each, 4x4; the first is the identity.
+    """
+    runs: list[tuple[int, list[Transform]]] = [(0, [np.eye(4)])] if len(scans) else []
+    motion: Transform | None = None
+    for position in range(1, len(scans)):
+        first, poses = runs[-1]
+        if motion is None:
+            motion = registered(scans[position], scans[position - 1])
+        if motion is not None:
+            past = range(max(first, position - BEFORE), position)
+            motion = _onto(scans[position], [scans[one] for one in past], [poses[one - first] for one in past], motion)
+        if motion is None:
+            runs.append((position, [np.eye(4)]))
+        else:
+            poses.append(poses[-1] @ motion)
+    return max(runs, key=lambda run: len(run[1]), default=(0, []))
+
+
+def path(poses: Sequence[Transform]) -> tuple[float, float]:
+    """Metres driven, and degrees turned on the way, both summed up."""
+    steps = [pose_vector(invert(a) @ b) for a, b in itertools.pairwise(poses)]
+    metres = sum(float(np.linalg.norm(step[:3])) for step in steps)
+    return metres, float(np.degrees(sum(float(np.linalg.norm(step[3:])) for step in steps)))
+
+
+def _onto(
+    scan: NDArray[np.float32], past: Sequence[NDArray[np.float32]], poses: Sequence[Transform], motion: Transform
+) -> Transform | None:
+    """The motion from the last of some scans to the next one; None where too few points agree."""
+    import small_gicp
+
+    target = [transform_points(invert(poses[-1]) @ pose, one[:, :3]) for one, pose in zip(past, poses, strict=True)]
+    result = small_gicp.align(
+        np.concatenate(target).astype(np.float64),
+        scan[:, :3].astype(np.float64),
+        init_T_target_source=motion,
+        registration_type="VGICP",
+        voxel_resolution=VOXEL_M,
+        downsampling_resolution=POINT_M,
+        max_correspondence_distance=FARTHEST_M,
+        num_threads=1,
+    )
+    believed = result.converged and result.num_inliers >= FEWEST_POINTS
+    return np.asarray(result.T_target_source, np.float64) if believed else None
