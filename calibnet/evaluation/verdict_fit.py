@@ -26,10 +26,11 @@ FALSE_ACCEPTS = 0.01
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
-OF_FRAMES = ("match_error", "misfit", "lens", "stated", "alike")
-"""Witnesses of a frame that are fitted: all nine accept a tenth fewer of the good ones on sequences left out.
-How far a run went counts apart, in the ranges it is held to."""
-OF_DRIVES = ("match_error", "lens", "stated", "aligned")
+OF_FRAMES = ("match_error", "misfit", "lens", "alike")
+"""Witnesses of a frame that are fitted: on sequences left out, all nine accept fewer of the good ones, and so does the
+stated deviation in the place of, or beside, the one for matches that err alike. How far a run went counts apart, in the
+ranges it is held to."""
+OF_DRIVES = ("match_error", "stated", "scatter", "halves", "aligned")
 """Witnesses of a drive that are fitted: there are few drives, and on those left out all nine do worse than these."""
 LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""

@@ -101,7 +101,7 @@ def test_a_drive_s_covariance_is_widened_to_its_errors() -> None:
         replace(
             run,
             information=np.linalg.inv(Spread().covariance(STATED, *BOTH, run.match_error_px) / 4).tolist(),
-            witnesses={**(run.witnesses or {}), "aligned": 0.0},
+            witnesses={**(run.witnesses or {}), "aligned": 0.0, "scatter": 0.0, "halves": 0.0},
         )
         for run in runs(400, Spread())
     ]
