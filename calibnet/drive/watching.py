@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -17,6 +17,7 @@ from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.trace import DriveEstimate, DriveLook
+from calibnet.verdict import BadFrame
 from calibnet.watch import Watched
 
 FEWEST = 2 * SHORTEST
@@ -93,11 +94,33 @@ def watch_drive(
     looks = {look.position: look for part in parts for look in part.relative_to(origin)}
     again = far_parts(calibrator, frames, looks, origin, observer)
     looks |= {look.position: look for part in again for look in part.relative_to(origin)}
+    skipped = [bad for part in parts for bad in part.estimate.skipped]
+    return judge_looks(looks, len(frames), origin, skipped)
+
+
+def watch_estimate(estimate: DriveEstimate, count: int) -> Watched:
+    """The same from a drive of ``count`` frames that is solved already: at no cost, and blind to where nothing fits.
+
+    Moves beyond what the last stage sees from the drive's extrinsic are found, but not measured.
+    """
+    origin = estimate.camera_from_lidar if estimate.looked_from is None else estimate.looked_from
+    return judge_looks({look.position: look for look in estimate.looks}, count, origin, estimate.skipped)
+
+
+def judge_looks(looks: dict[int, DriveLook], count: int, origin: Extrinsic, skipped: Iterable[BadFrame]) -> Watched:
+    """Whether what frames say changes over a drive, and whether so much can be told.
+
+    Args:
+        looks: what they say relative to ``origin``, by position.
+        count: of the drive's frames.
+        origin: ``camera_from_lidar``, 4x4.
+        skipped: frames that fit nowhere or could not be read.
+    """
     in_order = [looks[position] for position in sorted(looks)]
     known = {look.frame for look in in_order}
-    missing = tuple(bad for part in parts for bad in part.estimate.skipped if bad.frame not in known)
-    if len(in_order) < max(FEWEST, (len(frames) + 1) // 2):
-        reason = f"Only {len(in_order)} of {len(frames)} frames fit or can be read."
+    missing = tuple(bad for bad in skipped if bad.frame not in known)
+    if len(in_order) < max(FEWEST, (count + 1) // 2):
+        reason = f"Only {len(in_order)} of {count} frames fit or can be read."
         return Watched(origin, None, reason, len(in_order), missing)
     found = watch(in_order)
     blind = 3 * found.smallest

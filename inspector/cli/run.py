@@ -217,7 +217,11 @@ def make_session(
     console: Console,
 ) -> Session:
     """A run as its options say."""
+    from calibnet.drive.watching import FEWEST, watch_estimate
     from inspector.run.session import Session
+
+    count = len(options.positions)
+    watched = drive and options.method == CASCADE and count >= FEWEST
 
     return Session(
         sequence=options.sequence,
@@ -231,6 +235,7 @@ def make_session(
         description=description,
         contents=options.contents,
         console=console,
+        watching=partial(watch_estimate, count=count) if watched else None,
     )
 
 

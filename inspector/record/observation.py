@@ -146,6 +146,7 @@ class Layout:
         position: of the camera in the LiDAR frame, metres.
         forward: its viewing direction there, of unit length.
         with_drive: whether an estimate from the whole drive follows the frames.
+        with_watch: whether it also tells if the mount moved meanwhile.
         with_fit: whether its stages say what error they expect of their matches.
         method: name of the method that ran; empty for the cascade.
     """
@@ -158,6 +159,7 @@ class Layout:
     forward: Xyz = (1.0, 0.0, 0.0)
     with_drive: bool = False
     with_fit: bool = True
+    with_watch: bool = False
     method: str = ""
 
     @property
@@ -194,7 +196,7 @@ class Layout:
             _xyz(lidar_from_camera[:3, 2]),
             with_drive,
             any(math.isfinite(stage.match_error_px) for stage in observation.trace.stages),
-            observation.trace.method,
+            method=observation.trace.method,
         )
 
 

@@ -19,6 +19,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.text import one_line
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
+from calibnet.watch import Watched
 from inspector import entities
 from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation
@@ -28,6 +29,8 @@ from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
+from inspector.record.tabs.watch import log_watch
+from inspector.run.watching import sentences
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Recording:
             description: identifies the run.
             layout: what the recording will contain.
         """
-        self._contents = layout.contents
+        self._layout, self._contents = layout, layout.contents
         self._tabs = wanted_tabs(layout)
         self._seconds: dict[int, float] = {}
         blueprint = make_blueprint(layout, self._tabs)
@@ -121,6 +124,12 @@ class Recording:
         text = "\n\n".join(["# Not solved", *why])
         self._rec.log_for_all(entities.DRIVE_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self._stream.flush()
+
+    def log_watch(self, watched: Watched) -> None:
+        """Log whether the mount moved, where there is a tab for it."""
+        if self._layout.with_watch:
+            to_frame = lambda frame: self._rec.set_frame(frame, self._seconds.get(frame, 0.0))  # noqa: E731
+            log_watch(self._rec, watched.watch, list(sentences(watched)), to_frame)
 
     def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
         """Log what the drive's extrinsic makes of one of its frames."""

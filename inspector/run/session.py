@@ -31,6 +31,7 @@ from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.runtime.interruption import StopRequest
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import REJECTED, BadFrame
+from calibnet.watch import Watched
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
@@ -64,6 +65,7 @@ class Session:
         drive_asked: the user wants it, so that a drive which cannot be solved is an error.
         stop_on_bad_frame: end at the first frame that cannot be used, instead of going on with the next.
         verify: also judge the calibration that the run starts from, by the only frame or by the drive.
+        watching: says of a solved drive whether the mount moved meanwhile; None where it could not be told.
     """
 
     sequence: Sequence
@@ -79,6 +81,7 @@ class Session:
     drive_asked: bool = False
     stop_on_bad_frame: bool = False
     verify: bool = False
+    watching: Callable[[DriveEstimate], Watched] | None = None
 
     @property
     def frames(self) -> PickedFrames:
@@ -110,6 +113,7 @@ class Session:
                         continue
                     if recording is None:
                         layout = Layout.of(observation, self.contents, self.drive)
+                        layout = replace(layout, with_watch=self.drive and self.watching is not None)
                         recording = Recording(self.outputs.open(), self.description, layout)
                         if self.outputs.page is not None:
                             self.console.print(f"Watch it at {self.outputs.page}", markup=False, soft_wrap=True)
@@ -207,6 +211,8 @@ class Session:
         if self.verify and estimate.verdict is not None:
             summary.given_verdict = judge_given(self.cascade, self.frames, initial, estimate.verdict, DRIVE)
         recording.log_drive(estimate, reference, summary.given_verdict, summary.of_frames())
+        if self.watching is not None:
+            recording.log_watch(self.watching(estimate))
         self._record_drive_overlays(recording, estimate, stop)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict

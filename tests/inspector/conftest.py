@@ -43,6 +43,7 @@ def record() -> Callable[..., None]:
         stop_on_bad_frame: bool = False,
         drive: bool = False,
         drive_asked: bool = False,
+        watching: Any = None,
         cascade_type: Any = fakes_module.FakeCascade,
         **cascade: Any,
     ) -> Any:
@@ -59,6 +60,7 @@ def record() -> Callable[..., None]:
             stop_on_bad_frame=stop_on_bad_frame,
             drive=drive,
             drive_asked=drive_asked,
+            watching=watching,
         )
         try:
             return session.run()

@@ -7,7 +7,7 @@ from typing import Protocol
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.subtree import Subtree
-from inspector.record.tabs import cascade, cost_volumes, drive, exhibits, hourglass, overview, scene
+from inspector.record.tabs import cascade, cost_volumes, drive, exhibits, hourglass, overview, scene, watch
 from inspector.record.tabs.views import View
 
 
@@ -39,7 +39,7 @@ class Tab(Protocol):
         ...
 
 
-TABS: tuple[Tab, ...] = (overview, cascade, exhibits, cost_volumes, hourglass, scene, drive)
+TABS: tuple[Tab, ...] = (overview, cascade, exhibits, cost_volumes, hourglass, scene, drive, watch)
 
 
 def wanted_tabs(layout: Layout) -> list[Tab]:

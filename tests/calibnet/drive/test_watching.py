@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.drive.watching import runs, watch_drive
+from calibnet.drive.watching import runs, watch_drive, watch_estimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
@@ -103,6 +103,17 @@ def test_what_cannot_be_told_says_why() -> None:
     assert unread.watch is None and unread.reason == "Only 18 of 40 frames fit or can be read."
     nothing = watch_drive(Solver(), Moving(40, 99, STILL, bad=tuple(range(40))), REFERENCE)
     assert nothing.reason == "Picture and scan fit nowhere in the drive."
+
+
+def test_a_drive_that_is_solved_tells_it_at_no_cost() -> None:
+    moving = Moving(60, 30, miscalibration([0, 0, 0.7], [0, 0, 0]), bad=(7,))
+    solved = Solver().calibrate_drive(moving, REFERENCE)
+    watched = watch_estimate(solved, 60)
+    assert watched.watch is not None and watched.used == 59 and [bad.frame for bad in watched.skipped] == [7]
+    (change,) = watched.watch.changes
+    assert abs(change.frame - 30) <= 2 and change.rotation_deg == pytest.approx(0.7, abs=0.12)
+    half = watch_estimate(replace(solved, looks=solved.looks[:29]), 60)
+    assert half.watch is None and half.reason == "Only 29 of 60 frames fit or can be read."
 
 
 def test_runs_of_positions() -> None:

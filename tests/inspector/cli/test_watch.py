@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from calibnet.drive import watching
 from calibnet.drive.changes import watch
@@ -81,6 +82,19 @@ def test_json_and_recording_hold_the_estimate_over_the_drive(
     assert content["frames"] == {"used": 100, "skipped": [{"frame": 7, "why": "It is cut short."}]}
     estimate = read(file, "watch/yaw/estimate", "Scalars:scalars")
     assert len(estimate) == 100 and len(read(file, "watch/yaw/change", "Scalars:scalars")) == 1
+
+
+def test_a_run_has_a_tab_that_says_so_of_its_drive(
+    record: Callable[..., Any], tmp_path: Path, read: Callable[..., list[tuple[Any, Any]]]
+) -> None:
+    file = tmp_path / "run.rrd"
+    record(file, length=3, detail="overview", strides=(32,), drive=True, watching=lambda _: STEP)
+    *_, text = RrdReader(file).store().stream().filter(content="/watch/result")
+    assert text.to_record_batch()["TextDocument:text"].to_pylist()[-1][0].startswith("# Changed: the mount moved once")
+    ((frame, moved),) = read(file, "watch/yaw/change", "Scalars:scalars")
+    assert abs(frame - 50) <= 2 and moved.as_py()
+    record(tmp_path / "short.rrd", length=3, detail="overview", strides=(32,), drive=True)
+    assert list(RrdReader(tmp_path / "short.rrd").store().stream().filter(content="/watch/result")) == []
 
 
 def test_what_watch_does_not_do_is_wrong_usage(own: Path, tmp_path: Path) -> None:

@@ -1,0 +1,113 @@
+"""Tab *Did it move?*: what the frames of a drive say over time, each axis with its band, and where that changes.
+
+It is there where `Layout.with_watch` says so; a recording of ``calib-inspect watch`` shows nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from calibnet.watch import WINDOW, Watch
+from inspector import colors
+from inspector.record.contents import Contents
+from inspector.record.observation import Layout, Observation
+from inspector.record.pictures.legends import log_names
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import View, curve_view, legend, with_legend
+from inspector.run.watching import AXES, in_units
+
+NAME = "Did it move?"
+
+BAND = 2.0
+"""Standard deviations on either side: 95 % of the errors of a window, if noise is as it is measured."""
+TEXT = "watch/result"
+LEGEND = "legend/watch"
+CURVES = {
+    "frames": ("single frames", colors.REST, 1.0),
+    "estimate": (f"mean of {WINDOW} frames", colors.FOUND, 2.5),
+    "upper": (f"+{BAND:g} σ", colors.LIMIT, 1.0),
+    "lower": (f"-{BAND:g} σ", colors.LIMIT, 1.0),
+}
+"""Of every axis: its name, colour and width."""
+CHANGE = "change"
+"""Mark of an axis at frames where the mount has moved."""
+MARK_SIZE = 6.0
+NOT_YET = "# Not looked at yet\n\nWhether the mount moved is told when the whole drive is solved."
+TEXT_SHARE = 0.24
+"""Of the tab's width that it takes."""
+
+
+def curve(axis: str, kind: str) -> str:
+    """Path of a curve of an axis."""
+    return f"watch/{axis}/{kind}"
+
+
+def wanted(layout: Layout) -> bool:
+    """Where a drive is solved that has enough frames."""
+    return layout.with_watch
+
+
+def log_once(rec: Subtree, layout: Layout) -> None:
+    """Log names and colours of the curves."""
+    log_curve_styles(rec)
+    rec.log_once(TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
+
+
+def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Log nothing of a single frame: a change needs those around it, see `log_watch`."""
+
+
+def log_curve_styles(rec: Subtree) -> None:
+    """Names and colours of the curves, and their legend."""
+    names = {CURVES["frames"][0]: colors.REST, CURVES["estimate"][0]: colors.FOUND}
+    log_names(rec, LEGEND, names | {f"± {BAND:g} σ": colors.LIMIT, "the mount has moved": colors.INITIAL})
+    mark = rr.SeriesPoints(names="the mount has moved", colors=colors.INITIAL, marker_sizes=MARK_SIZE)
+    for axis in AXES:
+        for kind, (name, color, width) in CURVES.items():
+            rec.log_once(curve(axis, kind), rr.SeriesLines(names=name, colors=color, widths=width))
+        rec.log_once(curve(axis, CHANGE), mark)
+
+
+def log_watch(rec: Subtree, found: Watch | None, lines: Sequence[str], to_frame: Callable[[int], None]) -> None:
+    """Log what watching a drive told.
+
+    Args:
+        rec: what is logged to.
+        found: the estimate over the drive; None where there is only something to say.
+        lines: what is said, the result last.
+        to_frame: sets the timelines to a frame by its number.
+    """
+    text = "\n\n".join([f"# {lines[-1]}", *lines[:-1]])
+    rec.log_for_all(TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    if found is None:
+        return
+    moved = {change.frame for change in found.changes if change.until is None}
+    said, means, sigma = in_units(found.offsets), in_units(found.windowed), BAND * in_units(found.sigma)
+    levels = {"frames": said, "estimate": means, "upper": means + sigma, "lower": means - sigma}
+    for row, frame in enumerate(found.frames):
+        to_frame(int(frame))
+        for column, axis in enumerate(AXES):
+            for kind, values in levels.items():
+                rec.log(curve(axis, kind), rr.Scalars(float(values[row, column])))
+            if int(frame) in moved:
+                rec.log(curve(axis, CHANGE), rr.Scalars(float(means[row, column])))
+
+
+def view(layout: Layout) -> View:
+    """What came of it beside six plots."""
+    return watch_view()
+
+
+def watch_view() -> View:
+    """The same without a layout."""
+    units = {axis: "cm" if axis in ("x", "y", "z") else "deg" for axis in AXES}
+    views = [
+        curve_view(f"{axis.capitalize()} off the whole drive's [{unit}]", f"/watch/{axis}")
+        for axis, unit in units.items()
+    ]
+    text = rrb.TextDocumentView(origin=TEXT, name="Did the mount move?")
+    curves = with_legend(rrb.Grid(*views, grid_columns=3), legend("Curves", LEGEND), "Curves")
+    return rrb.Horizontal(text, curves, column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
