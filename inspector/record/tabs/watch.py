@@ -28,8 +28,8 @@ LEGEND = "legend/watch"
 CURVES = {
     "frames": ("single frames", colors.REST, 1.0),
     "estimate": (f"mean of {WINDOW} frames", colors.FOUND, 2.5),
-    "upper": (f"+{BAND:g} σ", colors.LIMIT, 1.0),
-    "lower": (f"-{BAND:g} σ", colors.LIMIT, 1.0),
+    "upper": (f"+{BAND:g} sigma", colors.LIMIT, 1.0),
+    "lower": (f"-{BAND:g} sigma", colors.LIMIT, 1.0),
 }
 """Of every axis: its name, colour and width."""
 CHANGE = "change"
@@ -63,7 +63,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 def log_curve_styles(rec: Subtree) -> None:
     """Names and colours of the curves, and their legend."""
     names = {CURVES["frames"][0]: colors.REST, CURVES["estimate"][0]: colors.FOUND}
-    log_names(rec, LEGEND, names | {f"± {BAND:g} σ": colors.LIMIT, "the mount has moved": colors.INITIAL})
+    log_names(rec, LEGEND, names | {f"± {BAND:g} sigma": colors.LIMIT, "the mount has moved": colors.INITIAL})
     mark = rr.SeriesPoints(names="the mount has moved", colors=colors.INITIAL, marker_sizes=MARK_SIZE)
     for axis in AXES:
         for kind, (name, color, width) in CURVES.items():
