@@ -183,11 +183,14 @@ def rows() -> Iterator[Row]:
         code = FINE
         yield Row(f"recording that is whole: {command}", whole(command), code, replaced=WRITTEN)
         yield from instead_of(f"recording, {command}", whole(command), "run.rrd")
-        for share in (0.02, 0.2, 0.5):
+        for share in (0.02, 0.2):
             what = f"recording cut to {share:.0%}: {command}"
             yield Row(
                 what, damaged(command, lambda data, share=share: data[: int(share * len(data))]), words=("run.rrd",)
             )
+        half = damaged(command, lambda data: data[: len(data) // 2])
+        words = ("run.rrd is cut off: only its 2 complete frames are used",)
+        yield Row(f"recording cut to half: {command}", half, code, words, replaced=WRITTEN)
         yield Row(f"recording of zeros: {command}", damaged(command, lambda data: data[:8] + bytes(len(data) - 8)))
     for what, (entity, values) in SAID.items():
         yield Row(f"recording with {what}", said("check", entity, **values), words=("run.rrd",))

@@ -64,6 +64,8 @@ CONTENTS = {
     Kind.GIF: b"GIF89a",
     Kind.WEBP: b"RIFF\1\0\0\0WEBP",
     Kind.WEIGHTS: b'\x10\0\0\0\0\0\0\0{"__metadata__"',
+    Kind.TABLE: b"method,range,rig,in_rig\n",
+    Kind.PARQUET: b"PAR1\x15\x04",
     Kind.OTHER: b"width: 640",
     Kind.EMPTY: b"",
 }

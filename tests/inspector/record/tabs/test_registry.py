@@ -100,4 +100,5 @@ def full_layout() -> Layout:
         True,
         Contents.of(Detail.FULL),
         with_drive=True,
+        with_watch=True,
     )
