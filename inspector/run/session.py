@@ -259,7 +259,7 @@ def drive_observer(progress: Progress, stop: StopRequest) -> Callable[[int, int]
 
 class _FramesPerSecond(ProgressColumn):
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None else f"{task.speed:.1f} frames/s")
+        return Text("" if task.speed is None or task.total is None else f"{task.speed:.1f} frames/s")
 
 
 def frame_progress(console: Console) -> Progress:
