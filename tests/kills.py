@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import subprocess
 import sys
@@ -18,6 +19,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+WITH_TESTS = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+"""For processes in another folder, which have the installed packages but not these tests."""
 RECORD = """
 import sys
 from pathlib import Path
@@ -62,7 +65,9 @@ class Kind:
 
 def killed(kind: Kind, folder: Path, draw: random.Random) -> bool:
     """Run and kill once; returns whether it was still running."""
-    process = subprocess.Popen(kind.command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    process = subprocess.Popen(
+        kind.command, cwd=folder, env=WITH_TESTS, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
     assert process.stdout is not None
     said = []
     for line in process.stdout:
@@ -127,7 +132,8 @@ def main() -> None:
     draw = random.Random(asked.seed)
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base)
-        subprocess.run([sys.executable, "-c", RECORD, "whole.rrd", "3"], cwd=folder, check=True, capture_output=True)
+        record = [sys.executable, "-c", RECORD, "whole.rrd", "3"]
+        subprocess.run(record, cwd=folder, env=WITH_TESTS, check=True, capture_output=True)
         for name in asked.kinds or KINDS:
             running = sum(killed(KINDS[name], folder, draw) for _ in range(asked.times))
             left = sorted(path.name for path in folder.iterdir() if path.name.endswith(".partial"))
