@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
 from inspector.cli.output import (
     JSON_FILE,
@@ -18,6 +17,7 @@ from inspector.cli.output import (
     overwrite_option,
     prepare,
     prepare_json,
+    read_table,
     say,
     write,
     write_json,
@@ -83,7 +83,7 @@ def ablate(
     prepare_json(json_file)
     prepare(markdown_file, Kind.EXPORT)
     if source is not None:
-        content = read_ablation(source)
+        content = read_table(source, "ablate")
     else:
         content = measured(
             presets or ("compact", "paper"), range_, weights, data, frames, repeats, seed, timed, threads
@@ -140,23 +140,6 @@ def measured(
         "processor": platform.processor() or platform.machine(),
         "rows": rows,
     }
-
-
-def read_ablation(source: Path) -> dict[str, Any]:
-    """The JSON of an earlier run.
-
-    Raises:
-        ConfigError: it is not one.
-    """
-    from calibnet.runtime.reading import parse_json, read_text
-
-    try:
-        content = parse_json(read_text(source, "The ablation", error=ConfigError))
-    except ValueError as error:
-        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect ablate --json` wrote.") from None
-    if not isinstance(content, dict) or content.get("table") != "ablate":
-        raise ConfigError(f"{source} was not written by `calib-inspect ablate --json`.")
-    return content
 
 
 def title(content: dict[str, Any]) -> str:

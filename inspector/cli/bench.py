@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
 from inspector.cli.output import (
     JSON_FILE,
     console_beside,
+    keep_json,
     overwrite_option,
     prepare,
     prepare_json,
+    read_table,
     say,
     write,
     write_json,
@@ -116,7 +116,7 @@ def bench(
         prepare(file, kind)
     prepare_json(json_file)
     if source is not None:
-        content = read_bench(source)
+        content = read_table(source, "bench")
     else:
         if not data:
             raise click.UsageError("--data is needed, for instance --data kitti-raw:DIR:2011_09_26/0048.")
@@ -126,7 +126,8 @@ def bench(
     from inspector.cli.bench_tables import print_bench
 
     print_bench(content, console_beside(json_file))
-    write_json(json_file, content)
+    if source is not None or json_file == "-":  # what was measured has been written method by method
+        write_json(json_file, content)
     for file, made, kind in outputs:
         if file is not None:
             write(file, made(content).encode(), kind)
@@ -187,10 +188,7 @@ def run(measured: Bench, contestants: list[Contestant], threads: int, json_file:
             for row in entry["rows"]:
                 if "why" in row:
                     say(f"{name}, {row['range']}: {row['why']}", err=True)
-            if json_file not in (None, "-"):
-                Path(str(json_file)).with_suffix(".partial.json").write_text(json.dumps(content, indent=2))
-    if json_file not in (None, "-"):
-        Path(str(json_file)).with_suffix(".partial.json").unlink(missing_ok=True)
+            keep_json(json_file, content, first=len(content["methods"]) == 1)
     return content
 
 
@@ -213,20 +211,3 @@ def described(measured: Bench, threads: int) -> dict[str, Any]:
         "processor": platform.processor() or platform.machine(),
         "methods": {},
     }
-
-
-def read_bench(source: Path) -> dict[str, Any]:
-    """The JSON of an earlier bench.
-
-    Raises:
-        ConfigError: it is not one.
-    """
-    from calibnet.runtime.reading import parse_json, read_text
-
-    try:
-        content = parse_json(read_text(source, "The bench", error=ConfigError))
-    except ValueError as error:
-        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect bench --json` wrote.") from None
-    if not isinstance(content, dict) or content.get("table") != "bench":
-        raise ConfigError(f"{source} was not written by `calib-inspect bench --json`.")
-    return content

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.errors import ConfigError
+from calibnet.runtime.reading import parse_json, read_text
 from calibnet.runtime.text import lines
 from calibnet.runtime.writing import Kind, allow_overwriting, check_output, write_whole
 
@@ -85,3 +87,28 @@ def write_json(json_file: str | None, content: dict[str, Any]) -> None:
         click.echo(text)
         return
     write(Path(json_file), f"{text}\n".encode(), Kind.JSON)
+
+
+def keep_json(json_file: str | None, content: dict[str, Any], first: bool) -> None:
+    """Write what there is so far, where a file is asked for; only the first time it says what it replaces."""
+    if json_file in (None, "-"):
+        return
+    if first:
+        write_json(json_file, content)
+    else:
+        write_whole(Path(str(json_file)), (json.dumps(content, indent=2) + "\n").encode(), Kind.JSON)
+
+
+def read_table(source: Path, command: str) -> dict[str, Any]:
+    """The JSON that a command with a table wrote earlier.
+
+    Raises:
+        ConfigError: it is not one of that command's.
+    """
+    try:
+        content = parse_json(read_text(source, f"The table of {command}", error=ConfigError))
+    except ValueError as error:
+        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect {command} --json` wrote.") from None
+    if not isinstance(content, dict) or content.get("table") != command:
+        raise ConfigError(f"{source} was not written by `calib-inspect {command} --json`.")
+    return content

@@ -25,6 +25,7 @@ def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     for name, kind in {"boaster": Boaster, "mover": Mover, "hungry": Hungry}.items():
         monkeypatch.setitem(METHODS.own, name, f"{kind.__module__}:{kind.__name__}")
     folder = write_folder(tmp_path / "own", 3)
+    (tmp_path / "table.partial.json").write_text("a user's")
     files = {kind: str(tmp_path / f"table.{kind}") for kind in ("json", "csv", "html", "markdown")}
     options = [word for kind, file in files.items() for word in (f"--{kind}", file)]
     code = run(
@@ -33,6 +34,7 @@ def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     )
     out, err = capsys.readouterr()
     assert code == 0, err
+    assert "Replaced" not in err and (tmp_path / "table.partial.json").read_text() == "a user's"
     return {"out": out, "err": err, **{kind: Path(file).read_text() for kind, file in files.items()}}
 
 
