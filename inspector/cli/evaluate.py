@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.datasets import PickedFrames, Sequence, dataset_names, open_sequence, select_frames
+from calibnet.datasets import PickedFrames, Sequence, dataset_names, select_frames
 from calibnet.methods.registry import METHODS, accepts, open_method
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, STAGES
 from inspector.cli.output import (
@@ -21,6 +21,7 @@ from inspector.cli.output import (
     say,
     write_json,
 )
+from inspector.cli.sources import open_parts
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -39,11 +40,15 @@ if TYPE_CHECKING:
     "--sequences",
     multiple=True,
     metavar="NAME [NAME]...",
-    help="Numbers (kitti-odometry), DATE/DRIVE (kitti-raw), splits (kitti-object), folders below --root (folder and "
-    "the datasets of other packages; without it --root itself).",
+    help="Numbers (kitti-odometry, kitti-tracking, kitti-360), DATE/DRIVE (kitti-raw), splits (kitti-object), SCENE or "
+    "SCENE/CAMERA (nuscenes), folders below --root (folder and the datasets of other packages; without it --root).",
 )
 @click.argument("more", nargs=-1, metavar="")
-@click.option("--camera", type=click.IntRange(0, 3), help="Camera of the KITTI datasets.  [default: 2]")
+@click.option(
+    "--camera",
+    metavar="CAMERA",
+    help="2 or CAM_BACK, for instance.  [default: the dataset's own, as its command has it]",
+)
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option("--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
@@ -79,7 +84,7 @@ def evaluate(
     root: Path,
     sequences: tuple[str, ...],
     more: tuple[str, ...],
-    camera: int | None,
+    camera: str | None,
     frames: str,
     range_: MiscalibrationRange,
     repeats: int,
@@ -104,8 +109,7 @@ def evaluate(
     """
     names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [
-        PickedFrames(sequence, select_frames(sequence, frames))
-        for sequence in open_sequences(dataset, root, names, camera)
+        PickedFrames(sequence, select_frames(sequence, frames)) for sequence in open_parts(dataset, root, names, camera)
     ]
     prepare_json(json_file)
     if virtual is not None:
@@ -176,34 +180,6 @@ def run_battery(
         measured = measure_battery(cascade, sequences, range_, repeats, seed, beside, show)
     print_battery(measured, console_beside(json_file))
     write_json(json_file, measured.as_dict())
-
-
-def open_sequences(dataset: str, root: Path, parts: list[str], camera: int | None) -> list[Sequence]:
-    """Open what ``--sequences`` names; each dataset calls its parts differently."""
-    options = {} if camera is None else {"camera": camera}
-    if dataset == "kitti-360" and parts:
-        return [open_sequence(dataset, root, drive=part, **options) for part in parts]
-    if dataset == "nuscenes":
-        scenes = [part.partition("/") for part in parts or [""]]
-        return [open_sequence(dataset, root, scene=one, camera=of or "CAM_FRONT") for one, _, of in scenes]
-    if dataset not in ("kitti-360", "kitti-odometry", "kitti-raw", "kitti-object", "kitti-tracking"):
-        return [open_sequence(dataset, root / part, **options) for part in parts or ["."]]
-    if dataset == "kitti-object":
-        return [open_sequence(dataset, root, split=part, **options) for part in parts or ["training"]]
-    if not parts:
-        example = {"kitti-raw": "2011_09_26/0005", "kitti-360": "0003"}.get(dataset, "04")
-        raise click.UsageError(f"--sequences is needed with --dataset {dataset}, for instance --sequences {example}.")
-    if dataset == "kitti-raw":
-        return [open_sequence(dataset, root, **drive(part), **options) for part in parts]
-    return [open_sequence(dataset, root, sequence=part, **options) for part in parts]
-
-
-def drive(text: str) -> dict[str, str]:
-    """Split ``DATE/DRIVE``."""
-    date, slash, number = text.partition("/")
-    if not (date and slash and number):
-        raise click.UsageError(f"{text!r} is not DATE/DRIVE, for instance 2011_09_26/0005.")
-    return {"date": date, "drive": number}
 
 
 class Bars:

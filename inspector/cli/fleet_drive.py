@@ -21,7 +21,7 @@ from calibnet.runtime.reading import protecting_inputs, read_file
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import keeping_others
 from inspector.cli.errors import environment_sentence
-from inspector.cli.sequences import over_sequences
+from inspector.cli.sequences import judged_options, over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
@@ -193,7 +193,7 @@ def _verified(task: Task, path: Path, started: float) -> Row:
 def _commands(act: Callable[..., int]) -> click.Group:
     """The subcommands of `verify`, with another action."""
     group = click.Group("verify")
-    over_sequences(group, act)
+    over_sequences(group, act, judged_options)
     return group
 
 

@@ -17,24 +17,13 @@ import click
 from calibnet.errors import ConfigError
 from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode
-from inspector.cli.inspect import (
-    DEMO_LENGTH,
-    bag_options,
-    camera_option,
-    disturbed,
-    folder_options,
-    open_bag,
-    open_folder,
-    open_object,
-    open_odometry,
-    open_raw,
-    root_option,
-    split_option,
-)
+from inspector.cli.inspect import length_option
 from inspector.cli.options import FOLDER, FRAMES, KNOWN_OPTIONS, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
 from inspector.cli.output import overwrite_option, say
+from inspector.cli.preparing import UNJUDGED, announce, open_other
 from inspector.cli.recordings import OUTPUT_FILE
-from inspector.cli.run import UNJUDGED, announce, checked, open_other
+from inspector.cli.run import checked
+from inspector.cli.sequences import Opening, over_sequences
 from inspector.export.registry import FORMATS
 from inspector.run.options import DEFAULT_RANGE
 
@@ -111,62 +100,21 @@ def live() -> None:
 
 
 @live.command()
-@click.argument("sequence")
-@root_option
-@camera_option
-@live_options
-def seq(sequence: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
-    """On a KITTI odometry sequence, for instance 04."""
-    return serve_live(open_odometry(sequence, root, camera), keeping, camera=camera, **asked)
-
-
-@live.command()
-@click.argument("date")
-@click.argument("number", metavar="DRIVE")
-@root_option
-@camera_option
-@live_options
-def raw(date: str, number: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
-    """On a KITTI raw drive, for instance 2011_09_26 0005."""
-    return serve_live(open_raw(date, number, root, camera), keeping, camera=camera, **asked)
-
-
-@live.command("object")
-@split_option
-@root_option
-@camera_option
-@live_options
-def object_(split: str, root: Path | None, camera: int, keeping: Keeping, **asked: Any) -> int:
-    """On the frames of the KITTI object detection benchmark."""
-    return serve_live(open_object(split, root, camera), keeping, camera=camera, **asked)
-
-
-@live.command()
-@click.argument("directory", type=FOLDER)
-@folder_options
-@live_options
-def folder(directory: Path, dataset: str, keeping: Keeping, **asked: Any) -> int:
-    """On your own images and scans; without --range their calibration is the guess, and there is no reference."""
-    sequence = open_folder(directory, dataset, asked)
-    return serve_live(sequence, keeping, as_is=not disturbed(asked), **asked)
-
-
-@live.command()
-@bag_options
-@live_options
-def bag(files: tuple[Path, ...], keeping: Keeping, **asked: Any) -> int:
-    """On a ROS 1 or ROS 2 bag, or an MCAP file; without --range its own extrinsic is the guess."""
-    return serve_live(open_bag(files, asked), keeping, as_is=not disturbed(asked), **asked)
-
-
-@live.command()
-@click.option("--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Frames to drive.")
+@length_option
 @live_options
 def demo(length: int, keeping: Keeping, **asked: Any) -> int:
     """On a drive through the synthetic world: needs no data."""
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 
     return serve_live(SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE), keeping, **asked)
+
+
+def live_opened(opening: Opening, keeping: Keeping, **asked: Any) -> int:
+    """Open what is to be looked at, and serve it; returns the exit code."""
+    return serve_live(opening(), keeping, **asked)
+
+
+over_sequences(live, live_opened, live_options, "On")
 
 
 def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:

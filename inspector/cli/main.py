@@ -17,31 +17,33 @@ from inspector.cli.errors import run
 
 @dataclass(frozen=True)
 class LazyCommand:
-    """Where a command lives and what the list of commands says about it."""
+    """Where a command lives, ``module:name`` or ``module:group.name``, and what the list of commands says of it."""
 
     target: str
     help: str
 
     def load(self) -> click.Command:
         """Import the command's module and return the command."""
-        module, _, name = self.target.partition(":")
+        module, _, names = self.target.partition(":")
+        name, _, below = names.partition(".")
         command = getattr(importlib.import_module(module), name)
+        command = command.commands[below] if below else command
         if not isinstance(command, click.Command):
             raise TypeError(f"{self.target} is not a click command")
         return command
 
 
 COMMANDS = {
-    "seq": LazyCommand("inspector.cli.inspect:seq", "Calibrate a KITTI odometry sequence and record every stage."),
-    "raw": LazyCommand("inspector.cli.inspect:raw", "The same for a KITTI raw drive."),
-    "object": LazyCommand("inspector.cli.inspect:object_", "The same for the KITTI object detection frames."),
-    "tracking": LazyCommand("inspector.cli.inspect:tracking", "The same for a KITTI tracking sequence."),
-    "kitti360": LazyCommand("inspector.cli.inspect:kitti360", "The same for a KITTI-360 drive."),
-    "nuscenes": LazyCommand("inspector.cli.inspect:nuscenes", "The same for a scene of nuScenes."),
-    "folder": LazyCommand("inspector.cli.inspect:folder", "The same for a folder of your own images and scans."),
-    "bag": LazyCommand("inspector.cli.inspect:bag", "The same for a ROS 1 or ROS 2 bag, or an MCAP file."),
+    "seq": LazyCommand("inspector.cli.inspect:runs.seq", "Calibrate a KITTI odometry sequence and record every stage."),
+    "raw": LazyCommand("inspector.cli.inspect:runs.raw", "The same for a KITTI raw drive."),
+    "object": LazyCommand("inspector.cli.inspect:runs.object", "The same for the KITTI object detection frames."),
+    "tracking": LazyCommand("inspector.cli.inspect:runs.tracking", "The same for a KITTI tracking sequence."),
+    "kitti360": LazyCommand("inspector.cli.inspect:runs.kitti360", "The same for a KITTI-360 drive."),
+    "nuscenes": LazyCommand("inspector.cli.inspect:runs.nuscenes", "The same for a scene of nuScenes."),
+    "folder": LazyCommand("inspector.cli.inspect:runs.folder", "The same for a folder of your own images and scans."),
+    "bag": LazyCommand("inspector.cli.inspect:runs.bag", "The same for a ROS 1 or ROS 2 bag, or an MCAP file."),
     "rig": LazyCommand("inspector.cli.rig:rig", "Several cameras on one LiDAR, each alone or all as one rig."),
-    "demo": LazyCommand("inspector.cli.inspect:demo", "The same for the synthetic world: needs no data."),
+    "demo": LazyCommand("inspector.cli.inspect:runs.demo", "The same for the synthetic world: needs no data."),
     "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand and see what the cascade answers."),
     "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),
     "watch": LazyCommand("inspector.cli.watch:watch", "Whether the mount moved during a drive."),

@@ -14,7 +14,8 @@ from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES
 from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES, TOLERANCE
 from inspector.cli.output import JSON_FILE, make_console, prepare_json, say, write, write_json
-from inspector.cli.run import describe_provenance, recording_to
+from inspector.cli.preparing import describe_provenance
+from inspector.cli.run import recording_to
 from inspector.cli.viewing import next_lines, saved_lines, viewing_options
 
 if TYPE_CHECKING:

@@ -1,8 +1,7 @@
-"""``calib-inspect verify seq|raw|object|folder``: whether the calibration that you have is good."""
+"""``calib-inspect verify seq|raw|folder|bag|...``: whether the calibration that you have is good."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,13 +10,12 @@ import click
 
 from calibnet.errors import CalibnetError
 from inspector.cli.errors import VERDICT_CODES, ExitCode
-from inspector.cli.inspect import disturbed
 from inspector.cli.output import prepare_json, say, write_json
-from inspector.cli.run import checked, choose_outputs, finish, prepare, recording_to
-from inspector.cli.sequences import over_sequences
+from inspector.cli.preparing import prepare
+from inspector.cli.run import checked, choose_outputs, finish, recording_to
+from inspector.cli.sequences import Opening, disturbed, judged_options, over_sequences
 
 if TYPE_CHECKING:
-    from calibnet.datasets import Sequence
     from calibnet.verdict import Verdict
     from inspector.cli.viewing import Viewing
     from inspector.run.options import RunOptions
@@ -38,7 +36,7 @@ def verify() -> None:
 
 
 def verify_sequence(
-    opening: Callable[[], Sequence], *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
+    opening: Opening, *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
 ) -> int:
     """Judge the calibration of a sequence; returns the exit code.
 
@@ -93,4 +91,4 @@ def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> Ex
     return VERDICT_CODES[verdict.word]
 
 
-over_sequences(verify, verify_sequence)
+over_sequences(verify, verify_sequence, judged_options)

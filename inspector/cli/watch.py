@@ -1,8 +1,7 @@
-"""``calib-inspect watch seq|raw|object|folder``: whether the mount moved during a drive."""
+"""``calib-inspect watch seq|raw|folder|bag|...``: whether the mount moved during a drive."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -10,14 +9,13 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from inspector.cli.errors import ExitCode
-from inspector.cli.inspect import disturbed
 from inspector.cli.output import prepare_json, say, write_json
-from inspector.cli.run import checked, choose_outputs, prepare, recording_to
-from inspector.cli.sequences import over_sequences
+from inspector.cli.preparing import prepare
+from inspector.cli.run import checked, choose_outputs, recording_to
+from inspector.cli.sequences import Opening, disturbed, judged_options, over_sequences
 
 if TYPE_CHECKING:
     from calibnet.cascade.cascade import Cascade
-    from calibnet.datasets import Sequence
     from calibnet.watch import Watched
     from inspector.cli.viewing import Viewing
     from inspector.run.session import Session
@@ -37,7 +35,7 @@ def watch() -> None:
 
 
 def watch_sequence(
-    opening: Callable[[], Sequence], *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
+    opening: Opening, *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
 ) -> int:
     """Watch a sequence; returns the exit code.
 
@@ -100,4 +98,4 @@ def watch_session(session: Session) -> Watched:
         return watch_drive(cast("Cascade", session.cascade), session.frames, initial, drive_observer(progress, stop))
 
 
-over_sequences(watch, watch_sequence)
+over_sequences(watch, watch_sequence, judged_options)

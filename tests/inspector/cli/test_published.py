@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from inspector.cli import inspect as commands
 from inspector.cli.errors import run
-from inspector.cli.evaluate import open_sequences
-from inspector.cli.main import cli
+from inspector.cli.main import COMMANDS, cli
+from inspector.cli.sources import SOURCES, open_parts
 from tests.calibnet.datasets.published import write_kitti_360, write_nuscenes
 
 
@@ -32,7 +33,7 @@ def test_kitti_360(tmp_path: Path, opened: list[tuple[Any, dict[str, Any]]]) -> 
     assert run(cli, ["kitti360", "3", "--root", str(tmp_path), "--camera", "1", "--no-drive"]) == 0
     ((sequence, asked),) = opened
     assert (sequence.name, asked["camera"], asked["drive"]) == ("kitti-360/0003", 1, False)
-    (one,) = open_sequences("kitti-360", tmp_path, ["0003"], 1)
+    (one,) = open_parts("kitti-360", tmp_path, ["0003"], "1")
     assert one.rig == "KITTI-360, camera 1"
 
 
@@ -45,11 +46,42 @@ def test_nuscenes(tmp_path: Path, opened: list[tuple[Any, dict[str, Any]]], caps
     assert "no keyframe of CAM_BACK" in capsys.readouterr().err
     assert run(cli, ["nuscenes"]) == 3
     assert "give --root DIR or set NUSCENES" in capsys.readouterr().err
-    assert [one.name for one in open_sequences("nuscenes", tmp_path, ["103"], None)] == ["nuscenes/scene-0103"]
+    assert [one.name for one in open_parts("nuscenes", tmp_path, ["103"], None)] == ["nuscenes/scene-0103"]
 
 
-@pytest.mark.parametrize("group", ["verify", "watch"])
+@pytest.mark.parametrize("group", ["verify", "watch", "live"])
 @pytest.mark.parametrize("command", ["kitti360", "nuscenes"])
 def test_they_can_be_verified_and_watched(group: str, command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(cli, [group, command, "--help"]) == 0
     assert "--root" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("dataset", "text", "options"),
+    [
+        ("kitti-raw", "2011_09_26/0005", {"date": "2011_09_26", "drive": "0005"}),
+        ("kitti-tracking", "0004", {"sequence": "0004"}),
+        ("nuscenes", "scene-0061/CAM_BACK", {"scene": "scene-0061", "camera": "CAM_BACK"}),
+    ],
+)
+def test_a_sequence_is_named_by_its_parts(dataset: str, text: str, options: dict[str, str]) -> None:
+    (source,) = (one for one in SOURCES if one.dataset == dataset)
+    assert source.named(text) == options
+
+
+@pytest.mark.parametrize(
+    ("dataset", "text"), [("kitti-raw", "0005"), ("kitti-raw", "2011_09_26/"), ("nuscenes", "a/b/c")]
+)
+def test_another_name_says_what_one_looks_like(dataset: str, text: str) -> None:
+    (source,) = (one for one in SOURCES if one.dataset == dataset)
+    with pytest.raises(click.UsageError, match=f"is not [A-Z/]+, for instance {source.example}"):
+        source.named(text)
+
+
+def test_every_kind_of_data_is_a_command_of_its_own_and_below_the_others() -> None:
+    names = {source.name for source in SOURCES}
+    assert names <= COMMANDS.keys()
+    for group in ("verify", "watch", "live"):
+        command = COMMANDS[group].load()
+        assert isinstance(command, click.Group)
+        assert names <= command.commands.keys()

@@ -1,0 +1,112 @@
+"""One kind of data at the command line: what names it, and how it is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from calibnet.errors import ConfigError
+from inspector.cli.options import FOLDER
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A kind of data.
+
+    Attributes:
+        name: of its command.
+        of: what it is, as it stands in a sentence.
+        note: what else its help says.
+        parameters: that say what is opened; ``open`` takes them by their names.
+        open: opens it; what it raises is a `CalibnetError`.
+        given: its extrinsic is what is to be corrected, and no reference, unless a miscalibration is asked for.
+        one_mount: all its frames are of one extrinsic.
+        dataset: its name for `open_sequence`; empty where that knows none.
+        parts: options of the dataset that ``evaluate --sequences`` names, with slashes between them.
+        example: of such a name; the parts that it has are needed.
+        whole: the name where none is given; None where one is needed.
+    """
+
+    name: str
+    of: str
+    note: str
+    parameters: tuple[click.Parameter, ...]
+    open: Callable[..., Sequence]
+    given: bool = False
+    one_mount: bool = True
+    dataset: str = ""
+    parts: tuple[str, ...] = ()
+    example: str = ""
+    whole: str | None = None
+
+    def named(self, text: str) -> dict[str, str]:
+        """The dataset's options for one of the names of ``evaluate --sequences``."""
+        words = text.split("/")
+        if not (self.example.count("/") < len(words) <= len(self.parts) and all(words)):
+            form = "/".join(self.parts).upper()
+            raise click.UsageError(f"{text!r} is not {form}, for instance {self.example}.")
+        return dict(zip(self.parts, words, strict=False))
+
+
+def published(
+    command: str,
+    dataset: str,
+    where: str,
+    options: tuple[click.Parameter, ...],
+    *,
+    variable: str = "KITTI_ROOT",
+    **more: Any,
+) -> Source:
+    """A published data set, which lies below ``--root``.
+
+    Args:
+        command: its name.
+        dataset: its name for `open_sequence`, which gets all options.
+        where: what it is called, and where it comes from, for the sentence that asks for ``--root``.
+        options: besides ``--root``. An argument called ``number`` is the dataset's ``drive``, since ``--drive`` is
+            an option of the run.
+        variable: of the environment, that stands in for ``--root``.
+        **more: fields of the `Source`.
+    """
+    root_option = click.Option(
+        ["--root"], type=FOLDER, envvar=variable, help=f"The dataset's folder.  [env: {variable}]"
+    )
+
+    def open_it(root: Path | None, **asked: Any) -> Sequence:
+        from calibnet.datasets import open_sequence
+
+        if root is None:
+            raise ConfigError(
+                f"No {where.partition(' ')[0]} folder: give --root DIR or set {variable} to where {where}; "
+                "`calib-inspect demo` needs none."
+            )
+        return open_sequence(dataset, root, **{"drive" if key == "number" else key: asked[key] for key in asked})
+
+    return Source(name=command, parameters=(*options, root_option), open=open_it, dataset=dataset, **more)
+
+
+def open_folder(
+    directory: Path, dataset: str, camera_frame: str | None, lidar_frame: str | None, **asked: Any
+) -> Sequence:
+    """A plain folder, or a folder of a dataset of another package, which knows none of these options."""
+    from calibnet.datasets import open_sequence
+    from calibnet.datasets.calibration_files import FrameChoice
+
+    frames = FrameChoice(camera_frame, lidar_frame)
+    options = {**asked, "frames": frames if any(frames) else None}
+    return open_sequence(dataset, directory, **{name: value for name, value in options.items() if value is not None})
+
+
+def open_bag(files: tuple[Path, ...], camera_frame: str | None, lidar_frame: str | None, **asked: Any) -> Sequence:
+    """A bag."""
+    from calibnet.datasets.bag import Bag, BagOptions
+    from calibnet.datasets.calibration_files import FrameChoice
+
+    return Bag(files, BagOptions(frames=FrameChoice(camera_frame, lidar_frame), **asked))

@@ -1,0 +1,230 @@
+"""What can be calibrated: every kind of data once, as it is named at the command line and as it is opened.
+
+`calib-inspect NAME`, `verify NAME`, `watch NAME`, `live NAME` and `evaluate --dataset` all read this list.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from calibnet.datasets import dataset_names
+from inspector.cli.options import FOLDER
+from inspector.cli.source import Source, open_bag, open_folder, published
+
+if TYPE_CHECKING:
+    from calibnet.datasets import Sequence
+
+KITTI = "{} is unpacked (from cvlibs.net/datasets/kitti)"
+AS_GIVEN = (
+    "Without --range and --miscalibrate its calibration is what is to be corrected, and there is no reference; with "
+    "them it is the reference."
+)
+CAMERA = click.Option(
+    ["--camera"], type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
+)
+GUESS = click.Option(
+    ["--guess"],
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Start from the extrinsic of this calibration file; needed where the data's own has none.",
+)
+CAMERA_FRAME = click.Option(
+    ["--camera-frame"], metavar="NAME", help="The camera's optical frame, among many in a calibration file or a bag."
+)
+LIDAR_FRAME = click.Option(["--lidar-frame"], metavar="NAME", help="The LiDAR's frame, likewise.")
+OTHERS = ("kitti-", "nuscenes")
+"""How the datasets begin that have commands of their own."""
+
+SOURCES = (
+    published(
+        "seq",
+        "kitti-odometry",
+        KITTI.format("KITTI odometry"),
+        (click.Argument(["sequence"]), CAMERA),
+        of="a KITTI odometry sequence, for instance 04",
+        note="--root is the folder that holds `sequences`.",
+        parts=("sequence",),
+        example="04",
+    ),
+    published(
+        "raw",
+        "kitti-raw",
+        KITTI.format("KITTI raw"),
+        (click.Argument(["date"]), click.Argument(["number"], metavar="DRIVE"), CAMERA),
+        of="a KITTI raw drive, for instance 2011_09_26 0005",
+        note="--root is the folder that holds the dates.",
+        parts=("date", "drive"),
+        example="2011_09_26/0005",
+    ),
+    published(
+        "object",
+        "kitti-object",
+        KITTI.format("KITTI object detection"),
+        (
+            click.Option(
+                ["--split"], default="training", show_default=True, help="training, testing, or a list in ImageSets."
+            ),
+            CAMERA,
+        ),
+        of="the frames of the KITTI object detection benchmark",
+        note="--root is the folder that holds `training`. Its frames are of several mounts, so they are no drive.",
+        one_mount=False,
+        parts=("split",),
+        example="training",
+        whole="training",
+    ),
+    published(
+        "tracking",
+        "kitti-tracking",
+        KITTI.format("KITTI tracking"),
+        (click.Argument(["sequence"]), CAMERA),
+        of="a sequence of the KITTI tracking benchmark, for instance 0004",
+        note="--root is the folder that holds `training`.",
+        parts=("sequence",),
+        example="0004",
+    ),
+    published(
+        "kitti360",
+        "kitti-360",
+        "KITTI-360 is unpacked (from cvlibs.net/datasets/kitti-360)",
+        (
+            click.Argument(["number"], metavar="DRIVE"),
+            click.Option(
+                ["--camera"],
+                type=click.IntRange(0, 3),
+                default=0,
+                show_default=True,
+                help="Camera to calibrate: 0 and 1 look ahead, 2 and 3 are fisheyes to the sides.",
+            ),
+        ),
+        variable="KITTI360_DATASET",
+        of="a drive of KITTI-360, for instance 0003",
+        note="--root is the folder that holds `calibration`, `data_2d_raw` and `data_3d_raw`.",
+        parts=("drive",),
+        example="0003",
+    ),
+    published(
+        "nuscenes",
+        "nuscenes",
+        "nuScenes is unpacked (from nuscenes.org)",
+        (
+            click.Argument(["scene"], required=False, default=""),
+            click.Option(
+                ["--camera"], metavar="CHANNEL", default="CAM_FRONT", show_default=True, help="Camera to calibrate."
+            ),
+            click.Option(
+                ["--version"], default="", metavar="NAME", help="Folder of the tables.  [default: the only one]"
+            ),
+            click.Option(
+                ["--compensate/--as-taken"],
+                default=True,
+                show_default=True,
+                help="Move each scan to the time of its image, by the car's poses.",
+            ),
+        ),
+        variable="NUSCENES",
+        of="the keyframes of a scene of nuScenes, for instance scene-0061; the first one by default",
+        note="--root is the folder that holds `samples` and the tables, `v1.0-mini`. Its SDK is not needed.",
+        parts=("scene", "camera"),
+        example="scene-0061",
+        whole="",
+    ),
+    Source(
+        name="folder",
+        of="your own images/ and clouds/, with a calibration.yaml or the calibration file of another tool",
+        note=AS_GIVEN,
+        parameters=(
+            click.Argument(["directory"], type=FOLDER),
+            click.Option(
+                ["--dataset"],
+                type=click.Choice([name for name in dataset_names() if not name.startswith(OTHERS)]),
+                default="folder",
+                show_default=True,
+                help="What the folder holds; packages can add to these.",
+            ),
+            GUESS,
+            click.Option(
+                ["--camera"], metavar="NAME", help="Camera of a calibration file of several, for instance cam0."
+            ),
+            CAMERA_FRAME,
+            LIDAR_FRAME,
+            click.Option(
+                ["--max-time-difference"],
+                type=click.FloatRange(min=0),
+                metavar="MS",
+                help="Pair each image with the nearest scan within so many milliseconds, by timestamps.txt in both "
+                "folders or by names that are times.  [default: by name; by time within 50 where names differ]",
+            ),
+        ),
+        open=open_folder,
+        given=True,
+    ),
+    Source(
+        name="bag",
+        of="a ROS 1 or ROS 2 bag, or an MCAP file",
+        note="FILES is a .bag, .db3 or .mcap file, the folder of a ROS 2 bag, or several .bag files of one drive. "
+        "Topics are found where there is one of a kind; the lens comes from CameraInfo, and the first guess from "
+        f"/tf_static or --guess. {AS_GIVEN}",
+        parameters=(
+            click.Argument(["files"], type=click.Path(path_type=Path), nargs=-1, required=True),
+            click.Option(["--image"], metavar="TOPIC", help="Of the images.  [default: the only one]"),
+            click.Option(["--points"], metavar="TOPIC", help="Of the point clouds.  [default: the only one]"),
+            click.Option(["--info"], metavar="TOPIC", help="Of the CameraInfo.  [default: the one beside the images]"),
+            GUESS,
+            CAMERA_FRAME,
+            LIDAR_FRAME,
+            click.Option(
+                ["--every"],
+                type=click.FloatRange(min=0, min_open=True),
+                metavar="S",
+                help="A frame in so many seconds, at a standstill where there is one.  [default: about 40 frames]",
+            ),
+            click.Option(
+                ["--accumulate"],
+                type=click.IntRange(1, 100),
+                default=1,
+                metavar="N",
+                help="Put N scans together at a standstill, for scanners that do not repeat their pattern (Livox).",
+            ),
+            click.Option(
+                ["--max-time-difference"],
+                type=click.FloatRange(min=0, min_open=True),
+                metavar="MS",
+                help="Milliseconds that an image and its scan may be apart.  [default: 50]",
+            ),
+        ),
+        open=open_bag,
+        given=True,
+    ),
+)
+"""Every kind of data, in the order in which ``--help`` lists them."""
+
+
+def open_parts(dataset: str, root: Path, names: list[str], camera: str | None) -> list[Sequence]:
+    """Open the sequences of a dataset that ``evaluate --sequences`` names.
+
+    Args:
+        dataset: one of `dataset_names`.
+        root: its folder.
+        names: of the sequences; of a dataset without a command of its own, folders below ``root``.
+        camera: which one, as text; None for the dataset's own choice.
+    """
+    from calibnet.datasets import open_sequence
+
+    options: dict[str, Any] = {}
+    if camera is not None:
+        options["camera"] = int(camera) if camera.isdecimal() else camera
+    source = next((one for one in SOURCES if one.dataset == dataset), None)
+    if source is None:
+        return [open_sequence(dataset, root / name, **options) for name in names or [os.curdir]]
+    if not names and source.whole is None:
+        raise click.UsageError(
+            f"--sequences is needed with --dataset {dataset}, for instance --sequences {source.example}."
+        )
+    parts: list[Mapping[str, Any]] = [source.named(name) for name in names] or [{source.parts[0]: source.whole}]
+    return [open_sequence(dataset, root, **{**options, **part}) for part in parts]
