@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sized
+from collections.abc import Iterable, Iterator, Sized
 from collections.abc import Sequence as Positions
 
 from calibnet.datasets.frame import Frame, Sequence
@@ -46,6 +46,14 @@ def spread(count: int, most: int) -> list[int]:
     """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
     chosen = min(count, most)
     return [(number + 1) * count // chosen - 1 for number in range(chosen)]
+
+
+def by_rig(sequences: Iterable[Sequence]) -> dict[str, list[Sequence]]:
+    """Sequences by `Sequence.rig`, in the order in which rigs appear."""
+    found: dict[str, list[Sequence]] = {}
+    for sequence in sequences:
+        found.setdefault(sequence.rig, []).append(sequence)
+    return found
 
 
 class PickedFrames:

@@ -14,20 +14,19 @@ from calibnet.cascade.cascade import Cascade
 from calibnet.cascade.stage import Stage
 from calibnet.datasets import Frame
 from calibnet.datasets import Sequence as FrameSequence
+from calibnet.datasets.selection import by_rig
 from calibnet.errors import CalibrationError, WeightsError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import RANGES, MiscalibrationRange, pose_error
+from calibnet.methods.calibrator import MethodCard
 from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.network.config import load_preset
 from calibnet.network.convolution import pack
-from calibnet.network.counting import count
+from calibnet.network.counting import total
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.precision import fastest
-from calibnet.weights.files import weights_path
-
-HEIGHT, WIDTH = 256, 512
-"""Input at which multiply-adds are counted: the paper's."""
+from calibnet.weights.files import read_record, weights_path
 
 
 class Claim(NamedTuple):
@@ -85,64 +84,57 @@ def measure_ablation(
         observer: told how far it is.
 
     Yields:
-        A row for each ablation and rig, as soon as it is there; without weights one row with a sentence ``why``.
+        A row for each ablation and rig, as soon as it is there; without weights, one row with a
+        sentence ``why``.
 
     Raises:
         DatasetError: a frame cannot be read.
         ConfigError: there is no such preset.
     """
     told = observer or (lambda row, done, total: None)
-    rigs: dict[str, list[FrameSequence]] = {}
-    for sequence in sequences:
-        rigs.setdefault(sequence.rig, []).append(sequence)
     frame = sequences[0][0] if sequences else None
     for preset in presets:
         for name in ABLATIONS:
-            row: dict[str, Any] = {"preset": preset, "name": name, **_cost(preset, name, range_)}
-            stage, why = _trained(preset, name, range_, weights)
-            chosen = stage or _untrained(preset, name, range_)
-            row["latency_ms"] = latency(chosen, frame, timed) if frame is not None and timed else None
-            if stage is None or not rigs:
+            network = CalibrationNetwork(ablated(load_preset(preset), name), range_)
+            stage, card, why = _trained(preset, name, range_, weights)
+            parameters, multiply_adds = total(network)
+            row: dict[str, Any] = {"preset": preset, "name": name, "parameters": parameters}
+            row |= {"multiply_adds": multiply_adds, "latency_ms": None, "samples_trained": card.samples_trained}
+            if frame is not None and timed:
+                row["latency_ms"] = latency(stage or _untrained(network, range_), frame, timed)
+            if stage is None or not sequences:
                 yield row | {"why": why or "No frames were given to measure errors on."}
                 continue
-            for rig, of_rig in rigs.items():
-                yield row | {"rig": rig} | _errors(stage, of_rig, repeats, seed, f"{preset}, {name}, {rig}", told)
+            for rig, of_rig in by_rig(sequences).items():
+                errors = _errors(stage, of_rig, repeats, seed, f"{preset}, {name}, {rig}", told)
+                yield row | {"rig": rig, "in_rig": card.knows(rig)} | errors
 
 
-def _cost(preset: str, name: str, range_: MiscalibrationRange) -> dict[str, int]:
-    costs = count(CalibrationNetwork(ablated(load_preset(preset), name), range_), HEIGHT, WIDTH)
-    return {
-        "parameters": sum(cost.parameters for cost in costs),
-        "multiply_adds": sum(cost.multiply_adds for cost in costs),
-    }
-
-
-def _trained(preset: str, name: str, range_: MiscalibrationRange, weights: Path | None) -> tuple[Stage | None, str]:
-    """The stage of a row, or why there is none.
+def _trained(
+    preset: str, name: str, range_: MiscalibrationRange, weights: Path | None
+) -> tuple[Stage | None, MethodCard, str]:
+    """The stage of a row and what it was trained on, or why there is none.
 
     Raises:
         WeightsError: a file is there and cannot be used, or holds another row's network.
     """
-    train = f"`calib-inspect train --preset {preset} --ablation"
+    train = f"`calib-inspect train --preset {preset} --ablation {name} --range {range_} --output"
     if weights is None:
-        why = f"No folder of weights was given: {train} ROW --range {range_} --output DIR` fills one, row by row."
-        return None, why
-    command = f"make them with {train} {name} --range {range_} --output {weights}`"
+        return None, MethodCard(), f"No folder of weights was given; {train} DIR` fills one."
     folder = ablation_folder(weights, name)
     path = weights_path(preset, range_, folder)
     if not path.exists():
-        return None, f"There are no weights at {path}; {command}."
+        return None, MethodCard(), f"There are no weights at {path}; {train} {weights}` makes them."
     stage = Cascade.load(preset, (RANGES.index(range_) + 1,), folder).stages[0]
     wanted, found = ablated(load_preset(preset), name), stage.network.config
     if any(getattr(wanted, switch) != getattr(found, switch) for switch in ABLATIONS.values() if switch):
-        raise WeightsError(f"{path} holds the network of another row of the ablation; {command}.")
-    return stage, ""
+        raise WeightsError(f"{path} holds the network of another row of the ablation; {train} {weights}` makes it.")
+    return stage, MethodCard.trained(0, 0, [read_record(path)]), ""
 
 
-def _untrained(preset: str, name: str, range_: MiscalibrationRange) -> Stage:
+def _untrained(network: CalibrationNetwork, range_: MiscalibrationRange) -> Stage:
     """A row's network with random weights, for its latency alone."""
-    network = CalibrationNetwork(ablated(load_preset(preset), name), range_).eval()
-    pack(network, fastest(torch.device("cpu")))
+    pack(network.eval(), fastest(torch.device("cpu")))
     return Stage(RANGES.index(range_) + 1, range_, network)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from calibnet.datasets import Frame, PickedFrames
 from calibnet.datasets import Sequence as FrameSequence
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import by_rig, spread
 from calibnet.errors import CalibnetError, CalibrationError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
 from calibnet.evaluation.claims import CLAIMS
@@ -63,10 +63,7 @@ class Bench:
     @property
     def rigs(self) -> dict[str, list[FrameSequence]]:
         """The sequences by rig."""
-        found: dict[str, list[FrameSequence]] = {}
-        for sequence in self.sequences:
-            found.setdefault(sequence.rig, []).append(sequence)
-        return found
+        return by_rig(self.sequences)
 
 
 class Step(NamedTuple):
@@ -94,6 +91,19 @@ def measure_bench(
     """
     for contestant in contestants:
         yield contestant.name, _entry(bench, contestant, observer or (lambda step: None))
+
+
+def initial_rows(bench: Bench) -> Iterator[dict[str, Any]]:
+    """The errors that single frames begin with, which a method has to be better than.
+
+    Raises:
+        DatasetError: a frame cannot be read.
+    """
+    for range_ in bench.ranges:
+        for rig, sequences in bench.rigs.items():
+            errors = [pose_error(one.initial, one.reference) for one in _frames(bench, range_, sequences)]
+            if errors:
+                yield {"range": str(range_), "rig": rig, "runs": len(errors), **Metrics.of(errors).as_dict()}
 
 
 def _entry(bench: Bench, contestant: Contestant, observer: Observer) -> dict[str, Any]:

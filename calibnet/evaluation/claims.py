@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-KITTI_OWN = "KITTI, of one car: trained and tested on its frames"
-HAN = "as quoted by Han et al. 2025, table 2; their measurements are of each paper's own frames"
-PROJFUSION = "measured by the authors of ProjFusion (2026), one code base, trained and tested in one rig"
+KITTI_OWN = "KITTI, the car that it was trained on"
+HAN = "its paper, as quoted by Han et al. (2025), table 2"
+PROJFUSION = "ProjFusion (2026), which trained and tested all in one rig"
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Claim:
     """
 
     range: str
-    rotation_deg: float | None
-    translation_cm: float | None
+    rotation_deg: float
+    translation_cm: float
     rig: str
     source: str
 
@@ -40,31 +40,31 @@ class Claim:
 
 CLAIMS: dict[str, tuple[Claim, ...]] = {
     "cascade": (
-        Claim("±0.25 m", 0.138, 1.101, KITTI_OWN, "Han et al. 2025, table 2, of the method that our cascade follows"),
-        Claim("±1.5 m", 0.020, 0.278, KITTI_OWN, "Han et al. 2025, table 2, of the method that our cascade follows"),
+        Claim("±0.25 m", 0.138, 1.101, KITTI_OWN, "Han et al. (2025), table 2, whose method the cascade follows"),
+        Claim("±1.5 m", 0.020, 0.278, KITTI_OWN, "Han et al. (2025), table 2, whose method the cascade follows"),
     ),
-    "regnet": (Claim("±20° / 1.5 m", 0.28, 6.0, KITTI_OWN, f"its own, {HAN}"),),
+    "regnet": (Claim("±20° / 1.5 m", 0.28, 6.0, KITTI_OWN, HAN),),
     "calibnet": (
-        Claim("±0.2 m", 0.41, 4.34, KITTI_OWN, f"its own, {HAN}"),
+        Claim("±0.2 m", 0.41, 4.34, KITTI_OWN, HAN),
         Claim("10° / 25 cm", 2.28, 6.47, "KITTI odometry 13-16, 18; RMSE of the angle", PROJFUSION),
     ),
     "lccnet": (
-        Claim("±1.5 m", 0.017, 0.297, KITTI_OWN, f"its own, {HAN}"),
+        Claim("±1.5 m", 0.017, 0.297, KITTI_OWN, HAN),
         Claim("10° / 25 cm", 2.50, 6.08, "KITTI odometry 13-16, 18; one network; RMSE of the angle", PROJFUSION),
     ),
     "calibformer": (
-        Claim("±0.25 m", 0.141, 1.188, KITTI_OWN, f"its own, {HAN}"),
-        Claim("not said in its abstract", 0.0562, 0.8751, KITTI_OWN, "its own abstract (ICRA 2024)"),
+        Claim("±0.25 m", 0.141, 1.188, KITTI_OWN, HAN),
+        Claim("a range not given", 0.0562, 0.8751, KITTI_OWN, "its abstract (ICRA 2024)"),
     ),
     "calib-anything": (
-        Claim("±0.2 m", 0.136, 1.027, "KITTI", f"its own, {HAN}"),
+        Claim("±0.2 m", 0.136, 1.027, "KITTI", HAN),
         Claim("10° / 25 cm", 5.32, 28.2, "KITTI odometry 13-16, 18; RMSE of the angle", PROJFUSION),
-        Claim("not said", 0.299, 12.08, "KITTI", "a table of others (PMC13006848)"),
+        Claim("a range not given", 0.299, 12.08, "KITTI", "another paper's table (PMC13006848)"),
     ),
-    "pcba": (Claim("±1.5 m", 0.019, 0.305, "not said", f"its own, {HAN}"),),
+    "pcba": (Claim("±1.5 m", 0.019, 0.305, "frames not named", HAN),),
     "information-distance": (
         Claim("10° / 25 cm", 13.1, 147.0, "KITTI odometry 13-16, 18; single shot; RMSE of the angle", PROJFUSION),
-        Claim("not said", 5.02, 8.91, "KITTI", "a table of others (PMC13006848)"),
+        Claim("a range not given", 5.02, 8.91, "KITTI", "another paper's table (PMC13006848)"),
     ),
 }
 """By the name of the method."""

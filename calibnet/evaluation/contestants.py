@@ -11,14 +11,9 @@ from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
 from calibnet.methods.calibrator import Calibrator, MethodCard
 from calibnet.methods.registry import CASCADE, METHODS, accepts, open_method
 from calibnet.network.config import load_preset
-from calibnet.network.counting import count
+from calibnet.network.counting import total
 from calibnet.network.network import CalibrationNetwork
 from calibnet.weights import read_record, weights_path
-
-HEIGHT, WIDTH = 256, 512
-"""Input at which multiply-adds are counted: the paper's."""
-KITTI_RIG = "KITTI 2011_09_26"
-"""Of all KITTI frames that are trained on."""
 
 
 def contestants(
@@ -70,14 +65,6 @@ class MeasuredCascade(Cascade):
 
 def cascade_card(cascade: Cascade, preset: str, folder: Path | None) -> MethodCard:
     """What the stages cost together, and what their records say they were trained on."""
-    costs = count(CalibrationNetwork(load_preset(preset), RANGES[0]), HEIGHT, WIDTH)  # of one stage: all cost the same
-    records = [read_record(weights_path(preset, RANGES[number - 1], folder)) for number in cascade.numbers]
-    options = [record.get("options", {}) for record in records]
-    data = " ".join(f"{one.get('packed') or ''} {' '.join(map(str, one.get('data') or []))}" for one in options)
-    return MethodCard(
-        len(cascade.stages) * sum(cost.parameters for cost in costs),
-        len(cascade.stages) * sum(cost.multiply_adds for cost in costs),
-        sum(int(record.get("samples", 0)) for record in records),
-        tuple(dict.fromkeys(rig for record in records for rig in record.get("rigs", ())))
-        or ((KITTI_RIG,) if "kitti" in data.lower() else ()),
-    )
+    parameters, multiply_adds = total(CalibrationNetwork(load_preset(preset), RANGES[0]))  # every stage costs the same
+    paths = [weights_path(preset, RANGES[number - 1], folder) for number in cascade.numbers]
+    return MethodCard.trained(len(paths) * parameters, len(paths) * multiply_adds, map(read_record, paths))

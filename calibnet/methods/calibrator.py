@@ -5,9 +5,9 @@ A method may say what it costs (`Described`), and that it needs the motion of a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
@@ -60,6 +60,10 @@ class DriveCalibrator(Calibrator, Protocol):
         ...
 
 
+_RENAMED = {"kitti-object/train": "KITTI object detection"}
+"""Rigs that records of packed trainings once named after their sequence."""
+
+
 @dataclass(frozen=True)
 class MethodCard:
     """What a method costs and what it was trained on, for tables.
@@ -75,6 +79,14 @@ class MethodCard:
     multiply_adds: int = 0
     samples_trained: int = 0
     trained_on: tuple[str, ...] = ()
+
+    @classmethod
+    def trained(cls, parameters: int, multiply_adds: int, records: Iterable[Mapping[str, Any]]) -> MethodCard:
+        """Of networks that cost so much together, with the records of their trainings (`read_record`)."""
+        records = list(records)
+        rigs = (_RENAMED.get(rig, rig) for record in records for rig in record.get("rigs", ()))
+        samples = sum(int(record.get("samples", 0)) for record in records)
+        return cls(parameters, multiply_adds, samples, tuple(dict.fromkeys(rigs)))
 
     def knows(self, rig: str) -> bool:
         """Whether it was trained on a rig."""

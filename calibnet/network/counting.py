@@ -11,6 +11,9 @@ from torch.utils.flop_counter import FlopCounterMode
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
 
+HEIGHT, WIDTH = 256, 512
+"""Input at which multiply-adds are counted: the paper's."""
+
 
 class ModuleCost(NamedTuple):
     """One box of the figure.
@@ -26,7 +29,7 @@ class ModuleCost(NamedTuple):
     multiply_adds: int
 
 
-def count(network: CalibrationNetwork, height: int, width: int) -> list[ModuleCost]:
+def count(network: CalibrationNetwork, height: int = HEIGHT, width: int = WIDTH) -> list[ModuleCost]:
     """Count a forward pass of one image and scan of ``height`` x ``width`` pixels, by running it.
 
     Not counted is what the figures of this field leave out too: normalisation, activations,
@@ -50,6 +53,12 @@ def count(network: CalibrationNetwork, height: int, width: int) -> list[ModuleCo
         network(empty_inputs(network, height, width), clock=clock)
     parameters = own_parameters(modules)
     return [ModuleCost(part.replace("_", " "), parameters[part], flops[part] // 2) for part in modules]
+
+
+def total(network: CalibrationNetwork) -> tuple[int, int]:
+    """Parameters and multiply-adds of all its boxes, at the paper's input."""
+    costs = count(network)
+    return sum(cost.parameters for cost in costs), sum(cost.multiply_adds for cost in costs)
 
 
 def own_parameters(modules: dict[str, list[nn.Module]]) -> dict[str, int]:

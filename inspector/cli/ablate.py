@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from calibnet.geometry import MiscalibrationRange
 
 FILE = click.Path(dir_okay=False, path_type=Path)
-NAMES = ("without", "rig")
-COLUMNS = (*NAMES, "parameters", "multiply-adds", "latency", "rotation", "translation")
 
 
 @click.command()
@@ -70,7 +68,7 @@ def ablate(
     """Take the network apart: what each of the paper's five ablations and the whole network costs and is worth.
 
     Parameters, multiply-adds, latency and errors stand beside the paper's. Errors are those after one look of the
-    network of --range, by rig, for the rows that --weights has; latency is of one look, on the first frame of --data.
+    network of --range for the rows that --weights has; latency is of one look, on the first frame of --data.
     The preset paper has no weights, and takes a minute or two of CPU for its latencies.
 
     \b
@@ -79,6 +77,7 @@ def ablate(
       --data kitti-raw:KITTI/raw:2011_09_26/0048 --data kitti-odometry:KITTI/odometry:04
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
     from calibnet.runtime.writing import Kind
+    from inspector.report.ablation_tables import as_markdown
 
     prepare_json(json_file)
     prepare(markdown_file, Kind.EXPORT)
@@ -110,8 +109,10 @@ def measured(
     import torch
 
     from calibnet.datasets import PickedFrames, select_frames
-    from calibnet.evaluation.ablation import HEIGHT, WIDTH, measure_ablation
+    from calibnet.evaluation.ablation import measure_ablation
+    from calibnet.evaluation.bench import Bench, initial_rows
     from calibnet.geometry import RANGES
+    from calibnet.network.counting import HEIGHT, WIDTH
     from calibnet.training.data import open_data
 
     if range_ not in RANGES:
@@ -120,6 +121,7 @@ def measured(
     torch.set_num_threads(threads)
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
+    every = Bench(list(sequences), (range_,), repeats, seed, most=max(map(len, sequences), default=0))
     rows: list[dict[str, Any]] = []
     with make_console().status("") as status:
 
@@ -138,67 +140,24 @@ def measured(
         "seed": seed,
         "threads": threads,
         "processor": platform.processor() or platform.machine(),
+        "initial": list(initial_rows(every)),
         "rows": rows,
     }
 
 
-def title(content: dict[str, Any]) -> str:
-    """What the table is of."""
-    return f"Ablation, ±{content['range']}, one look; in brackets what the paper says of its own"
-
-
-def cells(row: dict[str, Any]) -> tuple[str, ...]:
-    """A row as texts, in the order of `COLUMNS`."""
-    from calibnet.evaluation.ablation import CLAIMS
-
-    claim, took = CLAIMS[row["name"]], row["latency_ms"]
-    rotation, translation = row.get("rotation_deg"), row.get("translation_cm")
-    return (
-        "– (full)" if row["name"] == "full" else row["name"],
-        row.get("rig", ""),
-        f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
-        f"{row['multiply_adds'] / 1e9:.2f} G ({claim.flops_g:g})",
-        "" if took is None else f"{took:.0f} ms ({claim.latency_ms:g})",
-        "" if rotation is None else f"{rotation['mean']:.2f}° ({claim.rotation_deg:g})",
-        "" if translation is None else f"{translation['mean']:.1f} cm ({claim.translation_cm:g})",
-    )
-
-
-def tables(content: dict[str, Any]) -> Iterator[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
-    """A table for each preset: its name, the heads of the columns that have something in them, and its lines."""
-    for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
-        lines = [cells(row) for row in content["rows"] if row["preset"] == preset]
-        used = [position for position in range(len(COLUMNS)) if any(line[position] for line in lines)]
-        yield preset, tuple(COLUMNS[k] for k in used), [tuple(line[k] for k in used) for line in lines]
-
-
 def print_ablation(content: dict[str, Any], console: Console) -> None:
-    """The tables on the terminal, and why rows have no errors."""
+    """The tables on the terminal, and which rows have no errors."""
     from rich.table import Table
+
+    from inspector.report.ablation_tables import tables, title, untrained
+    from inspector.report.markdown import WORDS
 
     for preset, heads, lines in tables(content):
         table = Table(title=f"{preset}: {title(content)}")
         for head in heads:
-            table.add_column(head, justify="left" if head in NAMES else "right", overflow="fold")
+            table.add_column(head, justify="left" if head in WORDS else "right", overflow="fold")
         for line in lines:
             table.add_row(*line)
         console.print(table)
-    for why in dict.fromkeys(row["why"] for row in content["rows"] if "why" in row):
-        say(why, err=console.stderr)
-
-
-def as_markdown(content: dict[str, Any]) -> str:
-    """The same for documents."""
-    parts = [f"# {title(content)}"]
-    for preset, heads, lines in tables(content):
-        marks = "".join("---|" if head in NAMES else "---:|" for head in heads)
-        table = ["| " + " | ".join(heads) + " |", "|" + marks, *("| " + " | ".join(line) + " |" for line in lines)]
-        parts += [f"## {preset}", "\n".join(table)]
-    of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
-    parts.append(
-        f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "
-        f"multiply-adds at {content['input'][0]} x {content['input'][1]}; latency of one look on "
-        f"{content['processor']}, {content['threads']} threads. Made by calib-inspect ablate."
-    )
-    parts += dict.fromkeys(row["why"] for row in content["rows"] if "why" in row)
-    return "\n\n".join(parts) + "\n"
+    if missing := untrained(content):
+        say(missing, err=console.stderr)

@@ -105,7 +105,8 @@ def bench(
     """
     from calibnet.runtime.writing import Kind
     from inspector.report import bench_page
-    from inspector.report.bench_rows import as_csv, as_markdown
+    from inspector.report.bench_rows import as_csv
+    from inspector.report.bench_tables import as_markdown
 
     outputs = (
         (csv_file, as_csv, Kind.TABLE),
@@ -169,12 +170,12 @@ def run(measured: Bench, contestants: list[Contestant], threads: int, json_file:
     import cv2
     import torch
 
-    from calibnet.evaluation.bench import measure_bench
+    from calibnet.evaluation.bench import initial_rows, measure_bench
     from inspector.cli.evaluate import Bars
 
     torch.set_num_threads(threads)
     cv2.setNumThreads(threads)
-    content = described(measured, threads)
+    content = described(measured, threads) | {"initial": list(initial_rows(measured)), "methods": {}}
     bars = Bars()
 
     def show(step: BenchStep) -> None:
@@ -209,5 +210,4 @@ def described(measured: Bench, threads: int) -> dict[str, Any]:
         "limit_s": measured.limit_s,
         "threads": threads,
         "processor": platform.processor() or platform.machine(),
-        "methods": {},
     }

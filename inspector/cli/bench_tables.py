@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from calibnet.geometry import MiscalibrationRange
-from inspector.report.bench_rows import KINDS, NOTHING, about, audit_cells, claims, costs, rows
+from inspector.report.bench_rows import KINDS, NOTHING, about, claims, costs, rows
+from inspector.report.bench_summary import ERRORS, LEGEND, PICTURES, summary
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -13,8 +14,13 @@ if TYPE_CHECKING:
 
 
 def print_bench(content: dict[str, Any], console: Console) -> None:
-    """A table a range, one of costs, and the claims of papers line by line."""
-    console.print(about(content), soft_wrap=True)
+    """A line a method for each range, then one a rig; what they cost, and the claims of papers line by line."""
+    console.print(about(content), LEGEND, sep="\n")
+    for range_ in content["ranges"]:
+        for title, heads in (("mean errors", ERRORS), ("with pictures that are not the scan's", PICTURES)):
+            table = _summary(content, range_, title, heads)
+            if len(table.columns) > 2:
+                console.print(table)
     letters = {rig: chr(ord("A") + number % 26) for number, rig in enumerate(_rigs(content))}
     for rig, letter in letters.items():
         console.print(f"Rig {letter}: {rig}", soft_wrap=True)
@@ -25,12 +31,10 @@ def print_bench(content: dict[str, Any], console: Console) -> None:
         if row.why:
             console.print(f"{row.method}, {row.label}: {row.why}", soft_wrap=True, style="yellow")
     console.print(_costs(content))
-    console.print(_audit(content))
+    console.print("Published elsewhere, on other frames:")
     for name, claim in claims(content):
         errors = f"{claim['rotation_deg']:g}° / {claim['translation_cm']:g} cm"
-        console.print(
-            f"{name} claims {errors} from {claim['range']} on {claim['rig']} ({claim['source']}).", soft_wrap=True
-        )
+        console.print(f"{name}: {errors} from {claim['range']} on {claim['rig']} ({claim['source']}).", soft_wrap=True)
 
 
 def _rigs(content: dict[str, Any]) -> list[str]:
@@ -38,21 +42,25 @@ def _rigs(content: dict[str, Any]) -> list[str]:
 
 
 def _errors(content: dict[str, Any], range_: str, letters: dict[str, str]) -> Table:
-    table = _table(f"{MiscalibrationRange.parse(range_).label}, median and 95th percentile")
+    table = _table(
+        f"From {MiscalibrationRange.parse(range_).label} by rig: median and 95th percentile; runs within 2° and 5 cm"
+    )
     table.add_column("rig", no_wrap=True)
-    for head in ("degrees", "cm", "2°, 5 cm", "refused"):
+    for head in ("degrees", "cm", "2°, 5 cm"):
         table.add_column(head, justify="right", no_wrap=True)
     for row in rows(content):
         if row.range == range_:
             errors = [_pair(row.error(kind, "median"), row.error(kind, "p95")) for kind in KINDS]
             known = "*" if row.known == "known" else " "
             where = f"{letters.get(row.rig, '')}{known} {row.of}" if row.rig else ""
-            table.add_row(row.method, where, *errors, row.success, row.refused)
+            table.add_row(row.method, where, *errors, row.success)
     return table
 
 
 def _pair(median: float | None, p95: float | None) -> str:
-    return NOTHING if median is None or p95 is None else f"{median:.2f} / {p95:.2f}"
+    if median is None or p95 is None:
+        return NOTHING
+    return " / ".join(f"{value:.{2 if value < 10 else 1}f}" for value in (median, p95))
 
 
 def _costs(content: dict[str, Any]) -> Table:
@@ -66,12 +74,15 @@ def _costs(content: dict[str, Any]) -> Table:
     return table
 
 
-def _audit(content: dict[str, Any]) -> Table:
-    table = _table("Medians with pictures that are not the scan's")
-    for head in ("grey picture", "picture of another drive"):
-        table.add_column(head, justify="right", no_wrap=True)
-    for name, entry in content["methods"].items():
-        table.add_row(name, *audit_cells(entry).values())
+def _summary(content: dict[str, Any], range_: str, title: str, chosen: tuple[str, ...]) -> Table:
+    heads, body = summary(content, range_)
+    table = _table(f"From {MiscalibrationRange.parse(range_).label}, {title}")
+    kept = [k for k in range(1, len(heads)) if heads[k] == "of" or heads[k] in chosen]
+    for k in kept:
+        table.add_column(heads[k], justify="left" if heads[k] == "of" else "right")
+    for line in body:
+        if any(line[k] != NOTHING for k in kept[1:]):
+            table.add_row(line[0], *(line[k] for k in kept))
     return table
 
 

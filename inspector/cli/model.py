@@ -11,9 +11,6 @@ from inspector.cli.output import JSON_FILE, console_beside, overwrite_option, pr
 if TYPE_CHECKING:
     from rich.table import Table
 
-HEIGHT, WIDTH = 256, 512
-"""Input at which multiply-adds are counted: the paper's."""
-
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network: compact, paper or another preset.")
@@ -26,12 +23,12 @@ def info(preset: str, json_file: str | None) -> None:
     """
     from calibnet.geometry import RANGES
     from calibnet.network.config import load_preset
-    from calibnet.network.counting import count
+    from calibnet.network.counting import HEIGHT, WIDTH, count
     from calibnet.network.network import CalibrationNetwork
 
     prepare_json(json_file)
     network = CalibrationNetwork(load_preset(preset), RANGES[0])  # any range: the cost is the same
-    costs = count(network, HEIGHT, WIDTH)
+    costs = count(network)
     modules = [
         {"name": cost.name, "parameters": cost.parameters, "multiply_adds": cost.multiply_adds} for cost in costs
     ]
@@ -51,7 +48,7 @@ def cost_table(content: dict[str, Any]) -> Table:
     """One row a module and one for the total."""
     from rich.table import Table
 
-    table = Table(title=f"{content['preset']}, one stage at {HEIGHT} x {WIDTH}")
+    table = Table(title=f"{content['preset']}, one stage at {content['input'][0]} x {content['input'][1]}")
     table.add_column("module")
     table.add_column("parameters", justify="right")
     table.add_column("multiply-adds", justify="right")

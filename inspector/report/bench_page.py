@@ -5,7 +5,9 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from inspector.report.bench_rows import about, tables
+from inspector.report.bench_rows import about
+from inspector.report.bench_summary import LEGEND
+from inspector.report.bench_tables import TITLE, long_tables, short_tables
 from inspector.report.page import stylesheet
 
 _PAGE = """<!doctype html>
@@ -14,21 +16,23 @@ _PAGE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="generator" content="calib-inspect">
-<title>All methods on the same frames</title>
+<title>{title}</title>
 <link rel="icon" href="data:,">
 <style>
 {style}
-table.figures td, table.figures th {{ text-align: left; vertical-align: top; }}
+main {{ max-width: 1360px; }}
+td, th {{ text-align: left; vertical-align: top; padding: 4px 14px 4px 0; }}
+td:last-child {{ white-space: normal; }}
+summary {{ cursor: pointer; font-weight: 600; }}
 </style>
 </head>
 <body>
 <main>
 <header>
 <p class="kind">Camera–LiDAR calibration: methods compared</p>
-<h1>All methods on the same frames, from the same miscalibrations</h1>
+<h1>{title}</h1>
 <p class="about">{about}</p>
-<p>“Known” is a rig that the method was trained on, “other” one that it never saw. What a method can do with a grey
-picture, or with that of another drive, it does not read off the picture.</p>
+<p>{legend}</p>
 </header>
 {sections}
 </main>
@@ -39,15 +43,19 @@ picture, or with that of another drive, it does not read off the picture.</p>
 
 def page(content: dict[str, Any]) -> str:
     """The page of what ``bench --json`` wrote."""
-    sections = [_section(title, heads, body) for title, (heads, body) in tables(content)]
-    return _PAGE.format(style=stylesheet(), about=escape(about(content)), sections="\n".join(sections))
+    sections = [_section(title, *table) for title, table in short_tables(content)]
+    sections += [_section(title, *table, folded=True) for title, table in long_tables(content)]
+    said = {"title": TITLE, "about": escape(about(content)), "legend": escape(LEGEND)}
+    return _PAGE.format(style=stylesheet(), sections="\n".join(sections), **said)
 
 
-def _section(title: str, heads: list[str], body: list[list[str]]) -> str:
+def _section(title: str, heads: list[str], body: list[list[str]], folded: bool = False) -> str:
     head = "".join(f"<th>{escape(cell)}</th>" for cell in heads)
     lines = "\n".join(f"<tr>{_cells(line)}</tr>" for line in body)
-    table = f'<table class="figures"><thead><tr>{head}</tr></thead><tbody>\n{lines}\n</tbody></table>'
-    return f'<section>\n<h2>{escape(title)}</h2>\n<div class="wide">{table}</div>\n</section>'
+    table = f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>\n{lines}\n</tbody></table></div>'
+    if folded:
+        return f"<section><details><summary>{escape(title)}</summary>\n{table}\n</details></section>"
+    return f"<section>\n<h2>{escape(title)}</h2>\n{table}\n</section>"
 
 
 def _cells(line: list[str]) -> str:

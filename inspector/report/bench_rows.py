@@ -12,6 +12,8 @@ from calibnet.geometry import MiscalibrationRange
 
 NOTHING = "–"
 KINDS = ("rotation_deg", "translation_cm")
+SHOWN = 4
+"""Rigs that are named of those that a method was trained on."""
 AXES = ("roll", "pitch", "yaw"), ("x", "y", "z")
 
 
@@ -56,11 +58,6 @@ class Row:
         return NOTHING if value is None else f"{value:.2f}°" if kind == "rotation_deg" else f"{value:.1f} cm"
 
     @property
-    def means(self) -> list[str]:
-        """Mean errors."""
-        return [self.said(kind, "mean") for kind in KINDS]
-
-    @property
     def success(self) -> str:
         """Share of runs within 2° and 5 cm."""
         share = self.figures.get("success_2deg_5cm")
@@ -94,29 +91,15 @@ def _known(entry: dict[str, Any], row: dict[str, Any]) -> str:
 def costs(entry: dict[str, Any]) -> dict[str, str]:
     """What a method costs, by heading."""
     parameters, adds, ms = entry["parameters"], entry["multiply_adds"], entry["latency_ms"]
-    samples, trained = entry["samples_trained"], ", ".join(entry["trained_on"])
+    samples, trained = entry["samples_trained"], entry["trained_on"]
+    rigs = ", ".join(trained[:SHOWN]) + (f" and {len(trained) - SHOWN} more" if len(trained) > SHOWN else "")
     return {
         "parameters": NOTHING if parameters is None else f"{parameters / 1e6:.2f} M" if parameters else "none",
         "multiply-adds": NOTHING if adds is None else f"{adds / 1e9:.2f} G" if adds else "none",
         "a frame": NOTHING if ms is None else f"{ms:.0f} ms" if ms < 10_000 else f"{ms / 1000:.0f} s",
         "samples": NOTHING if samples is None else f"{samples:,}" if samples else "none",
-        "trained on": trained or ("no rig" if samples == 0 else NOTHING),
+        "trained on": rigs or ("no rig" if samples == 0 else NOTHING),
     }
-
-
-def audit_cells(entry: dict[str, Any]) -> dict[str, str]:
-    """Median rotation and translation with grey pictures and with those of another drive."""
-    cells = {}
-    for name in ("grey", "swapped"):
-        row = entry["audit"].get(name)
-        if row is None:
-            cells[name] = NOTHING
-        elif "why" in row:
-            cells[name] = "refused"
-        else:
-            rotation, translation = row["rotation_deg"]["median"], row["translation_cm"]["median"]
-            cells[name] = f"{rotation:.2f}° / {translation:.1f} cm"
-    return cells
 
 
 def claims(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -128,12 +111,16 @@ def claims(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def about(content: dict[str, Any]) -> str:
     """What was measured on, in a sentence."""
-    rigs = ", ".join(dict.fromkeys(one["rig"] for one in content["sequences"]))
+    rigs = list(dict.fromkeys(one["rig"] for one in content["sequences"]))
     return (
-        f"{len(content['sequences'])} sequences of {rigs}; at most {content['most']} frames of each, "
-        f"{content['repeats']} miscalibration{'' if content['repeats'] == 1 else 's'} a frame, seed {content['seed']}; "
-        f"{content['threads']} threads."
+        f"{_count(len(content['sequences']), 'sequence')} of {_count(len(rigs), 'rig')} ({'; '.join(rigs)}); "
+        f"at most {content['most']} frames of each, {_count(content['repeats'], 'miscalibration')} a frame, "
+        f"seed {content['seed']}; {_count(content['threads'], 'thread')}."
     )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def as_csv(content: dict[str, Any]) -> str:
@@ -155,82 +142,3 @@ def as_csv(content: dict[str, Any]) -> str:
         cells += [entry[key] for key in ("parameters", "multiply_adds", "latency_ms", "samples_trained")]
         table.writerow([*cells, "; ".join(entry["trained_on"]), row.why])
     return text.getvalue()
-
-
-def as_markdown(content: dict[str, Any]) -> str:
-    """The page for documents."""
-    lines = [
-        "<!-- Made by calib-inspect bench --from FILE --markdown FILE. -->",
-        "",
-        "# All methods on the same frames",
-    ]
-    lines += ["", about(content), ""]
-    for title, table in tables(content):
-        lines += [f"## {title}", "", *_markdown(*table), ""]
-    return "\n".join(lines)
-
-
-Table = tuple[list[str], list[list[str]]]
-
-
-def _errors(content: dict[str, Any], range_: str) -> Table:
-    heads = ["method", "rig", "trained there", "of", "rotation, median", "p95", "translation, median", "p95"]
-    heads += ["within 2° and 5 cm", "refused"]
-    body = []
-    for row in (one for one in rows(content) if one.range == range_):
-        cells = [row.method, row.rig or NOTHING, row.known, row.of]
-        if row.why:
-            body.append([*cells, row.why, *[""] * 4, row.refused])
-            continue
-        figures = [row.said(kind, name) for kind in KINDS for name in ("median", "p95")]
-        body.append([*cells, *figures, row.success, row.refused])
-    return heads, body
-
-
-def _axes(content: dict[str, Any], range_: str) -> Table:
-    names = [(kind, axis) for kind, axes in zip(KINDS, AXES, strict=True) for axis in axes]
-    body = [
-        [row.method, row.rig, row.of, *(row.said(kind, name) for kind, name in names), *row.means]
-        for row in rows(content)
-        if row.range == range_ and not row.why
-    ]
-    return ["method", "rig", "of", *(axis for _, axis in names), "rotation, mean", "translation, mean"], body
-
-
-def _costs(content: dict[str, Any]) -> Table:
-    body = [[name, *costs(entry).values(), *audit_cells(entry).values()] for name, entry in content["methods"].items()]
-    heads = ["method", "parameters", "multiply-adds", "a frame", "samples", "trained on"]
-    return [*heads, "grey picture", "picture of another drive"], body
-
-
-def _claims(content: dict[str, Any]) -> Table:
-    def number(value: float | None, unit: str) -> str:
-        return NOTHING if value is None else f"{value:g}{unit}"
-
-    body = [
-        [
-            name,
-            claim["range"],
-            number(claim["rotation_deg"], "°"),
-            number(claim["translation_cm"], " cm"),
-            claim["rig"],
-            claim["source"],
-        ]
-        for name, claim in claims(content)
-    ]
-    return ["method", "range", "rotation", "translation", "measured on", "says who"], body
-
-
-def tables(content: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """All tables with their titles."""
-    for range_ in content["ranges"]:
-        label = MiscalibrationRange.parse(range_).label
-        yield label, _errors(content, range_)
-        yield f"{label}, per axis: mean of the absolute values", _axes(content, range_)
-    yield "What they cost, and what they make of pictures that are not the scan's", _costs(content)
-    yield "What the papers claim", _claims(content)
-
-
-def _markdown(heads: list[str], body: list[list[str]]) -> list[str]:
-    cells = ([cell.replace("|", "\\|") for cell in line] for line in (heads, ["---"] * len(heads), *body))
-    return ["| " + " | ".join(line) + " |" for line in cells]

@@ -49,12 +49,10 @@ class LearnedMethod:
         """What its networks cost and were trained with."""
         networks = [stage.network for stage in self.stages]
         paths = [weights_path(self.NAME, stage.range, self.weights) for stage in self.stages]
-        records = [read_record(path) for path in paths]
-        return MethodCard(
-            parameters=sum(parameter.numel() for network in networks for parameter in network.parameters()),
-            multiply_adds=sum(stage.settings.looks * multiply_adds(stage.network) for stage in self.stages),
-            samples_trained=sum(int(record.get("samples", 0)) for record in records),
-            trained_on=tuple(dict.fromkeys(rig for record in records for rig in record.get("rigs", ()))),
+        return MethodCard.trained(
+            sum(parameter.numel() for network in networks for parameter in network.parameters()),
+            sum(stage.settings.looks * multiply_adds(stage.network) for stage in self.stages),
+            map(read_record, paths),
         )
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:

@@ -24,13 +24,13 @@ def tiny_preset(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("calibnet.cascade.cascade.load_preset", lambda name: TINY)
 
 
-def save_row(folder: Path, name: str, of: str | None = None) -> None:
+def save_row(folder: Path, name: str, of: str | None = None, rigs: tuple[str, ...] = ()) -> None:
     """Random weights where those of a row are looked for."""
     torch.manual_seed(0)
     network = CalibrationNetwork(ablated(TINY, of or name), RANGES[2])
     within = ablation_folder(folder, name)
     within.mkdir(parents=True)
-    save_network(weights_path("tiny", RANGES[2], within), network, network.state_dict(), {})
+    save_network(weights_path("tiny", RANGES[2], within), network, network.state_dict(), {"rigs": rigs, "samples": 64})
 
 
 def test_rows_are_those_of_the_paper(tiny_preset: None) -> None:
@@ -41,11 +41,11 @@ def test_rows_are_those_of_the_paper(tiny_preset: None) -> None:
     for row in rows[:4]:
         assert row["parameters"] < full["parameters"] and row["multiply_adds"] < full["multiply_adds"]
     assert rows[4]["parameters"] == full["parameters"]
-    assert all("train --preset tiny --ablation ROW --range 5/0.5" in row["why"] for row in rows)
+    assert all(f"train --preset tiny --ablation {row['name']} --range 5/0.5" in row["why"] for row in rows)
 
 
 def test_errors_are_of_the_rows_that_have_weights(tiny_preset: None, tmp_path: Path) -> None:
-    save_row(tmp_path, "full")
+    save_row(tmp_path, "full", rigs=(Scenes(1).rig,))
     save_row(tmp_path, "multi-scale-volumes")
     told = []
     frames = [Scenes(2)]
@@ -61,6 +61,7 @@ def test_errors_are_of_the_rows_that_have_weights(tiny_preset: None, tmp_path: P
         assert row["latency_ms"] > 0
         if name in ("full", "multi-scale-volumes"):
             assert row["runs"] == 4 and row["failed"] == 0 and row["rig"] == frames[0].rig
+            assert row["in_rig"] is (name == "full") and row["samples_trained"] == 64
             assert row["rotation_deg"]["mean"] > 0 and row["translation_cm"]["median"] > 0
         else:
             assert row["why"].startswith("There are no weights at ") and "rotation_deg" not in row

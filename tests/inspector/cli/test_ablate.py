@@ -25,11 +25,13 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
     assert rows["full"]["parameters"] == sum(parameter.numel() for parameter in network.parameters())
     assert rows["full"]["preset"] == "compact"
     assert rows["full"]["latency_ms"] is None
-    assert capsys.readouterr().out.count("train --preset compact --ablation ROW --range 5/0.5") == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("Not trained, so without errors: compact (multi-scale-features, ") == 1
+    assert "train --preset PRESET --ablation ROW --range 5/0.5" in said
     assert run(cli, ["ablate", "--from", str(out), "--markdown", str(page)]) == 0
     written = page.read_text()
-    assert "## compact" in written and "| without | parameters | multiply-adds |\n" in written
-    assert "| – (full) | 2.65 M (20.5) | 3.13 G (78.3) |" in written
+    assert "## compact" in written and "| without | parameters | multiply-adds | the paper |\n" in written
+    assert "| – (full) | 2.65 M (20.5) | 3.13 G (78.3) | 0.068° / 0.864 cm |" in written
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from calibnet.methods.registry import METHODS
 from inspector.cli.errors import run
 from inspector.cli.main import cli
-from inspector.report.bench_rows import as_markdown
+from inspector.report.bench_tables import as_markdown
 from tests.inspector.cli.test_methods import Boaster, Hungry, Mover
 from tests.inspector.cli.test_plugins import start
 from tests.support.folder import write_folder

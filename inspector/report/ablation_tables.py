@@ -1,0 +1,80 @@
+"""The table of `ablate` as rows of text, and as Markdown: what each module costs and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from calibnet.geometry import MiscalibrationRange
+from inspector.report.bench_summary import NO_CORRECTION, known_and_other
+from inspector.report.markdown import markdown_table
+
+HEADS = ("without", "parameters", "multiply-adds", "a look", "samples", "rigs trained on", "other rigs", "the paper")
+
+
+def title(content: dict[str, Any]) -> str:
+    """What the table is of."""
+    label = MiscalibrationRange.parse(content["range"]).label
+    return f"Ablation: one look, from {label}; in brackets what the paper says of its own"
+
+
+def tables(content: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """A table for each preset: its name, the heads of the columns that have something in them, and its lines."""
+    for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
+        rows = [row for row in content["rows"] if row["preset"] == preset]
+        known = {row["rig"] for row in rows if row.get("in_rig")}
+        lines = [
+            _line([row for row in rows if row["name"] == name], known)
+            for name in dict.fromkeys(row["name"] for row in rows)
+        ]
+        if any(line[5] or line[6] for line in lines):
+            initial = known_and_other(content.get("initial", ()), known)
+            lines.insert(0, [NO_CORRECTION, "", "", "", "", *initial, ""])
+        used = [column for column in range(len(HEADS)) if any(line[column] for line in lines)]
+        yield preset, [HEADS[k] for k in used], [[line[k] for k in used] for line in lines]
+
+
+def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
+    from calibnet.evaluation.ablation import CLAIMS
+
+    row = rows[0]
+    claim, took, samples = CLAIMS[row["name"]], row["latency_ms"], row.get("samples_trained")
+    return [
+        "– (full)" if row["name"] == "full" else row["name"],
+        f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
+        f"{row['multiply_adds'] / 1e9:.2f} G ({claim.flops_g:g})",
+        "" if took is None else f"{took:.0f} ms ({claim.latency_ms:g})",
+        f"{samples:,}" if samples else "",
+        *(["", ""] if "why" in row else known_and_other(rows, known)),
+        f"{claim.rotation_deg:g}° / {claim.translation_cm:g} cm",
+    ]
+
+
+def untrained(content: dict[str, Any]) -> str:
+    """Which rows have no errors for want of weights, in a sentence; empty where all have them."""
+    missing: dict[str, list[str]] = {}
+    for row in content["rows"]:
+        if "why" in row and not row.get("samples_trained"):
+            missing.setdefault(row["preset"], []).append(row["name"])
+    if not missing:
+        return ""
+    which = "; ".join(f"{preset} ({', '.join(names)})" for preset, names in missing.items())
+    return (
+        f"Not trained, so without errors: {which}. "
+        f"`calib-inspect train --preset PRESET --ablation ROW --range {content['range']} --output DIR` trains a row, "
+        "and `ablate --weights DIR --data FRAMES` measures it."
+    )
+
+
+def as_markdown(content: dict[str, Any]) -> str:
+    """The tables for documents."""
+    parts = [f"# {title(content)}"]
+    for preset, heads, lines in tables(content):
+        parts += [f"## {preset}", markdown_table(heads, lines)]
+    of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
+    parts.append(
+        f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "
+        f"multiply-adds at {content['input'][0]} x {content['input'][1]}; a look on {content['processor']}, "
+        f"{content['threads']} threads. Made by `calib-inspect ablate`."
+    )
+    return "\n\n".join([*parts, untrained(content)]).strip() + "\n"

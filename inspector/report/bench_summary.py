@@ -1,0 +1,89 @@
+"""The first table of `bench` for a range: a line a method, over all rigs that it was trained on and over all others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from inspector.report.bench_rows import KINDS, NOTHING, Row, costs, rows
+
+ERRORS = ("rigs trained on", "other rigs", "refused")
+PICTURES = ("grey picture", "other picture")
+COSTS = ("a frame", "parameters")
+NO_CORRECTION = "no correction"
+LEGEND = (
+    "Mean errors, of rotation and translation. A refused run counts with the error that it began with. Methods without "
+    "training have the same rigs in a column as the trained ones. Grey picture, other picture: errors when the picture "
+    "is made grey or is one of another drive. A method that then refuses, or errs as if uncorrected, looks at the "
+    "picture; one that corrects as before reads its answer off the scan."
+)
+
+
+def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[str]]]:
+    """Heads and lines of the table for a range."""
+    of_range = [row for row in rows(content) if row.range == range_]
+    known = {row.rig for row in of_range if row.known == "known"}
+    heads = ["method", "of", *ERRORS, *PICTURES, *COSTS, "its paper"]
+    body = []
+    initial = [one for one in content.get("initial", ()) if one["range"] == range_]
+    if initial:
+        body.append([NO_CORRECTION, "frames", *known_and_other(initial, known), *[NOTHING] * (len(heads) - 4)])
+    for name, entry in content["methods"].items():
+        beside = [*_pictures(entry, range_), *(costs(entry)[head] for head in COSTS), _claim(entry)]
+        own = [row for row in of_range if row.method == name]
+        for of in dict.fromkeys(row.of for row in own):  # what stands beside the errors, once
+            measured = [row for row in own if row.of == of]
+            where = {row.rig for row in measured if row.known == "known"} if entry["samples_trained"] else known
+            body.append(
+                [name, of, *known_and_other([row.figures for row in measured], where), _refused(measured), *beside]
+            )
+            beside = [NOTHING] * len(beside)
+    used = [k for k in range(len(heads)) if k < 2 or any(line[k] != NOTHING for line in body)]
+    return [heads[k] for k in used], [[line[k] for k in used] for line in body]
+
+
+def _pictures(entry: dict[str, Any], range_: str) -> list[str]:
+    audit = entry["audit"] if entry["audit"].get("range") == range_ else {}
+    return [_altered(audit.get(name)) for name in ("grey", "swapped")]
+
+
+def known_and_other(figures: Iterable[dict[str, Any]], known: set[str]) -> list[str]:
+    """Mean errors in rigs that are known, and in others, every run alike."""
+    parts: tuple[list[dict[str, Any]], ...] = [], []
+    for one in figures:
+        parts[one["rig"] not in known].append(one)
+    return [_mean(part) for part in parts]
+
+
+def _mean(figures: list[dict[str, Any]]) -> str:
+    measured = [one for one in figures if "rotation_deg" in one]
+    runs = sum(one["runs"] for one in measured)
+    if not runs:
+        return "refused" if any(one.get("runs") for one in figures) else NOTHING
+    means = (sum(one["runs"] * one[kind]["mean"] for one in measured) / runs for kind in KINDS)
+    return pair(*means)
+
+
+def pair(degrees: float, centimetres: float) -> str:
+    """Both errors of a cell."""
+    return f"{degrees:.2f}° / {centimetres:.{0 if centimetres >= 10 else 1}f} cm"
+
+
+def _refused(measured: list[Row]) -> str:
+    runs = sum(row.figures.get("runs", 0) for row in measured)
+    return f"{sum(row.figures.get('refused', 0) for row in measured)} of {runs}" if runs else NOTHING
+
+
+def _altered(row: dict[str, Any] | None) -> str:
+    if not row:
+        return NOTHING
+    if not row.get("refused"):
+        return NOTHING if "why" in row else pair(*(row[kind]["mean"] for kind in KINDS))
+    return "refused" if row["refused"] == row["runs"] else f"{row['refused'] / row['runs']:.0%} refused"
+
+
+def _claim(entry: dict[str, Any]) -> str:
+    if not entry["claims"]:
+        return NOTHING
+    first = entry["claims"][0]
+    return f"{first['rotation_deg']:g}° / {first['translation_cm']:g} cm from {first['range']}"
