@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -193,29 +194,20 @@ def measure_row(
 
 
 def _frames(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[FrameSequence]) -> Iterator[_Try]:
-    def run(method: Calibrator, initial: Extrinsic, frame: Frame) -> tuple[Extrinsic, bool]:
-        trace = method.calibrate(frame, initial)
-        return trace.corrected, trace.rejected
-
     for sequence in sequences:
         for position in spread(len(sequence), bench.most):
             frame = sequence[position]
             for repeat in range(bench.repeats):
                 delta = draw_miscalibration(range_, bench.seed, frame.index, repeat)
-                yield _Try(
-                    delta @ frame.camera_from_lidar,
-                    frame.camera_from_lidar,
-                    lambda method, initial, frame=frame: run(method, initial, frame),  # type: ignore[misc]
-                )
+                yield _Try(delta @ frame.camera_from_lidar, frame.camera_from_lidar, partial(_on_frame, frame))
+
+
+def _on_frame(frame: Frame, method: Calibrator, initial: Extrinsic) -> tuple[Extrinsic, bool]:
+    trace = method.calibrate(frame, initial)
+    return trace.corrected, trace.rejected
 
 
 def _drives(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[FrameSequence]) -> Iterator[_Try]:
-    def run(method: Calibrator, initial: Extrinsic, drive: FrameSequence) -> tuple[Extrinsic, bool]:
-        assert isinstance(method, DriveCalibrator)
-        estimate = method.calibrate_drive(drive, initial)
-        rejected = estimate.verdict is not None and estimate.verdict.word == "rejected"
-        return initial if rejected else estimate.camera_from_lidar, rejected
-
     for number, sequence in enumerate(sequences):
         if not shares_mount(sequence):
             continue
@@ -224,11 +216,14 @@ def _drives(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[Frame
         reference = drive[0].camera_from_lidar
         for repeat in range(bench.repeats):
             delta = draw_miscalibration(range_, bench.seed, number, repeat + 1000)
-            yield _Try(
-                delta @ reference,
-                reference,
-                lambda method, initial, drive=drive: run(method, initial, drive),  # type: ignore[misc]
-            )
+            yield _Try(delta @ reference, reference, partial(_on_drive, drive))
+
+
+def _on_drive(drive: FrameSequence, method: Calibrator, initial: Extrinsic) -> tuple[Extrinsic, bool]:
+    assert isinstance(method, DriveCalibrator)
+    estimate = method.calibrate_drive(drive, initial)
+    rejected = estimate.verdict is not None and estimate.verdict.word == "rejected"
+    return initial if rejected else estimate.camera_from_lidar, rejected
 
 
 def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,20 +32,14 @@ def contestants(
         ConfigError: there is no such method.
     """
     chosen = (CASCADE, *METHODS.names()) if "all" in names else names
-    found = []
-    for name in chosen:
-        if name == CASCADE:
-            found.append(Contestant(CASCADE, lambda range_: MeasuredCascade.within(range_, preset)))
-            found += [
-                Contestant(label, lambda range_, folder=folder: MeasuredCascade.within(range_, preset, folder))  # type: ignore[misc]
-                for label, folder in ours.items()
-            ]
-        else:
-            found.append(Contestant(name, lambda range_, name=name: _open(name, range_, told)))  # type: ignore[misc]
-    return found
+    cascade = partial(MeasuredCascade.within, preset)
+    found = [
+        Contestant(name, partial(cascade, None) if name == CASCADE else partial(_open, name, told)) for name in chosen
+    ]
+    return found + [Contestant(label, partial(cascade, folder)) for label, folder in ours.items()]
 
 
-def _open(name: str, range_: MiscalibrationRange, told: dict[str, Any]) -> Calibrator:
+def _open(name: str, told: dict[str, Any], range_: MiscalibrationRange) -> Calibrator:
     maker = METHODS.load(name)
     return open_method(name, range_, **{option: value for option, value in told.items() if accepts(maker, option)})
 
@@ -55,7 +50,7 @@ class MeasuredCascade(Cascade):
     card: MethodCard
 
     @classmethod
-    def within(cls, range_: MiscalibrationRange, preset: str, folder: Path | None = None) -> MeasuredCascade:
+    def within(cls, preset: str, folder: Path | None, range_: MiscalibrationRange) -> MeasuredCascade:
         """The stages that ``evaluate`` runs for a range, with weights of a folder or of the package."""
         cascade = cls.load(preset, stages_within(range_), folder, wider=True)
         assert isinstance(cascade, cls)

@@ -17,7 +17,6 @@ from inspector.cli.output import (
     overwrite_option,
     prepare,
     prepare_json,
-    read_table,
     say,
     write,
     write_json,
@@ -82,6 +81,8 @@ def ablate(
     prepare_json(json_file)
     prepare(markdown_file, Kind.EXPORT)
     if source is not None:
+        from inspector.report.table_files import read_table
+
         content = read_table(source, "ablate")
     else:
         content = measured(

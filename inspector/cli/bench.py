@@ -16,7 +16,6 @@ from inspector.cli.output import (
     overwrite_option,
     prepare,
     prepare_json,
-    read_table,
     say,
     write,
     write_json,
@@ -117,6 +116,8 @@ def bench(
         prepare(file, kind)
     prepare_json(json_file)
     if source is not None:
+        from inspector.report.table_files import read_table
+
         content = read_table(source, "bench")
     else:
         if not data:

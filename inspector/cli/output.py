@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from calibnet.errors import ConfigError
-from calibnet.runtime.reading import parse_json, read_text
 from calibnet.runtime.text import lines
 from calibnet.runtime.writing import Kind, allow_overwriting, check_output, write_whole
 
@@ -97,18 +95,3 @@ def keep_json(json_file: str | None, content: dict[str, Any], first: bool) -> No
         write_json(json_file, content)
     else:
         write_whole(Path(str(json_file)), (json.dumps(content, indent=2) + "\n").encode(), Kind.JSON)
-
-
-def read_table(source: Path, command: str) -> dict[str, Any]:
-    """The JSON that a command with a table wrote earlier.
-
-    Raises:
-        ConfigError: it is not one of that command's.
-    """
-    try:
-        content = parse_json(read_text(source, f"The table of {command}", error=ConfigError))
-    except ValueError as error:
-        raise ConfigError(f"{source} is no JSON ({error}); give what `calib-inspect {command} --json` wrote.") from None
-    if not isinstance(content, dict) or content.get("table") != command:
-        raise ConfigError(f"{source} was not written by `calib-inspect {command} --json`.")
-    return content

@@ -56,7 +56,7 @@ def known_and_other(figures: Iterable[dict[str, Any]], known: set[str]) -> list[
 
 
 def _mean(figures: list[dict[str, Any]]) -> str:
-    measured = [one for one in figures if "rotation_deg" in one]
+    measured = [one for one in figures if all(one.get(kind) for kind in KINDS)]
     runs = sum(one["runs"] for one in measured)
     if not runs:
         return "refused" if any(one.get("runs") for one in figures) else NOTHING

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,3 +47,11 @@ def test_a_method_of_another_package(tmp_path: Path, monkeypatch: pytest.MonkeyP
     method = open_method("nothing", RANGES[2])
     assert not isinstance(method, DriveCalibrator)
     check_method(method, boxes())
+
+
+def test_the_method_that_the_documents_show_is_one() -> None:
+    document = (Path(__file__).parents[3] / "docs/methods.md").read_text(encoding="utf-8")
+    code = document.split("```python\n")[1].split("```")[0]
+    space: dict[str, Any] = {}
+    exec(code, space)
+    check_method(space["BestOfFifty"](RANGES[4]), boxes())

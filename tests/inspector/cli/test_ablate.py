@@ -39,6 +39,7 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
     [
         (["ablate", "--range", "4/0.4"], 2, "20/1.5, 10/1, 5/0.5, 2/0.2, 1/0.1"),
         (["ablate", "--preset", "huge"], 3, "'huge'"),
+        (["ablate", "--from", "cut.json"], 3, "rows is missing"),
         (["ablate", "--from", "other.json"], 3, "was not written by `calib-inspect ablate --json`"),
         (["train", "--method", "lccnet", "--all", "--samples", "8"], 2, "--method trains one network"),
         (["train", "--method", "lccnet", "--ablation", "full", "--range", "5/0.5", "--samples", "8"], 2, "--method"),
@@ -55,5 +56,7 @@ def test_what_does_not_go_is_a_sentence(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("other.json").write_text("{}")
+    cut = {"table": "ablate", "range": "5/0.5", "input": [256, 512], "processor": "x", "sequences": []}
+    Path("cut.json").write_text(json.dumps(cut | {"repeats": 1, "seed": 0, "threads": 1}))
     assert run(cli, arguments) == code
     assert said in " ".join(capsys.readouterr().err.split())

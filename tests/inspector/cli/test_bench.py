@@ -77,6 +77,13 @@ def test_an_earlier_table_is_shown_without_measuring(
     other.write_text("{}")
     assert run(cli, ["bench", "--from", str(other)]) == 3
     assert "was not written by `calib-inspect bench --json`" in capsys.readouterr().err
+    content = json.loads(measured["json"])
+    del content["methods"]["mover"]["parameters"]
+    content["ranges"] = 5
+    other.write_text(json.dumps(content))
+    assert run(cli, ["bench", "--from", str(other)]) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert "ranges: input should be a valid list, methods.mover.parameters is missing" in said
 
 
 @pytest.mark.parametrize(
