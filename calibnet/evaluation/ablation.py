@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 
@@ -27,35 +27,6 @@ from calibnet.network.counting import total
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.precision import fastest
 from calibnet.weights.files import read_record, weights_path
-
-
-class Claim(NamedTuple):
-    """A row of the paper's table, on its machine and its own car's frames.
-
-    Attributes:
-        parameters_m: millions.
-        flops_g: what the paper calls FLOPs, 1e9; its numbers are those of multiply-adds.
-        latency_ms: on its GPU.
-        translation_cm: error.
-        rotation_deg: error.
-    """
-
-    parameters_m: float
-    flops_g: float
-    latency_ms: float
-    translation_cm: float
-    rotation_deg: float
-
-
-CLAIMS = {
-    "multi-scale-features": Claim(18.7, 62.5, 17.5, 1.058, 0.084),
-    "multi-scale-volumes": Claim(19.1, 63.8, 18.8, 1.213, 0.099),
-    "aggregation": Claim(19.4, 70.5, 19.5, 1.151, 0.093),
-    "hierarchical-fusion": Claim(18.8, 61.1, 18.4, 0.930, 0.078),
-    "hybrid-loss": Claim(20.2, 77.4, 22.6, 0.997, 0.074),
-    "full": Claim(20.5, 78.3, 23.3, 0.864, 0.068),
-}
-"""By the names of `calibnet.network.ablations.ABLATIONS`."""
 
 Observer = Callable[[str, int, int], None]
 """Told the row, and the runs of it done and to be done."""

@@ -8,7 +8,7 @@ Only figures that were found in print are here. Translation is in centimetres, r
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 KITTI_OWN = "KITTI, the car that it was trained on"
 HAN = "its paper, as quoted by Han et al. (2025), table 2"
@@ -68,3 +68,32 @@ CLAIMS: dict[str, tuple[Claim, ...]] = {
     ),
 }
 """By the name of the method."""
+
+
+class AblationClaim(NamedTuple):
+    """A row of the paper's ablation (its Table 3), on its machine and its own car's frames.
+
+    Attributes:
+        parameters_m: millions.
+        flops_g: what the paper calls FLOPs, 1e9; its numbers are those of multiply-adds.
+        latency_ms: on its GPU.
+        translation_cm: error.
+        rotation_deg: error.
+    """
+
+    parameters_m: float
+    flops_g: float
+    latency_ms: float
+    translation_cm: float
+    rotation_deg: float
+
+
+ABLATION_CLAIMS = {
+    "multi-scale-features": AblationClaim(18.7, 62.5, 17.5, 1.058, 0.084),
+    "multi-scale-volumes": AblationClaim(19.1, 63.8, 18.8, 1.213, 0.099),
+    "aggregation": AblationClaim(19.4, 70.5, 19.5, 1.151, 0.093),
+    "hierarchical-fusion": AblationClaim(18.8, 61.1, 18.4, 0.930, 0.078),
+    "hybrid-loss": AblationClaim(20.2, 77.4, 22.6, 0.997, 0.074),
+    "full": AblationClaim(20.5, 78.3, 23.3, 0.864, 0.068),
+}
+"""By the names of `calibnet.network.ablations.ABLATIONS`."""

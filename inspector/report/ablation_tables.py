@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from calibnet.evaluation.claims import ABLATION_CLAIMS
 from calibnet.geometry import MiscalibrationRange
 from inspector.report.bench_summary import NO_CORRECTION, known_and_other
 from inspector.report.markdown import markdown_table
@@ -35,10 +36,8 @@ def tables(content: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[
 
 
 def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
-    from calibnet.evaluation.ablation import CLAIMS
-
     row = rows[0]
-    claim, took, samples = CLAIMS[row["name"]], row["latency_ms"], row.get("samples_trained")
+    claim, took, samples = ABLATION_CLAIMS[row["name"]], row["latency_ms"], row.get("samples_trained")
     return [
         "– (full)" if row["name"] == "full" else row["name"],
         f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 from annotated_types import Interval, Len, Predicate
 
 from calibnet.errors import ConfigError
-from calibnet.evaluation.claims import Claim
-from calibnet.network.ablations import ABLATIONS
+from calibnet.evaluation.claims import ABLATION_CLAIMS, Claim
 from calibnet.runtime.reading import parse_json, read_text
 from calibnet.runtime.schema import validated
 
@@ -108,7 +107,7 @@ class _Bench(_Table):
 @dataclass(frozen=True, kw_only=True)
 class _AblationRow(_Figures):
     preset: str
-    name: Annotated[str, Predicate(ABLATIONS.__contains__)]
+    name: Annotated[str, Predicate(ABLATION_CLAIMS.__contains__)]
     parameters: Count
     multiply_adds: Count
     latency_ms: Number | None
