@@ -158,8 +158,10 @@ class Cascade:
                 before = self._run(wider, views, start, held=held)
                 stages = self._run(self.stages, views, before[-1].after, detail, held)
                 trace = CascadeTrace(start, stages, clock.parts, limit, before)
+            clock.skip()  # the stages time themselves
             trace = replace(trace, again=self._again(views, trace, held))
             verdict = judge(views.frame, start, trace, self.coefficients, known=self.known.words)
+            clock("verdict")
             if held is not None and verdict.covariance is not None:
                 narrowed = held.narrowed(verdict.covariance, verdict.camera_from_lidar)
                 verdict = replace(verdict, covariance=narrowed)

@@ -17,7 +17,7 @@ from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.known import Held
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.judging.witnesses import bent_misfit, misfit
+from calibnet.judging.witnesses import misfits
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
@@ -135,8 +135,7 @@ def said(frame: Frame, position: int, look: StageTrace) -> DriveLook:
         pose_vector(look.correction),
         look.information,
         look.match_error_px,
-        misfit(look),
-        bent_misfit(look),
+        *misfits(look),
     )
 
 

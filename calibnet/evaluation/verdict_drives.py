@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import lru_cache
@@ -22,8 +23,8 @@ from calibnet.geometry.se3 import pose_vector
 from calibnet.judging.drive_witnesses import drive_witnesses
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
-FRAMES = 6
-"""Of a drive, at most: more take longer, and say little more of what all of them get wrong."""
+FEWEST, MOST = 3, 16
+"""Frames of a drive; a sequence that has fewer gives all of them."""
 
 
 class Faulty:
@@ -61,18 +62,24 @@ class DriveStream:
     """The runs on some drives with a cascade, by number, as `calibnet.evaluation.verdict_runs.RunStream` has frames."""
 
     def __init__(self, cascade: Cascade, sequences: Iterable[FrameSequence], seed: int) -> None:
-        """A run is one of these sequences, every one as often as the others; those that are no drive are left out."""
+        """A run is a part of one of these sequences, and longer ones are drawn more often, up to `MOST` frames.
+
+        What is no drive is left out, and sequences of one name, the cameras of one recording, count as one.
+        """
         self.cascade, self.seed = asking(cascade), seed
         self.sequences = [sequence for sequence in sequences if shares_mount(sequence)]
+        named = Counter(sequence.name for sequence in self.sequences)
+        odds = np.array([min(len(one), MOST) / named[one.name] for one in self.sequences], np.float64)
+        self.odds = odds / odds.sum()
 
     def run(self, number: int) -> VerdictRun | None:
         """The run of this number; None where it cannot be made."""
         generator = np.random.default_rng([self.seed, number, 1])
         if not self.sequences:
             return None
-        which = int(generator.integers(len(self.sequences)))
+        which = int(generator.choice(len(self.sequences), p=self.odds))
         sequence = self.sequences[which]
-        positions = spread(len(sequence), FRAMES)
+        positions = part(len(sequence), generator)
         fault = PLAIN if generator.random() < PLAIN_SHARE else self._fault(which, generator)
         donor = self.sequences[(which + 1) % len(self.sequences)]
         try:
@@ -92,6 +99,17 @@ class DriveStream:
                 named.setdefault(fault.name, []).append(fault)
         strengths = named[str(generator.choice(list(named)))]
         return strengths[int(generator.integers(len(strengths)))]
+
+
+def part(length: int, generator: np.random.Generator) -> list[int]:
+    """Positions of a drive's frames: so many, spread over a part of the sequence, both drawn.
+
+    The same frames from another guess end at nearly the same place: what tells drives apart is which frames they have.
+    """
+    count = min(length, round(float(np.exp(generator.uniform(np.log(FEWEST), np.log(MOST))))))
+    stretch = int(generator.integers(count, length + 1))
+    start = int(generator.integers(length - stretch + 1))
+    return [start + position for position in spread(stretch, count)]
 
 
 def measured(

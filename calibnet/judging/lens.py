@@ -19,6 +19,8 @@ from calibnet.geometry.types import Extrinsic, Floats, Matrix6
 from calibnet.trace import Matches
 
 ITERATIONS = 12
+SETTLED = 3e-4
+"""Share of the cost that a step gains when it is the last: further ones would gain less than that together."""
 INDEPENDENT = 1 / 20
 """Share of matches that err independently: errors of neighbours are correlated over some twenty cells of a row."""
 LEAST_SCALE_PX = 0.1
@@ -81,7 +83,13 @@ class Fit:
 
 
 def fit(
-    matches: Matches, before: Extrinsic, camera: PinholeCamera, guess: Extrinsic, prior: Matrix6, lens: Lens = PINHOLE
+    matches: Matches,
+    before: Extrinsic,
+    camera: PinholeCamera,
+    guess: Extrinsic,
+    prior: Matrix6,
+    lens: Lens = PINHOLE,
+    start: Fit | None = None,
 ) -> Fit:
     """Fit pose and lens to the matches of one look.
 
@@ -92,11 +100,14 @@ def fit(
         guess: ``camera_from_lidar`` that the run started from.
         prior: information ``[6, 6]`` of the guess.
         lens: what to fit besides the pose.
+        start: a fit of the same matches to beat, from whose pose to start; a lens whose steps gain too little to come
+            below its cost is given up. None to start from ``before``.
     """
-    points, scale = matches.points.astype(np.float64), np.maximum(matches.scale.astype(np.float64), LEAST_SCALE_PX)
+    points = matches.points.astype(np.float64)
+    scale = np.maximum(matches.scale.T.astype(np.float64), LEAST_SCALE_PX)
     focal = np.array(camera.focal)
-    target = points[:, :2] / points[:, 2:] + matches.displacement / focal  # in focal lengths from the principal point
-    scale = scale / focal
+    target = ((points[:, :2] / points[:, 2:]) + matches.displacement / focal).T  # focal lengths from the centre
+    scale = np.ascontiguousarray(scale / focal[:, None])
     fitted = np.array([lens.focal, lens.center, lens.center, lens.radial])
     chosen = np.flatnonzero(np.concatenate([np.ones(6, bool), fitted]))
     information = np.zeros((10, 10))
@@ -104,21 +115,25 @@ def fit(
     information[6:, 6:] = np.diag(LENS_SIGMA**-2)
     information = information[np.ix_(chosen, chosen)]
 
-    pose, extra = before @ invert(before), np.zeros(4)
+    from_guess = before @ invert(guess)
+    pose, extra = np.eye(4) if start is None else start.camera_from_lidar @ invert(before), np.zeros(4)
+
+    buffer = np.empty((10, 2, len(points)))
 
     def residuals(pose: Extrinsic, extra: Floats) -> tuple[Floats, Floats, float]:
-        seen, jacobian, ahead = view(transform_points(pose, points).astype(np.float64), extra, lens.equidistant)
-        residual = target - seen
+        moved = transform_points(pose, points).astype(np.float64)
+        seen, jacobian, ahead = view(moved, extra, lens.equidistant, buffer)
+        residual = target - seen.T
         size = np.sqrt(scale**2 + residual**2)
-        weight = ahead[:, None] * INDEPENDENT / (scale * size)
-        offset = np.concatenate([pose_vector(pose @ before @ invert(guess)), extra])[chosen]
-        cost = INDEPENDENT * float((ahead[:, None] * (size / scale - 1)).sum()) + 0.5 * offset @ information @ offset
-        weighted = jacobian[:, :, chosen] * weight[:, :, None]
-        normal = np.einsum("nci,ncj->ij", weighted, jacobian[:, :, chosen]) + information
-        return normal, np.einsum("nci,nc->i", weighted, residual) - information @ offset, cost
+        weight = ahead * INDEPENDENT / (scale * size)
+        offset = np.concatenate([pose_vector(pose @ from_guess), extra])[chosen]
+        cost = INDEPENDENT * float((ahead * (size / scale - 1)).sum()) + 0.5 * offset @ information @ offset
+        derivatives = jacobian.T[chosen].reshape(len(chosen), -1)  # a row each, of x and then of y
+        weighted = derivatives * weight.reshape(-1)
+        return weighted @ derivatives.T + information, weighted @ residual.reshape(-1) - information @ offset, cost
 
     normal, gradient, cost = residuals(pose, extra)
-    for _ in range(ITERATIONS):
+    for left in reversed(range(ITERATIONS)):
         step = np.zeros(10)
         step[chosen] = np.linalg.solve(normal, gradient)
         for shorter in (1.0, 0.5, 0.1):  # a full step may overshoot where residuals are large
@@ -130,7 +145,7 @@ def fit(
             break
         gained = cost - tried[2]
         pose, extra, (normal, gradient, cost) = further, more, tried
-        if gained < 1e-3:
+        if gained < SETTLED * cost or (start is not None and cost - gained * left > start.cost):
             break
     return Fit(
         lens,
@@ -143,38 +158,47 @@ def fit(
     )
 
 
-def view(moved: Floats, extra: Floats, equidistant: bool) -> tuple[Floats, Floats, Floats]:
+def view(
+    moved: Floats, extra: Floats, equidistant: bool, buffer: Floats | None = None
+) -> tuple[Floats, Floats, Floats]:
     """Where points are seen, in focal lengths from the principal point.
 
     Args:
         moved: ``[N, 3]`` in the camera frame.
         extra: logarithm of the focal length's factor, offset of the principal point (x, y), radial coefficient.
         equidistant: the lens shows the angle from its axis, not the angle's tangent.
+        buffer: ``[10, 2, N]`` that takes the derivatives in, for whoever calls often; new by default.
 
     Returns:
         Places ``[N, 2]``; their derivative ``[N, 2, 10]`` by a motion ``(translation, rotation)`` and by ``extra``; and
         1 for the points ahead ``[N]``, 0 for the others.
     """
-    x, y, depth = moved.T
+    depth = moved[:, 2]
     inverse = 1 / np.maximum(depth, MINIMUM_DEPTH)
-    x, y = x * inverse, y * inverse
+    x, y = moved[:, 0] * inverse, moved[:, 1] * inverse
     square = x * x + y * y
-    radius = np.sqrt(np.maximum(square, 1e-12))
-    bent, slope = np.ones_like(radius), np.zeros_like(radius)  # of the place, and its change by the squared radius
+    bent, slope = 1 + extra[3] * square, extra[3]  # of the place, and its change by the squared radius
     if equidistant:
-        bent = np.arctan(radius) / radius
-        slope = (1 / (1 + square) - bent) / (2 * np.maximum(square, 1e-6))
-    bent, slope = bent + extra[3] * square, slope + extra[3]
+        radius = np.sqrt(np.maximum(square, 1e-12))
+        straight = np.arctan(radius) / radius
+        bent = bent - 1 + straight
+        slope = slope + (1 / (1 + square) - straight) / (2 * np.maximum(square, 1e-6))
     factor = np.exp(extra[0])
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    by_x = np.stack([inverse, zero, -x * inverse, -x * y, 1 + x * x, -y])
-    by_y = np.stack([zero, inverse, -y * inverse, -1 - y * y, x * y, x])
-    by_square = 2 * (x * by_x + y * by_y)
-    jacobian = np.empty((len(x), 2, 10))
-    for row, (place, by_pose) in enumerate(((x, by_x), (y, by_y))):
-        jacobian[:, row, :6] = factor * (bent * by_pose + place * slope * by_square).T
-        jacobian[:, row, 6] = factor * bent * place
-        jacobian[:, row, 7 + row], jacobian[:, row, 8 - row] = one, zero
-        jacobian[:, row, 9] = factor * place * square
-    seen = factor * np.stack([x * bent, y * bent], axis=1) + extra[1:3]
-    return seen, jacobian, (depth > MINIMUM_DEPTH).astype(np.float64)
+    jacobian = np.empty((10, 2, len(x))) if buffer is None else buffer
+    crossed, zero = x * y, np.zeros_like(x)
+    by_x = (inverse, zero, -x * inverse, -crossed, 1 + x * x, -y)
+    by_y = (zero, inverse, -y * inverse, -1 - y * y, crossed, x)
+    straight_lens = not equidistant and extra[3] == 0
+    for column, (of_x, of_y) in enumerate(zip(by_x, by_y, strict=True)):
+        if straight_lens:
+            jacobian[column, 0], jacobian[column, 1] = factor * of_x, factor * of_y
+            continue
+        by_square = 2 * slope * (x * of_x + y * of_y)
+        jacobian[column, 0] = factor * (bent * of_x + x * by_square)
+        jacobian[column, 1] = factor * (bent * of_y + y * by_square)
+    for row, place in enumerate((x, y)):
+        jacobian[6, row] = factor * bent * place
+        jacobian[7 + row, row], jacobian[8 - row, row] = 1.0, 0.0
+        jacobian[9, row] = factor * place * square
+    seen = factor * np.stack([x * bent, y * bent]) + extra[1:3, None]
+    return seen.T, jacobian.T, (depth > MINIMUM_DEPTH).astype(np.float64)

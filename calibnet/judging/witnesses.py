@@ -7,6 +7,7 @@ adds.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.alike import alike_covariance
-from calibnet.judging.lens import LENSES, PINHOLE, Fit, Lens, fit
+from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
 AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
@@ -95,12 +96,12 @@ def witnesses(trace: CascadeTrace) -> Witnesses:
     last, again = trace.stages[-1], trace.again
     asked = again or last
     earlier = trace.stages[-2] if len(trace.stages) > 1 else last
-    alone, bent = misfit(asked), bent_misfit(asked)
+    alone, bent = misfits(asked)
     return Witnesses(
         match_error=math.log(asked.match_error_px),
         earlier_error=math.log(earlier.match_error_px),
         misfit=math.log(max(alone, LEAST)),
-        lens=math.log(max(min(bent, alone), LEAST) / max(alone, LEAST)),
+        lens=math.log(max(bent, LEAST) / max(alone, LEAST)),
         stated=_stated(asked),
         alike=_alike(asked, trace.stages[0].range),
         reach=reach(trace.initial, last.after, trace.stages[0].range).share,
@@ -115,16 +116,20 @@ def misfit(stage: StageTrace) -> float:
     Not a number where there are no matches. Between frames it varies as much as with what is wrong; for one frame it is
     least with the right lens.
     """
-    if stage.matches is None or not len(stage.matches.points):
-        return math.nan
-    return _fit(stage, PINHOLE).cost / len(stage.matches.points)
+    return misfits(stage, ())[0]
 
 
-def bent_misfit(stage: StageTrace) -> float:
-    """The `misfit` with whichever other lens explains the matches best, fitted together with the pose."""
-    if stage.matches is None or not len(stage.matches.points):
-        return math.nan
-    return min(_fit(stage, lens).cost for lens in LENSES) / len(stage.matches.points)
+def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, float]:
+    """The `misfit`, and that with whichever other lens explains the matches best, fitted together with the pose.
+
+    The second is the first where no lens explains them better.
+    """
+    matches, prior, origin = stage.matches, stage.range.information, stage.looked_from
+    if matches is None or not len(matches.points):
+        return math.nan, math.nan
+    alone = fit(matches, origin, stage.camera, origin, prior, PINHOLE)
+    bent = [fit(matches, origin, stage.camera, origin, prior, lens, start=alone).cost for lens in lenses]
+    return alone.cost / len(matches.points), min(alone.cost, *bent, math.inf) / len(matches.points)
 
 
 def _stated(stage: StageTrace) -> float:
@@ -140,9 +145,3 @@ def _alike(stage: StageTrace, searched: MiscalibrationRange) -> float:
         return math.nan
     covariance = alike_covariance(stage.matches, stage.camera, searched.information)
     return math.log(100 * math.sqrt(np.trace(covariance[:3, :3])))
-
-
-def _fit(stage: StageTrace, lens: Lens) -> Fit:
-    assert stage.matches is not None
-    prior = stage.range.information
-    return fit(stage.matches, stage.looked_from, stage.camera, stage.looked_from, prior, lens)

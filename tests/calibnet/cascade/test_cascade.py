@@ -161,7 +161,7 @@ def test_detail_is_made_only_when_asked_for(frame: Frame, trace: CascadeTrace) -
 
 
 def test_times_are_told_by_part(trace: CascadeTrace) -> None:
-    assert trace.milliseconds.keys() == {"preparation", "resize", "image_features"}
+    assert trace.milliseconds.keys() == {"preparation", "resize", "image_features", "verdict"}
     for stage in trace.stages:
         parts = {"projection", "lidar_features", "cost_volumes", "hourglass", "displacement", "pose"}
         assert stage.milliseconds.keys() == parts

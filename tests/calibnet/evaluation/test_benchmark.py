@@ -19,7 +19,7 @@ def test_parts_and_stages_make_up_the_whole() -> None:
     for stage in content["stages"]:
         assert set(stage["parts_ms_per_frame"]) == parts
         assert set(stage["batch_ms_per_frame"]) == {str(size) for size in BATCHES}
-    assert set(content["parts_ms_per_frame"]) == parts | {"preparation", "resize", "image_features"}
+    assert set(content["parts_ms_per_frame"]) == parts | {"preparation", "resize", "image_features", "verdict"}
     assert content["parts_ms_per_frame"]["pose"] == pytest.approx(
         sum(stage["parts_ms_per_frame"]["pose"] for stage in content["stages"])
     )

@@ -72,3 +72,12 @@ def test_standard_deviations_are_of_the_pose_and_of_what_is_fitted_besides() -> 
     assert fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, PINHOLE).sigma.shape == (6,)
     both = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, Lens("both", focal=True, radial=True))
     assert both.sigma.shape == (8,) and (both.sigma > 0).all()
+
+
+def test_a_fit_that_starts_from_the_pose_alone_comes_to_the_same_and_is_given_up_where_it_cannot_win() -> None:
+    found = matches(CORRECTION, noise=1.0)
+    alone = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, PINHOLE)
+    for lens in LENSES:
+        afresh = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, lens).cost
+        warm = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, lens, start=alone).cost
+        assert warm == pytest.approx(afresh, rel=3e-4) if afresh <= alone.cost else warm > alone.cost

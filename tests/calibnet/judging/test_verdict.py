@@ -9,7 +9,7 @@ import pytest
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.judging.coefficients import load_coefficients
 from calibnet.judging.doubt import Doubt
-from calibnet.judging.witnesses import Witnesses, bent_misfit, misfit, reach, witnesses
+from calibnet.judging.witnesses import Witnesses, misfit, misfits, reach, witnesses
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import BadFrame, Cause, Verdict, moved
 from calibnet.weights.manifest import load_manifest
@@ -64,7 +64,8 @@ def test_witnesses_of_a_run_that_fits_and_of_one_that_does_not() -> None:
     assert wrong.misfit > found.misfit + 0.5
     assert wrong.lens < -0.5 < -0.05 < found.lens <= 0
     curved = run(guess, REFERENCE, bent).stages[-1]
-    assert bent_misfit(curved) < 0.5 * misfit(curved) and bent_misfit(fits.stages[-1]) > 0.95 * misfit(fits.stages[-1])
+    (alone, bent), (fitting, _) = misfits(curved), misfits(fits.stages[-1])
+    assert bent < 0.5 * alone and misfits(fits.stages[-1])[1] > 0.95 * fitting and misfit(curved) == alone
 
 
 def test_a_look_again_counts_instead_of_the_last_one() -> None:
