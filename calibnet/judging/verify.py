@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Cause, Verdict, Word, moved
 
 SIGNIFICANT = 16.27
 """99.9 % quantile of chi-square with three degrees of freedom: those of the rotation, or of the translation."""
@@ -36,22 +37,25 @@ class Tolerance:
         return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"
 
 
-FRAME, DRIVE = Tolerance(1.5, 40.0), Tolerance(0.5, 15.0)
-"""What a single frame, and what a drive, can tell: twice to three times the standard deviations that they state."""
+FRAME = (Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0))
+DRIVE = (Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0))
+"""What may be tolerated of a single frame's calibration, and of a drive's, finest first: the limits that the verdict
+holds results to, where a result is sure enough to tell so little, and what the others can tell."""
 
 
-def verify(given: Extrinsic, found: Verdict, tolerance: Tolerance) -> Verdict:
+def verify(given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]) -> Verdict:
     """Hold a calibration against what was found from there.
 
-    It is rejected if it is off by more than the tolerance in rotation or in translation, and if that is significant
-    (chi-square, 99.9 %). It is accepted if it is within the tolerance with a probability of 95 %, by the covariance of
-    what was found. Otherwise nobody can tell. Where what was found is not accepted itself, the calibration is rejected
-    if causes are known, for then the input is wrong, and else nobody can tell.
+    It is rejected if it is off by more than the finest tolerance that the covariance of what was found can tell, in
+    rotation or in translation, and if that is significant (chi-square, 99.9 %). It is accepted if it is within one of
+    the tolerances with a probability of 95 %, and the finest of these is told. Otherwise nobody can tell. Where what
+    was found is not accepted itself, the calibration is rejected if causes are known, for then the input is wrong, and
+    else nobody can tell.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.
         found: verdict on the estimate of a frame or of a drive that started there, with its covariance.
-        tolerance: `FRAME` or `DRIVE`.
+        tolerances: `FRAME` or `DRIVE`: finest first.
 
     Returns:
         A verdict on ``given``. Its ``camera_from_lidar`` is what was found, and ``moved`` leads there from ``given``.
@@ -74,13 +78,19 @@ def verify(given: Extrinsic, found: Verdict, tolerance: Tolerance) -> Verdict:
         return verdict(CANNOT_TELL, f"The calibration seems to be off by {off}, but nothing states how sure that is.")
     offset = pose_vector(given @ invert(estimate))
     off = _said(error, offset, found.covariance)
-    if _is_beyond(error, offset, found.covariance, tolerance):
-        return verdict(REJECTED, f"The calibration is off by {off}; {tolerance} are tolerated.")
-    share = probability_within(offset, found.covariance, tolerance)
-    if share >= PROBABLE:
-        return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: by {off}.")
-    reason = f"The calibration is off by {off}; that it is within {tolerance} is {share:.0%} probable."
-    return verdict(CANNOT_TELL, reason)
+    still = np.zeros(6)
+    told = next(
+        (one for one in tolerances if probability_within(still, found.covariance, one) >= PROBABLE), tolerances[-1]
+    )
+    if _is_beyond(error, offset, found.covariance, told):
+        return verdict(REJECTED, f"The calibration is off by {off}; {told} are tolerated.")
+    for tolerance in tolerances:
+        share = probability_within(offset, found.covariance, tolerance)
+        if share >= PROBABLE:
+            return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: by {off}.")
+    return verdict(
+        CANNOT_TELL, f"The calibration is off by {off}; that it is within {tolerance} is {share:.0%} probable."
+    )
 
 
 def unfit(given: Extrinsic, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 from calibnet.datasets.frame import Frames
@@ -19,7 +20,9 @@ SUSPECTS = 3
 """Frames, spread over a drive, that are asked for the cause: each runs stages some thirty times."""
 
 
-def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict, tolerance: Tolerance) -> Verdict:
+def judge_given(
+    method: object, frames: Frames, given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]
+) -> Verdict:
     """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
 
     Args:
@@ -27,12 +30,12 @@ def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict
         frames: where it was found.
         given: ``camera_from_lidar`` to verify, 4x4.
         found: verdict on what was found.
-        tolerance: how far off is good.
+        tolerances: how far off is good, see `calibnet.judging.verify.verify`.
     """
-    verdict = verify(given, found, tolerance)
+    verdict = verify(given, found, tolerances)
     if verdict.word == ACCEPTED or found.causes:
         return verdict
-    return verify(given, replace(found, causes=suspected(method, frames, given)), tolerance)
+    return verify(given, replace(found, causes=suspected(method, frames, given)), tolerances)
 
 
 def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, ...]:

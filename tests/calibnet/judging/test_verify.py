@@ -18,7 +18,7 @@ from tests.support.fakes import REFERENCE
 MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
 
 
-TIGHT, WIDE = Tolerance(0.3, 8.0), Tolerance(1.0, 25.0)
+TIGHT, WIDE = (Tolerance(0.3, 8.0),), (Tolerance(1.0, 25.0),)
 
 
 def covariance(degrees: float, centimetres: float) -> Matrix6:
@@ -69,10 +69,10 @@ def test_the_word_follows_offset_and_certainty(given: np.ndarray, sure: tuple[fl
 
 def test_the_probability_is_that_of_the_normal_distribution() -> None:
     """Three axes of 4 cm: within 8 cm with the chi distribution's 73.9 %; the rotation is sure."""
-    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT)
+    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT[0])
     assert inside == pytest.approx(0.7385, abs=0.005)
     offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
-    assert probability_within(offset, covariance(0.001, 0.01), TIGHT) == pytest.approx(0.5, abs=0.01)
+    assert probability_within(offset, covariance(0.001, 0.01), TIGHT[0]) == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
@@ -116,3 +116,20 @@ def test_an_error_may_name_its_cause() -> None:
 def test_what_a_drive_and_a_frame_usually_state_is_sure_enough_to_accept_what_is_right() -> None:
     assert verify(off(), found(0.12, 3.5), DRIVE).word == "accepted", "0.2 degrees and 6 cm over the axes"
     assert verify(off(), found(0.35, 10.0), FRAME).word == "accepted", "0.6 degrees and 17 cm"
+
+
+@pytest.mark.parametrize(
+    ("given", "sure", "word", "end"),
+    [
+        (off(), (0.05, 2.0), "accepted", "no more than 0.3° / 8 cm: by"),  # sure enough for the finest
+        (off(), (0.12, 3.5), "accepted", "no more than 0.5° / 15 cm: by"),
+        (off(z=0.10), (0.05, 2.0), "rejected", "0.3° / 8 cm are tolerated."),  # what is sure finds less
+        (off(z=0.09), (0.05, 2.6), "accepted", "no more than 0.5° / 15 cm: by"),  # beyond 8 cm, but at 3.5 sigma only
+        (off(z=0.14), (0.05, 3.5), "cannot tell", "within 0.5° / 15 cm is "),
+    ],
+)
+def test_the_finest_tolerance_that_can_be_told_is_held_to(
+    given: np.ndarray, sure: tuple[float, float], word: str, end: str
+) -> None:
+    verdict = verify(given, found(*sure), DRIVE)
+    assert verdict.word == word and end in verdict.reason
