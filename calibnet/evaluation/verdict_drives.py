@@ -18,13 +18,19 @@ from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
 from calibnet.evaluation.drives import shares_mount
 from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking, within
+from calibnet.evaluation.virtual import Virtual
 from calibnet.geometry import invert, pose_error, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
+from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.judging.drive_witnesses import drive_witnesses
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
-FEWEST, MOST = 3, 16
+MOST = 16
 """Frames of a drive; a sequence that has fewer gives all of them."""
+ENOUGH = 8
+"""Frames from which on a sequence is drawn as often as any: half as many, half as often."""
+VIRTUAL_SHARE = 0.5
+"""Of the drives: those that `calibnet.evaluation.virtual` shows through another lens, turned, half of them thinned."""
 
 
 class Faulty:
@@ -62,14 +68,15 @@ class DriveStream:
     """The runs on some drives with a cascade, by number, as `calibnet.evaluation.verdict_runs.RunStream` has frames."""
 
     def __init__(self, cascade: Cascade, sequences: Iterable[FrameSequence], seed: int) -> None:
-        """A run is a part of one of these sequences, and longer ones are drawn more often, up to `MOST` frames.
+        """A run is a part of one of these sequences, as it is or as a virtual rig has it.
 
-        What is no drive is left out, and sequences of one name, the cameras of one recording, count as one.
+        What is no drive, or has too few frames to be judged, is left out. Sequences of one name, the cameras of one
+        recording, count as one.
         """
         self.cascade, self.seed = asking(cascade), seed
-        self.sequences = [sequence for sequence in sequences if shares_mount(sequence)]
+        self.sequences = [one for one in sequences if len(one) >= FEWEST_JUDGED and shares_mount(one)]
         named = Counter(sequence.name for sequence in self.sequences)
-        odds = np.array([min(len(one), MOST) / named[one.name] for one in self.sequences], np.float64)
+        odds = np.array([min(len(one), ENOUGH) / named[one.name] for one in self.sequences], np.float64)
         self.odds = odds / odds.sum()
 
     def run(self, number: int) -> VerdictRun | None:
@@ -78,27 +85,27 @@ class DriveStream:
         if not self.sequences:
             return None
         which = int(generator.choice(len(self.sequences), p=self.odds))
-        sequence = self.sequences[which]
+        real, donor = self.sequences[which], self.sequences[(which + 1) % len(self.sequences)]
+        sequence = Virtual(real, number, self.seed) if generator.random() < VIRTUAL_SHARE else real
         positions = part(len(sequence), generator)
-        fault = PLAIN if generator.random() < PLAIN_SHARE else self._fault(which, generator)
-        donor = self.sequences[(which + 1) % len(self.sequences)]
+        fault = PLAIN if generator.random() < PLAIN_SHARE else drawn_fault(sequence, generator)
         try:
             drive = Faulty(sequence, positions, None if fault is PLAIN else fault, [donor[0]])
             searched = self.cascade.stages[0].range
             guess = sample_miscalibration(searched, generator) @ sequence[positions[0]].camera_from_lidar
-            return measured(self.cascade, drive, guess, number, sequence.name, fault)
+            return measured(self.cascade, drive, guess, number, real.name, fault)
         except CalibnetError:
             return None
 
-    def _fault(self, which: int, generator: np.random.Generator) -> Corruption:
-        """Any fault that a drive can have, each name as often as the others; the far start belongs to frames."""
-        sequence = self.sequences[which]
-        named: dict[str, list[Corruption]] = {}
-        for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
-            if fault.farther == 1:
-                named.setdefault(fault.name, []).append(fault)
-        strengths = named[str(generator.choice(list(named)))]
-        return strengths[int(generator.integers(len(strengths)))]
+
+def drawn_fault(sequence: FrameSequence, generator: np.random.Generator) -> Corruption:
+    """Any fault that a drive can have, each name as often as the others; the far start belongs to frames."""
+    named: dict[str, list[Corruption]] = {}
+    for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
+        if fault.farther == 1:
+            named.setdefault(fault.name, []).append(fault)
+    strengths = named[str(generator.choice(list(named)))]
+    return strengths[int(generator.integers(len(strengths)))]
 
 
 def part(length: int, generator: np.random.Generator) -> list[int]:
@@ -106,7 +113,7 @@ def part(length: int, generator: np.random.Generator) -> list[int]:
 
     The same frames from another guess end at nearly the same place: what tells drives apart is which frames they have.
     """
-    count = min(length, round(float(np.exp(generator.uniform(np.log(FEWEST), np.log(MOST))))))
+    count = min(length, round(float(np.exp(generator.uniform(np.log(FEWEST_JUDGED), np.log(MOST))))))
     stretch = int(generator.integers(count, length + 1))
     start = int(generator.integers(length - stretch + 1))
     return [start + position for position in spread(stretch, count)]

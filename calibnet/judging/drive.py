@@ -13,6 +13,9 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verd
 
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Standard deviations, over all axes, beyond which the frames agree on too little."""
+FEWEST_JUDGED = 4
+"""Frames that a drive needs to be accepted: of two or three, which mostly show one place, as many end beyond the limits
+as within, and nothing tells which (docs/decisions.md, "Drives")."""
 HALVES_CM = 15.0
 """Between the halves of a drive, turns counted as `calibnet.judging.drive_witnesses` does, from which on it is told."""
 
@@ -55,6 +58,8 @@ def _word(
         )
     if isinstance(doubt, str):
         return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {doubt}"
+    if used < FEWEST_JUDGED:
+        return CANNOT_TELL, f"{used} frames agree; to be sure of a drive takes {FEWEST_JUDGED}, better of other places."
     witnesses = drive_witnesses(estimate, initial, searched)
     if witnesses is None:
         return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."

@@ -63,6 +63,13 @@ def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -
     np.testing.assert_array_equal(verdict.covariance, drive.covariance)
 
 
+def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
+    few = replace(estimate(), frames=3, looks=estimate().looks[:3])
+    verdict = judge_drive(few, REFERENCE, RANGES[2], DOUBT)
+    assert verdict.word == "cannot tell" and verdict.reason.startswith("3 frames agree; to be sure of a drive takes 4")
+    assert judge_drive(replace(few, frames=4), REFERENCE, RANGES[2], DOUBT).word == "accepted"
+
+
 def test_by_no_coefficients_no_drive_is_accepted() -> None:
     verdict = judge_drive(estimate(), REFERENCE, RANGES[2], "Nothing was fitted.")
     assert verdict.word == "cannot tell"
