@@ -20,7 +20,7 @@ from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert
 from calibnet.geometry.known import Held, Known
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
-from calibnet.judging.causes import Search, match_error_of, misfit_of, reach_of
+from calibnet.judging.causes import Search, match_error_of, reach_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.judge import judge
@@ -171,7 +171,7 @@ class Cascade:
     def explain(self, frame: Frame, initial: Extrinsic, lags: Search | None = None) -> Verdict:
         """The verdict on a frame with its causes: what, undone in the input, makes picture and scan fit.
 
-        This runs stages some thirty times, for frames whose verdict in `calibrate` is not accepted.
+        This runs stages up to thirty times, for frames whose verdict in `calibrate` is not accepted.
 
         Args:
             frame: image, scan and camera; its own extrinsic is not looked at.
@@ -192,7 +192,6 @@ class Cascade:
                 trace,
                 self.coefficients,
                 match_error_of(self.stages[0]),
-                misfit_of(self.calibrate),
                 None if lags is None else (lags, reach_of(self.calibrate)),
                 self.known.words,
             )

@@ -1,9 +1,8 @@
 """Why picture and scan do not fit: whatever, done to what was given, makes them fit is the cause.
 
 Each attempt undoes one fault. A mirrored or rolled picture and a scan in other axes keep the scan from being found in
-the picture at all, so a coarse stage's match error tells. A wrong lens is explained away by a wrong pose, and match
-errors hardly notice; but no pose fits the last stage's matches as well as with the right lens, so their misfit tells.
-Both need the network again for every attempt, which is for doubt and for `verify`, not for every frame.
+the picture at all, so a coarse stage's match error tells. That needs the network again for every attempt, which is for
+doubt and for `verify`, not for every frame. A wrong lens is told by the matches, see `calibnet.judging.lens_causes`.
 """
 
 from __future__ import annotations
@@ -17,9 +16,9 @@ import numpy as np
 
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
-from calibnet.geometry import PinholeCamera, transform_points
+from calibnet.geometry import transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
-from calibnet.judging.witnesses import misfit, reach
+from calibnet.judging.witnesses import reach
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.verdict import Cause
 
@@ -35,13 +34,11 @@ class Attempt:
         names: of the causes; two where the picture cannot tell which.
         text: a sentence for the user.
         undo: of a frame.
-        handicap: what its measure is multiplied by: more than 1 for what often fits a little better without being so.
     """
 
     names: tuple[str, ...]
     text: str
     undo: Callable[[Frame], Frame]
-    handicap: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -80,8 +77,8 @@ def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> t
 
     given = measured(frame)
     tried = [(measured(frame.changed(attempt.undo)), attempt) for attempt in search.attempts]
-    least, best = min(tried, key=lambda pair: pair[0] * pair[1].handicap)
-    if not least * best.handicap < search.share * given or not least < search.most:
+    least, best = min(tried, key=lambda pair: pair[0])
+    if not least < search.share * given or not least < search.most:
         return ()
     before = "no match at all" if np.isinf(given) else f"{given:.3g} {search.unit}"
     evidence = f"{least:.3g} {search.unit} with that undone, instead of {before}"
@@ -108,19 +105,6 @@ def match_error_of(stage: Looking) -> Measure:
         first = stage.look(frame, view, guess)
         second = stage.look(frame, view, first.after)
         return float(np.sqrt(first.match_error_px * second.match_error_px))
-
-    return measure
-
-
-def misfit_of(calibrate: Callable[[Frame, Extrinsic], CascadeTrace]) -> Measure:
-    """The `calibnet.judging.witnesses.misfit` of the last stage's matches after a run, times their expected error.
-
-    With a wrong lens both grow; the misfit alone is smaller with some other lens on one good frame in ten.
-    """
-
-    def measure(frame: Frame, guess: Extrinsic) -> float:
-        last = calibrate(frame, guess).stages[-1]
-        return misfit(last) * last.match_error_px
 
     return measure
 
@@ -174,34 +158,6 @@ def scan(rotation: Floats) -> Callable[[Frame], Frame]:
     return undo
 
 
-def lens(focal: float = 1.0, right: float = 0.0, down: float = 0.0) -> Callable[[Frame], Frame]:
-    """Take a camera of ``focal`` times the focal length, its principal point moved by shares of the picture's width."""
-
-    def undo(frame: Frame) -> Frame:
-        matrix, width = frame.camera.matrix.copy(), frame.camera.width
-        matrix[:2, :2] *= focal
-        matrix[:2, 2] += right * width, down * width
-        return replace(frame, camera=PinholeCamera(width, frame.camera.height, matrix))
-
-    return undo
-
-
-def rectified(bend: Callable[[Floats], Floats]) -> Callable[[Frame], Frame]:
-    """Undo a lens that shows at ``bend(r)`` what a pinhole shows at ``r``, in focal lengths from the centre."""
-
-    def undo(frame: Frame) -> Frame:
-        camera = frame.camera
-        (fx, fy), (cx, cy) = camera.focal, camera.center
-        v, u = np.mgrid[: camera.height, : camera.width]
-        x, y = (u - cx) / fx, (v - cy) / fy
-        radius = np.hypot(x, y)
-        stretch = bend(radius) / np.maximum(radius, 1e-9)
-        maps = ((fx * x * stretch + cx).astype(np.float32), (fy * y * stretch + cy).astype(np.float32))
-        return replace(frame, image=cv2.remap(frame.image, *maps, cv2.INTER_LINEAR).astype(np.uint8, copy=False))
-
-    return undo
-
-
 def _picture_and_scan() -> Iterator[Attempt]:
     yield Attempt(("mirrored", "left-handed"), "The picture is mirrored, or the scan's axes are left-handed.", mirrored)
     for degrees in (-30, 30, -90, 90, 180):
@@ -221,36 +177,7 @@ def _picture_and_scan() -> Iterator[Attempt]:
         yield Attempt(("left-handed",), text, scan(np.diag(signs)))
 
 
-HANDICAP = 1.6
-"""Of a principal point farther up or down, which a pitch explains all but wholly: scans are narrow that way."""
-
-
-def _lenses() -> Iterator[Attempt]:
-    for percent in (-10, -5, 5, 10):  # that what camera_matrix says is too long
-        text = (
-            f"The picture looks as if its focal length were about {abs(percent)} % "
-            f"{'shorter' if percent > 0 else 'longer'} than camera_matrix says."
-        )
-        yield Attempt(("focal-length",), text, lens(focal=1 / (1 + percent / 100)))
-    for right, down in ((-0.05, 0.0), (0.05, 0.0), (0.0, -0.05), (0.0, 0.05)):
-        side = ("to the right" if right > 0 else "to the left") if right else ("down" if down > 0 else "up")
-        text = (
-            f"The picture looks as if its principal point lay about 5 % of the width farther {side} than camera_matrix "
-            "says, or as if it were shifted."
-        )
-        yield Attempt(("principal-point",), text, lens(right=right, down=down), HANDICAP if down else 1.0)
-    text = "The picture looks barrel-shaped (k1 of about -0.2): its distortion seems not to be undone."
-    yield Attempt(("distortion",), text, rectified(lambda radius: radius * (1 - 0.2 * radius**2)))
-    text = "The picture looks like that of a fisheye lens (equidistant): undo its distortion with that model."
-    yield Attempt(("lens-model",), text, rectified(np.arctan))
-
-
-PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=25.0, unit="px of expected match error")
+PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=18.0, unit="px of expected match error")
 """By the match error of a coarse stage. Of 4 frames of 4 rigs, a mirrored picture and other axes undone came to 0.13 to
 0.5 of it, a rolled picture to 0.3 to 0.6; the best wrong attempt for a picture of another place to 0.5 once, and
-otherwise to 0.8 and more."""
-LENSES = Search(tuple(_lenses()), share=0.75, most=np.inf, unit="of misfit times match error (px)")
-"""By the last stage's matches, on runs that were not accepted, of rigs of nine makes and of the synthetic world. Of 23
-good ones without fault, 1 is given a lens that it does not have; of 22 with a wrong lens 11 are named rightly, 3
-wrongly.
-By the misfit alone, at 0.85, it was 2, 11 and 5."""
+otherwise to 0.8 and more. Undone they are 8 to 12 px; a picture of another place came to 23."""

@@ -7,9 +7,10 @@ import math
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.plausibility import ROW_STEP, Implausible, bit_depth, of_camera, of_extrinsic, ranges, up
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.causes import LENSES, PICTURE_AND_SCAN, Measure, Search, cause
+from calibnet.judging.causes import PICTURE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import covariance
+from calibnet.judging.lens_causes import lens_causes
 from calibnet.judging.witnesses import reach, witnesses
 from calibnet.trace import MARGIN, CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
@@ -28,7 +29,6 @@ def judge(
     trace: CascadeTrace | None,
     coefficients: Coefficients,
     match_error: Measure | None = None,
-    misfit: Measure | None = None,
     lag: tuple[Search, Measure] | None = None,
     known: str = "",
 ) -> Verdict:
@@ -39,12 +39,12 @@ def judge(
         guess: ``camera_from_lidar`` that it started from, 4x4.
         trace: of the run; None where it could not be run because too few points fall into the picture.
         coefficients: that were fitted to the weights; without any nothing is accepted.
-        match_error: where picture and scan do not fit, finds out why by `calibnet.judging.causes.PICTURE_AND_SCAN`.
+        match_error: given, it is found out why a result is not accepted: where picture and scan do not fit, by this
+            measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by the lens that the matches ask for.
         lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
             far a run goes.
         known: what was known of the extrinsic beforehand, as the user said it. The doubt is fitted to runs in which all
             axes are open, which go wrong mostly in what may be known here: it accepts then, and never rejects.
-        misfit: where they fit, but not well enough, finds out why by `calibnet.judging.causes.LENSES`.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
     of_scan = ranges(frame.points), up(frame.points)
@@ -56,6 +56,9 @@ def judge(
 
     def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
         return suspects or (() if measure is None else cause(search, frame, guess, measure))
+
+    def why_lens() -> tuple[Cause, ...]:
+        return suspects or (() if match_error is None or trace is None else lens_causes(trace))
 
     if trace is None or not trace.stages:
         causes = why(PICTURE_AND_SCAN, match_error)
@@ -80,14 +83,19 @@ def judge(
             f"at most {trace.match_error_limit_px:g} px are usual."
         )
         causes = why(PICTURE_AND_SCAN, match_error)
-        if not causes and match_error is not None and last.match_error_px > UNRELATED_PX:
-            text = "They seem to be of different places, or the start is far outside the range searched."
-            causes = (Cause("other-picture", text, f"{last.match_error_px:.1f} px, and nothing tried makes them fit"),)
+        if not causes and match_error is not None:
+            if last.match_error_px > UNRELATED_PX:
+                text = "They seem to be of different places, or the start is far outside the range searched."
+                causes = (
+                    Cause("other-picture", text, f"{last.match_error_px:.1f} px, and nothing tried makes them fit"),
+                )
+            else:
+                causes = why_lens()
         return verdict(REJECTED, reason, causes)
     gone = reach(trace.initial, last.after, trace.stages[0].range)
     if gone.share > MARGIN:
         word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
-        return verdict(word, f"The LiDAR {gone}.", why(LENSES, misfit) or (why(*lag) if lag else ()))
+        return verdict(word, f"The LiDAR {gone}.", why_lens() or (why(*lag) if lag else ()))
 
     doubt = coefficients.doubt_of(last.range)
     if isinstance(doubt, str):
@@ -105,8 +113,8 @@ def judge(
             "Picture and scan fit, but not as well as in runs that end right (if no axis were known, an error would be "
             f"{wrong:.0%} likely; with {known} it is less so, how much cannot be told)."
         )
-        return verdict(CANNOT_TELL, reason, why(LENSES, misfit))
-    return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why(LENSES, misfit))
+        return verdict(CANNOT_TELL, reason, why_lens())
+    return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why_lens())
 
 
 def _suspect(remark: Implausible) -> Cause:

@@ -17,7 +17,7 @@ from calibnet.verdict import ACCEPTED, Cause, Verdict
 from inspector.verdicts import causes_of
 
 SUSPECTS = 3
-"""Frames, spread over a drive, that are asked for the cause: each runs stages some thirty times."""
+"""Frames, spread over a drive, that are asked for the cause: each runs stages up to thirty times."""
 
 
 def judge_given(
