@@ -29,6 +29,7 @@ import numpy as np
 from calibnet.errors import CalibnetError
 from tests.hostile import calibrations, clouds, pictures, weights
 from tests.hostile.recordings import VERDICT
+from tests.support.clouds import npy, npz, with_fields
 
 HANG_S, GIGABYTES = 10, 2.0
 """An input that takes longer, or grows the process by more, is a finding."""
@@ -148,7 +149,9 @@ def _seeds_of_scans(suffix: str) -> tuple[bytes, ...]:
     contents = {
         ".pcd": [clouds.pcd(kept, form) for form in ("ascii", "binary", "binary_compressed")],
         ".ply": [clouds.ply(kept, form) for form in ("ascii", "binary_little_endian")],
-        ".npy": [clouds.npy(kept)],
+        ".npy": [clouds.npy(kept), npy(with_fields(kept))],
+        ".npz": [npz(kept)],
+        ".las": [clouds.LAS],
         ".bin": [kept.tobytes(), np.tile(clouds.POINTS, (1, 1))[:200].tobytes()],
         ".feather": [clouds.FEATHER],
         ".parquet": [clouds.PARQUET],
@@ -163,6 +166,38 @@ def _small(form: str) -> bytes:
 WORDS = tuple(
     b"FIELDS|SIZE|TYPE|COUNT|WIDTH|HEIGHT|POINTS|DATA|ascii|binary|binary_compressed|_|F|U|4294967296|-1|nan|inf|1e400|"
     b"element vertex|property float|property list uchar int|end_header|format|0|99999999999".split(b"|")
+)
+
+
+def _bag(kind: str, data: bytes) -> object:
+    """A bag: the message of a cloud and everything else in it is read as `calib-inspect bag` reads it."""
+    from calibnet.datasets.bag import Bag
+
+    return _as_file(f"bag{kind}", data, lambda path: Bag([path])[0])
+
+
+def _small_bag(kind: str) -> bytes:
+    from tests.hostile.bags import small_bag
+
+    return small_bag(kind)
+
+
+def _stamps(data: bytes) -> object:
+    from calibnet.datasets.pairing import times_of
+
+    return _as_file("timestamps.txt", data, lambda path: times_of({"a": path.parent / "a", "b": path.parent / "b"}))
+
+
+def _nuscenes_sensors(data: bytes) -> object:
+    from calibnet.datasets.nuscenes_tables import read_sensors
+
+    _as_file("sensor.json", b'[{"token": "s", "channel": "LIDAR_TOP"}]', Path.exists)
+    return _as_file("calibrated_sensor.json", data, lambda path: read_sensors(path.parent))
+
+
+SENSOR = (
+    b'[{"token": "a", "sensor_token": "s", "translation": [1.0, 0.0, 2.0], "rotation": [1.0, 0.0, 0.0, 0.0], '
+    b'"camera_intrinsic": [[9.0, 0.0, 4.0], [0.0, 9.0, 3.0], [0.0, 0.0, 1.0]]}]'
 )
 
 
@@ -183,8 +218,9 @@ def _small_floats() -> bytes:
 TARGETS: dict[str, Target] = {
     **{
         f"scan{suffix}": Target(partial(_scan, suffix), _seeds_of_scans(suffix), WORDS)
-        for suffix in (".pcd", ".ply", ".npy", ".bin", ".feather", ".parquet")
+        for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".feather", ".parquet")
     },
+    **{f"bag{kind}": Target(partial(_bag, kind), (_small_bag(kind),)) for kind in (".bag", ".db3", ".mcap")},
     "image": Target(_image, (*(_small(form) for form in ("PNG", "JPEG", "BMP", "TIFF", "WEBP")), _small_floats())),
     "calibration": Target(
         _calibration,
@@ -194,11 +230,14 @@ TARGETS: dict[str, Target] = {
             b'{"width": 400, "height": 120}',
             b"%YAML:1.0\n---\n",
             b"mirror_parameters: {xi: 2}\nprojection_parameters: {gamma1: 1, gamma2: 1, u0: 1, v0: 1}\n",
+            *(text.encode() for text in calibrations.OTHERS),
         ),
         (b"&a ", b"*a", b"!!int ", b"!!opencv-matrix", b"<<: ", b"camera_matrix: ", b".nan", b"2011-01-01", b"[[[["),
     ),
     "kitti calib": Target(_kitti, (b"P2: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n",), WORDS),
     "nuscenes table": Target(_nuscenes, (b'[\n{\n"token": "a",\n"translation": [1.0, 2.0, 3.0]\n},\n{}\n]',), WORDS),
+    "nuscenes sensors": Target(_nuscenes_sensors, (SENSOR,), WORDS),
+    "stamps": Target(_stamps, (b"1532402927612460000\n1532402927712460000\n", b"2011-09-26 13:02:25.9\n0.5\n"), WORDS),
     "kitti times": Target(_times, (b"0.0\n0.104\n0.207\n",), WORDS),
     "weights": Target(_weights, (weights.file(lambda _: None)[: 1 << 15],)),
     "manifest": Target(

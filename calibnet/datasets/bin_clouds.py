@@ -53,6 +53,8 @@ def read_bin(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
             f"its {len(data)} bytes are no whole rows of {len(layout)} columns ({', '.join(layout)}, as float32), so "
             "it is truncated or the columns are others"
         )
+    else:
+        _check_declared(np.frombuffer(data, "<f4"), layout)
     rows = np.frombuffer(data, "<f4").reshape(-1, len(layout))
     return {name.lower(): rows[:, place] for place, name in enumerate(layout)}
 
@@ -65,6 +67,7 @@ def recognised(data: bytes) -> tuple[str, ...]:
     """
     fitting = [layout for layout in LAYOUTS if len(data) % (FLOAT_BYTES * len(layout)) == 0]
     if not fitting:
+        _check_width(data)
         raise CloudError(
             f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns ({DECLARE})"
         )
@@ -78,8 +81,39 @@ def recognised(data: bytes) -> tuple[str, ...]:
     chosen = KITTI if KITTI in good else min(good, key=len)
     rivals = [layout for layout in fitting if telling[layout] > CLEARLY * best and len(layout) % len(chosen)]
     if (rivals and chosen is not KITTI) or not _plausible(values.reshape(-1, len(chosen))):
+        _check_width(data)
         _ask()
     return chosen
+
+
+def _check_declared(values: NDArray[np.float32], layout: tuple[str, ...]) -> None:
+    """Hold a declared layout against the numbers, which mix where there are more or fewer columns.
+
+    Raises:
+        CloudError: another number of columns tells much more of them.
+    """
+    if len(values) < FEWEST_VALUES:
+        return
+    levels = _levels(values[:ENOUGH_VALUES])
+    others = {len(other) for other in LAYOUTS if len(values) % len(other) == 0} - {len(layout)}
+    telling = {columns: _telling(levels, columns) for columns in others}
+    best = max(telling, key=lambda columns: telling[columns], default=0)
+    if best and _telling(levels, len(layout)) < CLEARLY * telling[best]:
+        raise CloudError(
+            f"cloud_columns names {len(layout)} columns ({', '.join(layout)}), and its numbers look like rows of {best}"
+        )
+
+
+def _check_width(data: bytes) -> None:
+    """Tell numbers of 8 bytes, which nothing here writes, by their sizes.
+
+    Raises:
+        CloudError: they are such.
+    """
+    with np.errstate(invalid="ignore"):
+        values = np.abs(np.frombuffer(data[: len(data) // 8 * 8], "<f8"))
+        if len(values) >= FEWEST_VALUES and (values < FARTHEST_M).mean() > 0.99 and (values > 0.1).mean() > 0.3:
+            raise CloudError("its numbers seem to be float64; write them as float32 (points.astype('float32').tofile)")
 
 
 def _levels(values: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -25,6 +25,10 @@ Columns = dict[str, NDArray[np.generic]]
 """Values ``[N]`` by name, in lower case; of a name given twice the first counts."""
 
 
+INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity", "scalar_reflectance", "i")
+"""Names under which clouds store intensity, best first, in lower case."""
+
+
 class CloudError(ValueError):
     """What is wrong with a cloud, in words that continue a sentence."""
 
@@ -161,3 +165,26 @@ def _single(columns: Sequence[Column]) -> dict[str, int]:
 
 def _few(number: int) -> str:
     return f"{number:,}" if abs(number) < 10**15 else "a huge number of"
+
+
+def points_of(columns: Columns) -> NDArray[np.float32]:
+    """``[N, 4]`` of columns by name; intensity 0 where there is none.
+
+    Raises:
+        CloudError: a coordinate is missing.
+    """
+    if missing := [axis for axis in "xyz" if axis not in columns]:
+        raise CloudError(f"it has no column {', '.join(missing)}, only {', '.join(columns) or 'none'}")
+    intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
+    return joined(columns["x"], columns["y"], columns["z"], intensity)
+
+
+def joined(
+    x: NDArray[np.generic], y: NDArray[np.generic], z: NDArray[np.generic], intensity: NDArray[np.generic] | None
+) -> NDArray[np.float32]:
+    """``[N, 4]`` of single columns; without an intensity that is 0."""
+    points = np.zeros((len(x), 4), np.float32)
+    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is dropped as such
+        for place, values in enumerate((x, y, z) if intensity is None else (x, y, z, intensity)):
+            points[:, place] = values
+    return points

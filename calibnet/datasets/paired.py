@@ -170,7 +170,9 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
             raise DatasetError(f"{folder} holds both {files[stem].name} and {path.name}; keep one of them.")
         files[stem] = path
     if not files:
-        raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}); put them there.")
+        others = sorted({path.suffix for path in folder.iterdir() if path.suffix})
+        there = f", only {', '.join(others[:5])}" if others else ""
+        raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}){there}; put them there.")
     return files
 
 

@@ -23,6 +23,8 @@ MEGABYTE = 1 << 20
 TEXT_BYTES = 16 * MEGABYTE
 """Of lists of times or frames; a calibration, a manifest or a preset has `SETTINGS_BYTES` at most."""
 SETTINGS_BYTES = MEGABYTE // 4
+LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+"""How the file begins that stands where Git LFS has not fetched one."""
 DEEPEST = 24
 """Levels that YAML and JSON of ours are nested at most; real ones have four."""
 
@@ -124,6 +126,8 @@ def read_file(
             data = file.read(largest + 1)
         if len(data) > largest:  # it grows while it is read
             raise TooLargeError(0, _too_large(len(data), largest), str(path))
+        if data.startswith(LFS_POINTER):
+            raise OSError(0, "Git LFS left a pointer in its place; fetch it with 'git lfs pull'", str(path))
     except OSError as problem:
         _refuse(path, what, problem, error, remedy)
     return data

@@ -23,6 +23,24 @@ def text(**lines: str | None) -> str:
 BOMB = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
     f"{chr(98 + n)}: &{chr(98 + n)} [{','.join([f'*{chr(97 + n)}'] * 9)}]\n" for n in range(9)
 )
+OTHERS = (
+    "image_width: 400\nimage_height: 120\ncamera_matrix: {rows: 3, cols: 3, data: [232, 0, 200, 0, 232, 60, 0, 0, 1]}\n"
+    "distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n" + EXTRINSIC,
+    "height: 120\nwidth: 400\ndistortion_model: equidistant\nd: [0.1, 0, 0, 0]\nk: [232, 0, 200, 0, 232, 60, 0, 0, 1]\n"
+    "---\n",
+    "cam0: {camera_model: omni, distortion_model: radtan, distortion_coeffs: [0, 0, 0, 0], resolution: [400, 120], "
+    "intrinsics: [1.2, 232, 232, 200, 60], T_cam_lidar: [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]}",
+    '{"camera": {"camera_model": "plumb_bob", "distortion_coeffs": [0, 0, 0, 0, 0], "intrinsics": [232, 232, 200, 60]},'
+    ' "results": {"T_lidar_camera": [0, 0, 0, 0.5, -0.5, 0.5, -0.5]}}',
+    "transforms:\n- header: {frame_id: velodyne}\n  child_frame_id: cam_optical\n  transform: {translation: {x: 0, y: 0"
+    ", z: 0}, rotation: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}\n---\n",
+    "kit:\n  camera0/camera_link: {x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}\n"
+    "  velodyne_top: {x: 0, y: 0, z: 0, roll: 0, pitch: 0, yaw: 0}\n",
+    "<?xml version='1.0'?><opencv_storage><image_width>400</image_width><image_height>120</image_height>"
+    "<K type_id='opencv-matrix'><rows>3</rows><cols>3</cols><dt>d</dt><data>232 0 200 0 232 60 0 0 1</data></K>"
+    "<D>0 0 0 0 0</D></opencv_storage>",
+)
+"""Whole calibrations as other tools write them."""
 VALUES = {
     "nested a thousand times": "x: " + "[" * 1000 + "]" * 1000,
     "nested a hundred thousand times": "x: " + "[" * 100_000,

@@ -6,6 +6,7 @@ import io
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import laspy
 import numpy as np
 import pyarrow as pa
 from pyarrow import feather, parquet
@@ -39,6 +40,16 @@ def table(write: Callable[[Any, io.BytesIO], None]) -> bytes:
     return file.getvalue()
 
 
+def las() -> bytes:
+    """A survey's file of twelve points."""
+    data = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
+    data.x, data.y, data.z = POINTS[:12, :3].T.astype(np.float64)
+    file = io.BytesIO()
+    data.write(file)
+    return file.getvalue()
+
+
+LAS = las()
 FEATHER, PARQUET = table(feather.write_feather), table(parquet.write_table)
 OF_TABLES = {".feather": FEATHER, ".parquet": PARQUET}
 FOREIGN = {

@@ -53,6 +53,22 @@ def npy(array: Values) -> bytes:
     return file.getvalue()
 
 
+def npz(array: Values) -> bytes:
+    """A ``.npz`` file of one array."""
+    file = io.BytesIO()
+    np.savez(file, points=array)
+    return file.getvalue()
+
+
+def with_fields(rows: Values) -> Values:
+    """Points ``[N, 4]`` as ``ros_numpy`` makes them, with a column of several values."""
+    kinds = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("rgb", "u1", 3), ("Intensity", "f4")]
+    array = np.zeros(len(rows), np.dtype(kinds))
+    for place, name in enumerate(("x", "y", "z", "Intensity")):
+        array[name] = rows[:, place]
+    return array
+
+
 def pack_lzf(data: bytes) -> bytes:
     """LZF the simplest way: copies of four zeros or more from just before, and literals."""
     out, place = bytearray(), 0

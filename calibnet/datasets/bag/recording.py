@@ -110,10 +110,12 @@ class BagRecording:
         """Say in one sentence what a reader of bags, or one of the libraries below it, cannot read."""
         try:
             yield
-        except (DatasetError, MemoryError, GeneratorExit):
+        except (DatasetError, GeneratorExit):
             raise
         except Exception as error:  # bags are read by many hands, which fail in as many ways
             why = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+            if isinstance(error, MemoryError):  # what a damaged record says of its own length
+                why = "it promises more than there is memory for"
             raise DatasetError(
                 f"Bag {self} cannot be read ({why}); reindex it (`rosbag reindex`, `ros2 bag reindex`, `mcap "
                 "recover`), or copy it again."

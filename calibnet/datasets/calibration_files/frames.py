@@ -21,6 +21,8 @@ LIDAR = re.compile(
 )
 OPTICAL_FROM_BODY = transform([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], [0.0, 0.0, 0.0])
 """From a frame with x forward, y left, z up to one with x right, y down, z forward: REP 103."""
+SAME = 1e-3
+"""Metres, and elements of a rotation, by which two ways to a frame may differ."""
 UPRIGHT = 0.8
 """Cosine between the z axes of a camera's frame and the LiDAR's from which on the camera's is none of an image."""
 
@@ -42,16 +44,22 @@ def camera_from_lidar(links: Iterable[Link], choice: FrameChoice, path: Path | s
         path: of the file, for messages.
 
     Raises:
-        DatasetError: a frame is not there, could be one of several, hangs on another tree, or is not an image's.
+        DatasetError: a frame is not there, could be one of several, hangs on another tree, has two places, or is not an
+            image's.
     """
     tree: dict[str, dict[str, Transform]] = {}
     for parent, child, parent_from_child in links:
+        if not np.allclose(tree.get(parent, {}).get(child, parent_from_child), parent_from_child, atol=SAME):
+            raise DatasetError(
+                f"{path} says twice, and differently, where {child} is in {parent}; give the right one by --guess FILE."
+            )
         tree.setdefault(parent, {})[child] = parent_from_child
         tree.setdefault(child, {})[parent] = invert(parent_from_child)
     lidar = _chosen(tree, choice.lidar, LIDAR, "lidar", path)
-    reachable = _from(tree, lidar)
-    cameras = {name: tree[name] for name in tree if choice.camera is not None or name in reachable}
-    camera = _chosen(cameras, choice.camera, CAMERA, "camera", path, but=lidar)
+    reachable = _from(tree, lidar, path)
+    near = {name: tree[name] for name in reachable}
+    is_near = choice.camera is None and any(CAMERA.search(name) for name in near if name != lidar)
+    camera = _chosen(near if is_near else tree, choice.camera, CAMERA, "camera", path, but=lidar)
     if camera not in reachable:
         raise DatasetError(f"{path} does not connect {camera} with {lidar}; give the transforms between them.")
     found = invert(reachable[camera])
@@ -63,15 +71,25 @@ def camera_from_lidar(links: Iterable[Link], choice: FrameChoice, path: Path | s
     return found
 
 
-def _from(tree: dict[str, dict[str, Transform]], start: str) -> dict[str, Transform]:
-    """``start_from_frame`` of every frame that hangs on it."""
+def _from(tree: dict[str, dict[str, Transform]], start: str, path: Path | str) -> dict[str, Transform]:
+    """``start_from_frame`` of every frame that hangs on it.
+
+    Raises:
+        DatasetError: two ways lead to a frame, and say that it is in different places.
+    """
     found, waiting = {start: np.eye(4)}, [start]
     while waiting:
         frame = waiting.pop()
         for other, frame_from_other in tree[frame].items():
+            by_this_way = found[frame] @ frame_from_other
             if other not in found:
-                found[other] = found[frame] @ frame_from_other
+                found[other] = by_this_way
                 waiting.append(other)
+            elif not np.allclose(found[other], by_this_way, atol=SAME):
+                raise DatasetError(
+                    f"{path} leads from {start} to {other} in two ways that contradict each other; a frame hangs on "
+                    "one other alone, so take the wrong transform out."
+                )
     return found
 
 

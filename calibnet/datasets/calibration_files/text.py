@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -10,6 +12,10 @@ from calibnet.errors import DatasetError
 from calibnet.runtime.reading import parse_json, parse_yaml, read_text
 
 OPENCV_YAML, OPENCV_TAG = "%YAML:1.0", "!!opencv-matrix"
+"""Before version 3 OpenCV put no space behind a key."""
+END_OF_MESSAGE = re.compile(r"^---[ \t]*$", re.MULTILINE)
+"""ROS's ``topic echo`` prints it behind every message."""
+MOST_MESSAGES = 100
 REMEDY = (
     "write width, height, camera_matrix, distortion and camera_from_lidar there, or give the file of another tool "
     "(docs/own-sensors.md)"
@@ -43,11 +49,39 @@ def parse(path: Path) -> Parsed:
     except ValueError:
         pass  # a mapping of YAML in braces, perhaps
     is_opencv = start.startswith(OPENCV_YAML) or OPENCV_TAG in text
-    text = text.replace(OPENCV_YAML, "", 1).replace(OPENCV_TAG, "")
+    if start.startswith(OPENCV_YAML):
+        text = re.sub(r"^([ \t]*\w+):(?=\S)", r"\1: ", text, flags=re.MULTILINE)
+    text = re.sub(r"\A\s*%YAML.*", "", text)  # a directive, which has no document of its own
+    parts = [part for part in re.split(END_OF_MESSAGE, text.replace(OPENCV_TAG, "")) if part.strip()]
+    if len(parts) > MOST_MESSAGES:
+        raise DatasetError(f"Calibration {path} holds {len(parts)} messages, with --- between them; one is enough.")
     try:
-        return Parsed(parse_yaml(text), is_opencv)
+        messages = [parse_yaml(part) for part in parts]
     except ValueError as problem:
         raise DatasetError(f"Calibration {path} is not valid YAML ({problem}); write it again.") from None
+    return Parsed(_joined([one for one in messages if one is not None], path), is_opencv)
+
+
+def _joined(messages: list[Any], path: Path) -> Any:
+    """One content of what ``topic echo`` printed: several messages that say the same, or each some transforms.
+
+    Raises:
+        DatasetError: they say different things.
+    """
+    if len(messages) <= 1:
+        return messages[0] if messages else None
+    if all(isinstance(one, Mapping) and isinstance(one.get("transforms"), list) for one in messages):
+        return {"transforms": [transform for one in messages for transform in one["transforms"]]}
+    if any(_said(one) != _said(messages[0]) for one in messages):
+        raise DatasetError(
+            f"Calibration {path} holds {len(messages)} messages that differ, with --- between them; keep the right one."
+        )
+    return messages[0]
+
+
+def _said(message: Any) -> Any:
+    """What a message says, but when and of which picture."""
+    return {key: message[key] for key in message if key != "header"} if isinstance(message, Mapping) else message
 
 
 def _xml_value(element: ElementTree.Element) -> Any:

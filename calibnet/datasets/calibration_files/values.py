@@ -190,6 +190,8 @@ def _of_parts(value: Mapping[Any, Any], path: Path, key: str) -> Transform:
         rotation = quaternion(value[name], name.removeprefix("quaternion_"), path, where)
     else:
         angles = numbers(value[name], where, path, (3,))
+        if name == "rpy_rad" and np.abs(angles).max() > 2 * np.pi:
+            raise DatasetError(f"Calibration {path}: {where} is more than a turn; call angles in degrees 'rpy_deg'.")
         rotation = roll_pitch_yaw(np.radians(angles) if name == "rpy_deg" else angles)
     translation = numbers(value["translation"], f"{key}.translation", path, (3,))
     return checked_rigid(transform(rotation, translation), path, key)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from collections.abc import Callable
+from pathlib import Path
 
 import laspy
 import numpy as np
@@ -12,9 +14,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 
-from calibnet.datasets.bin_clouds import KITTI, LAYOUTS, recognised
+from calibnet.datasets.bin_clouds import KITTI, LAYOUTS, read_bin, recognised
 from calibnet.datasets.cloud_table import CloudError
 from calibnet.errors import DatasetError
+from tests.support.clouds import with_fields
 
 
 def scan(count: int = 4000, seed: int = 0) -> np.ndarray:
@@ -53,12 +56,26 @@ def test_few_points_are_taken_for_kitti_s():
         recognised(scan(50)[:49, :5].tobytes())
 
 
-@pytest.mark.parametrize("data", [np.random.default_rng(0).bytes(60 * 400), scan()[:, :4].astype(np.float64).tobytes()])
-def test_what_is_no_float32_is_asked_about(data):
+def test_what_is_no_float32_is_asked_about():
     with pytest.raises(
         CloudError, match=r"does not show how many columns.*cloud_columns: \[x, y, z, intensity, ring\]"
     ):
-        recognised(data)
+        recognised(np.random.default_rng(0).bytes(60 * 400))
+
+
+@pytest.mark.parametrize("columns", [3, 4, 5, 6])
+def test_float64_is_called_so(columns):
+    with pytest.raises(CloudError, match="seem to be float64; write them as float32"):
+        recognised(scan()[:, :columns].astype(np.float64).tobytes())
+
+
+@pytest.mark.parametrize(("held", "named"), [(6, 4), (6, 3), (4, 5), (5, 4), (4, 3)])
+def test_a_declared_layout_of_other_columns_is_refused(held, named):
+    rows = scan(6000)[:, :held]
+    names = ("x", "y", "z", "intensity", "ring")[:named]
+    with pytest.raises(CloudError, match=f"names {named} columns .* and its numbers look like rows of {held}"):
+        read_bin(rows.tobytes(), names)
+    assert read_bin(rows.tobytes(), tuple("xyz") + ("a", "b", "c")[: held - 3])["x"] == pytest.approx(rows[:, 0])
 
 
 def test_every_layout_has_positions_first():
@@ -157,6 +174,60 @@ def test_a_transposed_array_is_refused_by_name(write_layout):
     np.save(layout.scans[1].with_suffix(".npy"), scan()[:, :4].T)
     with pytest.raises(DatasetError, match=r"an array \(4, 4000\), which seems to be transposed; save \[N, 4\]"):
         layout.open()[1]
+
+
+def in_folder(layout, name: str, write: Callable[[Path, np.ndarray], None]) -> np.ndarray:
+    """The points that are read where the middle scan is written so."""
+    layout.scans[1].unlink()
+    write(layout.scans[1].with_name(name), scan()[:, :4])
+    return np.asarray(layout.open()[1].points)
+
+
+WAYS: dict[str, Callable[[Path, np.ndarray], None]] = {
+    "0001.npy": lambda path, rows: np.save(path, with_fields(rows)),
+    "0001.npz": lambda path, rows: np.savez(path, points=rows, label="a drive"),
+    "0001.NPZ": lambda path, rows: np.savez(path.open("wb"), **dict(zip(["x", "y", "z", "i"], rows.T, strict=True))),
+}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_clouds_as_numpy_saves_them(name, write_layout):
+    assert_array_equal(in_folder(write_layout("folder"), name, WAYS[name]), scan()[:, :4])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "problem"),
+    [
+        ({"a": scan(), "b": scan()}, r"of its arrays \(a \(4000, 6\), b \(4000, 6\)\) not one alone is \[N, 4\]"),
+        ({"x": np.zeros(5), "y": np.zeros(4), "z": np.zeros(5)}, "its x, y and z are of different lengths"),
+        ({}, r"of its arrays \(none\) not one"),
+    ],
+)
+def test_an_archive_without_one_cloud_says_what_it_holds(arrays, problem, write_layout):
+    with pytest.raises(DatasetError, match=problem):
+        in_folder(write_layout("folder"), "0001.npz", lambda path, _: np.savez(path, **arrays))
+
+
+def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(write_layout):
+    def write(path: Path, _: np.ndarray) -> None:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr("points.npy", bytes(300 << 20))
+
+    with pytest.raises(DatasetError, match="would unpack to more than 256 MB"):
+        in_folder(write_layout("folder"), "0001.npz", write)
+
+
+def test_python_objects_are_not_opened(write_layout):
+    with pytest.raises(DatasetError, match="holds Python objects, which are not opened"):
+        in_folder(write_layout("folder"), "0001.npy", lambda path, _: np.save(path, np.array([{}], object)))
+
+
+def test_other_files_are_named(write_layout):
+    layout = write_layout("folder")
+    for path in layout.scans:
+        path.rename(path.with_suffix(".csv"))
+    with pytest.raises(DatasetError, match=r"holds no scans \(.*\.npz.*\), only \.csv; put them there"):
+        layout.open()
 
 
 def test_intensity_is_scaled_once_a_drive(write_layout):

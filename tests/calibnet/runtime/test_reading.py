@@ -120,3 +120,10 @@ def test_inputs_are_known_by_identity_within_a_run(tmp_path: Path) -> None:
         assert is_input(later.stat())
         assert not is_input(other.stat())
     assert not is_input(file.stat())
+
+
+def test_what_git_lfs_left_is_called_so(tmp_path: Path) -> None:
+    file = tmp_path / "0000.bin"
+    file.write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 12\n")
+    with pytest.raises(DatasetError, match=r"0000\.bin cannot be read \(Git LFS left a pointer .* 'git lfs pull'\)"):
+        read_file(file, "Scan", 1000)

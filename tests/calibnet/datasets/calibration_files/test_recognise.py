@@ -209,6 +209,53 @@ def test_frames_are_named_where_their_names_do_not_tell(write):
     assert_allclose(read_calibration(path, Wanted(frames=FrameChoice(None, "velodyne"))).camera_from_lidar, EXTRINSIC)
 
 
+def test_a_frame_in_two_places_is_refused(write):
+    twice = (
+        "- header: {frame_id: base_link}\n  child_frame_id: velodyne\n  transform: {translation: {x: 1.1, y: 0, z: 2}, "
+    )
+    twice += "rotation: {x: 0, y: 0, z: 0, w: 1}}\n"
+    with pytest.raises(DatasetError, match="says twice, and differently, where velodyne is in base_link"):
+        read_calibration(write(TF_ECHO + twice))
+    round_about = twice.replace("base_link", "front_camera_optical")
+    with pytest.raises(DatasetError, match=r"leads from velodyne to .* in two ways that contradict each other"):
+        read_calibration(write(TF_ECHO + round_about))
+    assert_allclose(read_calibration(write(TF_ECHO + twice.replace("1.1", "1.0"))).camera_from_lidar, EXTRINSIC)
+
+
+def test_frames_of_two_trees_are_not_connected(write):
+    apart = "\n".join(line for line in TF_ECHO.splitlines() if line)
+    apart = apart.replace(
+        "frame_id: base_link}\n  child_frame_id: front_camera", "frame_id: odom}\n  child_frame_id: front_camera"
+    )
+    with pytest.raises(DatasetError, match="does not connect front_camera_optical with velodyne"):
+        read_calibration(write(apart))
+
+
+def test_what_topic_echo_prints_ends_in_dashes(write):
+    """One message, several alike, and transforms of several publishers."""
+    found = read_calibration(write(ROS_ECHO + "---\n"))
+    check_camera(found, "ROS's camera_info", "equidistant", [0.1, -0.03, 0.001, 0.0])
+    later = ROS_ECHO.replace("frame_id: camera", "frame_id: camera, stamp: {sec: 7}")
+    assert read_calibration(write(f"{ROS_ECHO}---\n{later}---\n")).camera.model == "equidistant"
+    with pytest.raises(DatasetError, match="holds 2 messages that differ"):
+        read_calibration(write(f"{ROS_ECHO}---\n{later.replace('1280', '640')}---\n"))
+    first, rest = TF_ECHO.split("- header: {frame_id: base_link}", 1)
+    two = f"{first}---\ntransforms:\n- header: {{frame_id: base_link}}{rest}---\n"
+    assert_allclose(read_calibration(write(two)).camera_from_lidar, EXTRINSIC, atol=1e-12)
+    with pytest.raises(DatasetError, match="holds 5000 messages"):
+        read_calibration(write("a: 1\n---\n" * 5000))
+
+
+@pytest.mark.parametrize("header", ["%YAML:1.0\n---\n", "%YAML 1.0\n---\n"])
+def test_opencv_of_any_age(header, write):
+    """Before version 3 it put no space behind a key."""
+    colon = ":" if ":1.0" in header else ": "
+    text = header + f"image_width{colon}1280\nimage_height{colon}720\ncamera_matrix: !!opencv-matrix\n   rows{colon}3\n"
+    text += f"   cols{colon}3\n   dt{colon}d\n   data{colon}{MATRIX.ravel().tolist()}\n"
+    text += "distortion_coefficients: [0.1, -0.2, 0.001, 0.002, 0]\n"
+    check_camera(read_calibration(write(text)), "OpenCV's file", "plumb_bob", [0.1, -0.2, 0.001, 0.002, 0])
+
+
 def test_calibration_of_autoware(write):
     found = read_calibration(write(AUTOWARE))
     assert found.kind == "Autoware's calibration"
@@ -242,6 +289,10 @@ def test_an_extrinsic_in_any_form_and_either_direction(spelling, write):
         ("camera_from_lidar: {translation: [0, 0, 0], rotation: [0.5, -0.5, 0.5, 0.5]}", "whose order nobody can tell"),
         ("camera_from_lidar: {translation: [0, 0, 0], quaternion_xyzw: [1, 1, 0, 0]}", "has length 1.41 and not 1"),
         ("camera_from_lidar: {translation: [0, 0, 0]}", "has 0 rotations"),
+        (
+            "camera_from_lidar: {translation: [0, 0, 0], rpy_rad: [-90, 0, -90]}",
+            "is more than a turn; call angles in deg",
+        ),
         ("camera_from_lidar: {rpy_deg: [0, 0, 0]}", "has no 'translation'"),
         ("camera_from_lidar: {translation: [0, 0, 0], rpy_deg: [0, 0, 0], units: mm}", "an unknown 'units'"),
         (f"camera_from_lidar: {ROWS}\nlidar_from_camera: {ROWS}", "contradict each other"),

@@ -1,0 +1,104 @@
+"""Clouds as NumPy saves them: ``.npy``, also with named fields as ``ros_numpy`` makes them, and ``.npz``."""
+
+from __future__ import annotations
+
+import io
+import math
+import warnings
+import zipfile
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from calibnet.datasets.cloud_table import MOST_BYTES, MOST_COLUMNS, CloudError, Columns, joined, points_of
+
+
+def read_npy(data: bytes) -> NDArray[np.float32]:
+    """Points ``[N, 4]`` of an array ``[N, 3]`` or wider, or of one with fields x, y, z, intensity.
+
+    Raises:
+        CloudError: it is something else, or damaged.
+    """
+    return _points(read_array(data))
+
+
+def read_npz(data: bytes) -> NDArray[np.float32]:
+    """Points ``[N, 4]`` of the only array that can be some, or of arrays called x, y, z and intensity.
+
+    Raises:
+        CloudError: there is none, or several; or the file is damaged, or would unpack to more than a scan can be.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as file:
+            arrays = dict(_arrays(file))
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError) as error:
+        if isinstance(error, CloudError):
+            raise
+        raise CloudError("it is truncated or not a .npz archive") from None
+    columns: Columns = {
+        name.lower(): array for name, array in arrays.items() if array.ndim == 1 and not array.dtype.names
+    }
+    if set("xyz") <= columns.keys():
+        if len({len(column) for name, column in columns.items() if len(name) == 1}) > 1:
+            raise CloudError("its x, y and z are of different lengths")
+        return points_of({name: column for name, column in columns.items() if len(column) == len(columns["x"])})
+    tables = [
+        name for name, array in arrays.items() if array.dtype.names or (array.ndim == 2 and 3 <= array.shape[1] <= 16)
+    ]
+    if len(tables) != 1:
+        held = ", ".join(f"{name[:40]} {array.shape}" for name, array in list(arrays.items())[:6]) or "none"
+        raise CloudError(f"of its arrays ({held}) not one alone is [N, 4]; save the points as the only one")
+    return _points(arrays[tables[0]])
+
+
+def _arrays(file: zipfile.ZipFile) -> Iterator[tuple[str, NDArray[np.generic]]]:
+    """The arrays of numbers in an archive, which unpack to no more than a scan can be."""
+    entries = file.infolist()
+    if len(entries) > MOST_COLUMNS or sum(entry.file_size for entry in entries) > MOST_BYTES:
+        raise CloudError(f"it would unpack to more than {MOST_BYTES >> 20} MB")
+    for entry in entries:
+        with file.open(entry) as packed:
+            data = packed.read(entry.file_size)
+        try:
+            yield entry.filename.removesuffix(".npy"), read_array(data)
+        except CloudError:
+            continue  # text, or objects, beside the points
+
+
+def _points(array: NDArray[Any]) -> NDArray[np.float32]:
+    if array.dtype.names:
+        fields = {name: np.asarray(array[name]).ravel() for name in array.dtype.names}
+        return points_of({name.lower(): field for name, field in fields.items() if field.size == array.size})
+    if array.ndim == 2 and 3 <= array.shape[0] <= 8 and array.shape[1] > 8:
+        raise CloudError(f"it is an array {array.shape}, which seems to be transposed; save [N, 4], a point a row")
+    if array.ndim != 2 or array.shape[1] < 3:
+        raise CloudError(f"it is an array {array.shape} of {array.dtype} and not [N, 4] numbers: x, y, z, intensity")
+    x, y, z = array[:, 0], array[:, 1], array[:, 2]
+    return joined(x, y, z, array[:, 3] if array.shape[1] > 3 else None)
+
+
+def read_array(data: bytes) -> NDArray[np.generic]:
+    """The array of a ``.npy`` file; its header is held against its bytes before anything is allocated.
+
+    Raises:
+        CloudError: it is no such file, or has another length.
+    """
+    file = io.BytesIO(data)
+    try:
+        version = npy.read_magic(file)
+        read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that Python 2 wrote it
+            shape, by_column, dtype = read_header(file)
+    except Exception:  # the header is a Python literal, and fails in as many ways
+        raise CloudError("it is truncated or not a .npy array") from None
+    length, promised = len(data) - file.tell(), math.prod(shape) * dtype.itemsize
+    if dtype.hasobject:
+        raise CloudError("it holds Python objects, which are not opened; save an array [N, 4] of numbers")
+    if (dtype.kind not in "fiu" and not dtype.names) or any(side < 0 for side in shape) or length != promised:
+        what = f"an array {str(shape)[:60]} of {str(dtype)[:40]}"
+        raise CloudError(f"its header promises {what}, of {promised} bytes, and it holds {length}")
+    return np.frombuffer(data, dtype, offset=file.tell()).reshape(shape, order="F" if by_column else "C")

@@ -1,0 +1,30 @@
+"""Bags small enough to be changed at random."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from calibnet.datasets.frame import Frame
+from calibnet.geometry import PinholeCamera
+from tests.support.bags import write_bag
+
+AXES = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def small_bag(kind: str) -> bytes:
+    """The bytes of a bag with one frame.
+
+    Args:
+        kind: its file's ending.
+    """
+    camera = PinholeCamera(16, 12, np.array([[9.0, 0.0, 7.5], [0.0, 9.0, 5.5], [0.0, 0.0, 1.0]]))
+    points = np.random.default_rng(0).uniform([2, -2, -1, 0], [9, 2, 1, 1], (40, 4)).astype(np.float32)
+    frame = Frame(0, 0.0, np.full((12, 16, 3), 90, np.uint8), points, camera, AXES, "bag")
+    with tempfile.TemporaryDirectory() as folder:
+        plugin = {".bag": "ros1", ".db3": "sqlite3", ".mcap": "mcap"}[kind]
+        path = write_bag(Path(folder) / ("bag.bag" if kind == ".bag" else "bag"), plugin, [frame])
+        file = path if kind == ".bag" else next(path.glob(f"*{kind}"))
+        return file.read_bytes()
