@@ -17,10 +17,12 @@ class Exhibit:
     Attributes:
         name: for people, for instance ``"Masks"``; the same in every frame, and different within a stage.
         picture: ``[H, W, 3]`` uint8 RGB, or ``[H, W]`` float32, a map with NaN where there is nothing.
+        limits: of a map, the values that are darkest and brightest, so that maps can be compared; None for its own.
     """
 
     name: str
     picture: NDArray[np.uint8] | NDArray[np.float32] = field(repr=False)
+    limits: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

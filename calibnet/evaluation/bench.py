@@ -13,7 +13,7 @@ import numpy as np
 from calibnet.datasets import Frame, PickedFrames
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.datasets.selection import by_rig, spread
-from calibnet.errors import CalibnetError, CalibrationError
+from calibnet.errors import CalibnetError, CalibrationError, ConfigError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
 from calibnet.evaluation.claims import CLAIMS
 from calibnet.evaluation.drives import shares_mount
@@ -179,7 +179,7 @@ def measure_row(
         try:
             result, rejected = one.run(method, one.initial)
             refused += rejected
-        except CalibrationError as error:
+        except (CalibrationError, ConfigError) as error:  # of this frame, or of what the method was told of it
             refused, why = refused + 1, str(error)
         errors.append(pose_error(result, one.reference))
         told(done, len(tries))
@@ -239,7 +239,7 @@ def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> fl
         began = time.perf_counter()
         try:
             method.calibrate(frame, initial)
-        except CalibrationError:
+        except (CalibrationError, ConfigError):
             continue
         if count:
             times.append(1000 * (time.perf_counter() - began))

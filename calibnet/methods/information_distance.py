@@ -59,6 +59,6 @@ class InformationDistance:
         stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
         if detail:
             brightness = Exhibit("Brightness held against the scan's reflectance", terms[0].brightness.image)
-            curve = Curve("Distance that each start came down to, sorted", np.sort(distances))
+            curve = Curve("How far above the best each start came down, sorted", np.sort(distances) - distances.min())
             stage = replace(stage, exhibits=(brightness,), curves=(curve,))
         return CascadeTrace(initial, (stage,))

@@ -155,6 +155,8 @@ def set_up(
     from calibnet.training.data import open_data
 
     names = tuple(name.strip() for name in methods.split(",") if name.strip())
+    if not names:
+        raise click.UsageError("--methods names none; leave it out for all.")
     for name in names:
         if name not in ("all", CASCADE) and name not in METHODS:
             raise click.UsageError(f"There is no method {name!r}; choose from {CASCADE}, {', '.join(METHODS.names())}.")

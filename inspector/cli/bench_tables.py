@@ -31,8 +31,10 @@ def print_bench(content: dict[str, Any], console: Console) -> None:
         if row.why:
             console.print(f"{row.method}, {row.label}: {row.why}", soft_wrap=True, style="yellow")
     console.print(_costs(content))
-    console.print("Published elsewhere, on other frames:")
-    for name, claim in claims(content):
+    published = list(claims(content))
+    if published:
+        console.print("Published elsewhere, on other frames:")
+    for name, claim in published:
         errors = f"{claim['rotation_deg']:g}° / {claim['translation_cm']:g} cm"
         console.print(f"{name}: {errors} from {claim['range']} on {claim['rig']} ({claim['source']}).", soft_wrap=True)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.geometry import RANGES
 from calibnet.methods.learned.networks import NETWORKS
 from calibnet.network.ablations import ABLATIONS, ablation_folder
 from calibnet.network.heads import HEADS
@@ -189,6 +190,11 @@ def train(
         )
     if ablation and every_stage:
         raise click.UsageError("--ablation trains one stage: give --range instead of --all.")
+
+    if (method or ablation) and range_ not in RANGES:
+        raise click.UsageError(
+            f"--range {range_} is none of those that networks run at: {', '.join(map(str, RANGES))}."
+        )
 
     from calibnet.training.schedule import all_stages
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from calibnet.evaluation.metrics import Metrics
+from calibnet.methods.registry import CASCADE
 from inspector.compare.comparison import ComparedRun, Comparison
 from inspector.record.tabs.table import NOTHING, markdown
 
@@ -104,7 +105,7 @@ def _settings(comparison: Comparison) -> list[str]:
 
 def _described(run: ComparedRun) -> dict[str, Any]:
     """Settings, versions and weights of a run by a name for people."""
-    settings = {name: value for name, value in run.run.settings.items() if name not in UNCOMPARED}
+    settings = {"method": CASCADE} | {k: value for k, value in run.run.settings.items() if k not in UNCOMPARED}
     versions = {f"version of {name}": value for name, value in run.run.provenance.items()}
     weights = {
         f"weights of stage {number}": ", ".join(f"{key} {record[key]}" for key in RECORD_KEYS if key in record)

@@ -51,15 +51,16 @@ def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
 
 def untrained(content: dict[str, Any]) -> str:
     """Which rows have no errors for want of weights, in a sentence; empty where all have them."""
-    missing: dict[str, list[str]] = {}
-    for row in content["rows"]:
-        if "why" in row and not row.get("samples_trained"):
-            missing.setdefault(row["preset"], []).append(row["name"])
-    if not missing:
+    which = []
+    for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
+        rows = [row for row in content["rows"] if row["preset"] == preset]
+        missing = [row["name"] for row in rows if "why" in row and not row.get("samples_trained")]
+        if missing:
+            which.append(f"{preset} ({'all rows' if len(missing) == len(rows) else ', '.join(missing)})")
+    if not which:
         return ""
-    which = "; ".join(f"{preset} ({', '.join(names)})" for preset, names in missing.items())
     return (
-        f"Not trained, so without errors: {which}. "
+        f"Not trained, so without errors: {', '.join(which)}. "
         f"`calib-inspect train --preset PRESET --ablation ROW --range {content['range']} --output DIR` trains a row, "
         "and `ablate --weights DIR --data FRAMES` measures it."
     )

@@ -91,7 +91,7 @@ def _picture(shown: Exhibit) -> rr.EncodedImage | rr.Image:
             values = np.asarray(cv2.resize(values, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
         return rr.Image(values).compress(jpeg_quality=JPEG_QUALITY)
     seen = np.isfinite(values)
-    low, high = colors.robust_limits(np.asarray(values[seen]))
+    low, high = shown.limits or colors.robust_limits(np.asarray(values[seen]))
     painted = colors.map_colors(np.where(seen, values, low), low, high)
     painted[~seen] = colors.EMPTY
     return rr.Image(painted)

@@ -26,7 +26,7 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
     assert rows["full"]["preset"] == "compact"
     assert rows["full"]["latency_ms"] is None
     said = " ".join(capsys.readouterr().out.split())
-    assert said.count("Not trained, so without errors: compact (multi-scale-features, ") == 1
+    assert said.count("Not trained, so without errors: compact (all rows). ") == 1
     assert "train --preset PRESET --ablation ROW --range 5/0.5" in said
     assert run(cli, ["ablate", "--from", str(out), "--markdown", str(page)]) == 0
     written = page.read_text()
@@ -41,6 +41,7 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
         (["ablate", "--preset", "huge"], 3, "'huge'"),
         (["ablate", "--from", "cut.json"], 3, "rows is missing"),
         (["ablate", "--from", "other.json"], 3, "was not written by `calib-inspect ablate --json`"),
+        (["train", "--method", "lccnet", "--range", "4/0.4", "--samples", "8"], 2, "20/1.5, 10/1, 5/0.5, 2/0.2, 1/0.1"),
         (["train", "--method", "lccnet", "--all", "--samples", "8"], 2, "--method trains one network"),
         (["train", "--method", "lccnet", "--ablation", "full", "--range", "5/0.5", "--samples", "8"], 2, "--method"),
         (["train", "--ablation", "full", "--all", "--samples", "8"], 2, "--ablation trains one stage"),
