@@ -83,7 +83,7 @@ def test_an_earlier_table_is_shown_without_measuring(
     other.write_text(json.dumps(content))
     assert run(cli, ["bench", "--from", str(other)]) == 3
     said = " ".join(capsys.readouterr().err.split())
-    assert "ranges: input should be a valid list, methods.mover.parameters is missing" in said
+    assert "ranges: input should be a valid array, methods.mover.parameters is missing" in said
 
 
 @pytest.mark.parametrize(
