@@ -12,8 +12,8 @@ from torch.utils.data import DataLoader, Dataset, Sampler
 
 from calibnet.errors import CalibnetError
 from calibnet.network.batch import NetworkInputs
+from calibnet.network.target import Target
 from calibnet.runtime.interruption import SIGNALS
-from calibnet.training.losses import Target
 from calibnet.training.on_device.batches import DeviceSamples
 from calibnet.training.samples import TrainingSamples, collate
 

@@ -12,27 +12,8 @@ from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
 from calibnet.network.cost_volume import TEMPERATURE
 from calibnet.network.network import NetworkOutput
-from calibnet.network.pose import project_points
+from calibnet.network.target import Target, move, quaternion_angle, true_displacement
 from calibnet.training.recipe import LossRecipe
-
-
-class Target(NamedTuple):
-    """The truth of a batch.
-
-    Attributes:
-        correction: ``[B, 4, 4]`` that undoes the miscalibration.
-        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced besides; zero but where features
-            train alone.
-        visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
-            inside the image).
-        of_features: whether the batch trains features alone: its LiDAR images are displaced, which no pose explains.
-            The host decides by it, and would wait for the device to look at ``shift``.
-    """
-
-    correction: Tensor
-    shift: Tensor
-    visible: list[Tensor]
-    of_features: bool = False
 
 
 class Losses(NamedTuple):
@@ -50,18 +31,6 @@ class Losses(NamedTuple):
     def total(self) -> Tensor:
         """What is minimised."""
         return self.matching + self.displacement + self.pose + self.quaternion + self.points
-
-
-def move(correction: Tensor, points: Tensor) -> Tensor:
-    """Apply ``[B, 4, 4]`` to ``[B, N, 3]``."""
-    return points @ correction[:, :3, :3].transpose(1, 2) + correction[:, None, :3, 3]
-
-
-def true_displacement(cells: Tensor, correction: Tensor, intrinsics: Tensor) -> Tensor:
-    """Pixels ``[B, 2, h, w]`` from where each cell's point is projected to where it belongs."""
-    points = cells.flatten(2).transpose(1, 2)
-    offset = project_points(move(correction, points), intrinsics) - project_points(points, intrinsics)
-    return offset.transpose(1, 2).unflatten(2, cells.shape[2:])
 
 
 def balanced(depth: Tensor, counted: Tensor, recipe: LossRecipe, strength: float = 1.0) -> Tensor:
@@ -163,14 +132,6 @@ def displacement_loss(
     likelihood = error * torch.exp(-output.field.log_scale) + output.field.log_scale
     weight = balanced(depth, visible, recipe, recipe.displacement_balance)
     return (likelihood * weight[:, None]).sum() / (2 * visible.sum().clamp(min=1))
-
-
-def quaternion_angle(rotation: Tensor) -> Tensor:
-    """Angle in radians of rotations ``[B, 3, 3]``; has a gradient at zero, unlike the arccos."""
-    difference = rotation - rotation.transpose(1, 2)
-    sine = torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)
-    sine = 0.5 * (sine.square().sum(-1) + 1e-12).sqrt()
-    return torch.atan2(sine, 0.5 * (rotation.diagonal(dim1=1, dim2=2).sum(-1) - 1))
 
 
 def hybrid_loss(

@@ -17,9 +17,9 @@ from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform
 from calibnet.network.batch import Cut, LidarInput, NetworkInputs, lidar_input, make_batch
 from calibnet.network.pose import DEPTH_FLOOR
+from calibnet.network.target import Target
 from calibnet.training.draws import Draws
 from calibnet.training.frames import TrainingFrames
-from calibnet.training.losses import Target
 from calibnet.training.recipe import SampleRecipe
 
 

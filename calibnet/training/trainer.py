@@ -17,13 +17,14 @@ from calibnet.errors import CalibrationError, ConfigError
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
+from calibnet.network.target import Target
 from calibnet.runtime.claim import locked
 from calibnet.runtime.interruption import StopRequest
 from calibnet.runtime.writing import Kind, check_output
 from calibnet.training.batches import Batch, next_batch, open_batches
 from calibnet.training.build import Training
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
-from calibnet.training.losses import Losses, Target, feature_losses, hybrid_loss
+from calibnet.training.losses import Losses, feature_losses, hybrid_loss
 from calibnet.training.optimizer import make_optimizer, set_learning_rate, update_average
 from calibnet.training.progress import Every, Means, Observer, Progress
 from calibnet.training.record import manifest_with, training_record

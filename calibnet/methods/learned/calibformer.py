@@ -23,7 +23,7 @@ from calibnet.methods.learned.network import MethodLosses, MethodNetwork, Method
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.cost_volume import correlate
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 
 FEATURES = 128
 HEADS = 8

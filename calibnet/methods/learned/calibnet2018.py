@@ -25,7 +25,7 @@ from calibnet.methods.learned.network import MethodLosses, MethodNetwork, Method
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rigid, rotation_from_vector
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 
 AGGREGATED = (512, 512)
 BRANCH = 256

@@ -9,7 +9,7 @@ from torch import Tensor
 from calibnet.methods.learned.network import MethodLosses, inverse_depth
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import project_points
-from calibnet.training.losses import move, quaternion_angle
+from calibnet.network.target import move, quaternion_angle
 
 
 def angles(estimate: Tensor, truth: Tensor) -> Tensor:

@@ -13,7 +13,7 @@ from calibnet.methods.learned.config import MethodConfig
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.features import image_channels
 from calibnet.network.pose import rigid, rotation_from_quaternion
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 
 
 class MethodOutput(NamedTuple):

@@ -22,7 +22,7 @@ from calibnet.methods.learned.losses import told
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rigid, rotation_from_quaternion
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 
 PICTURE = (96, 256, 384)
 DEPTH = (48, 128, 192)

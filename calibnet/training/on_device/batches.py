@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from calibnet.network.batch import Cut, NetworkInputs
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 from calibnet.training.on_device.draws import DrawnBatch, DrawnSamples
 from calibnet.training.on_device.pictures import exposed, warped
 from calibnet.training.on_device.scans import Cells, Scans, rescanned, see

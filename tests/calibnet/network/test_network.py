@@ -11,7 +11,8 @@ from calibnet.network.config import load_preset
 from calibnet.network.cost_volume import band_index
 from calibnet.network.counting import count
 from calibnet.network.network import CalibrationNetwork
-from calibnet.training.losses import Target, hybrid_loss
+from calibnet.network.target import Target
+from calibnet.training.losses import hybrid_loss
 from calibnet.training.recipe import RECIPE
 from tests.support.tiny import random_inputs, tiny_network
 

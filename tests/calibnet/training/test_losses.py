@@ -12,17 +12,8 @@ from calibnet.network.batch import NetworkInputs
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import Pose
-from calibnet.training.losses import (
-    Losses,
-    Target,
-    balanced,
-    displacement_loss,
-    hybrid_loss,
-    matching_loss,
-    quaternion_angle,
-    scores_loss,
-    true_displacement,
-)
+from calibnet.network.target import Target, quaternion_angle, true_displacement
+from calibnet.training.losses import Losses, balanced, displacement_loss, hybrid_loss, matching_loss, scores_loss
 from calibnet.training.recipe import RECIPE
 from tests.support.tiny import TINY, random_inputs
 

@@ -12,10 +12,10 @@ from calibnet.geometry import RANGES, invert, miscalibration, project
 from calibnet.network.batch import Cut, lidar_input
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.pose import GeometricHead
+from calibnet.network.target import true_displacement
 from calibnet.training.data import Source
 from calibnet.training.draws import Draws
 from calibnet.training.frames import TrainingFrames
-from calibnet.training.losses import true_displacement
 from calibnet.training.recipe import RECIPE
 from calibnet.training.samples import Sample, TrainingSamples, collate, make_sample, visible_cells
 from tests.support.scene import REFERENCE, Scenes, make_frame

@@ -24,7 +24,7 @@ from calibnet.methods.learned.network import MethodOutput, scaled_pose
 from calibnet.methods.learned.regnet import RegNet, quaternion_of
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rotation_from_quaternion
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 
 TRUTH = torch.eye(4)[None]
 

@@ -14,7 +14,7 @@ from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.network import MethodNetwork, fitted_depth, fitted_image
 from calibnet.methods.learned.networks import NETWORKS, method_network
 from calibnet.network.batch import NetworkInputs
-from calibnet.training.losses import Target
+from calibnet.network.target import Target
 from calibnet.training.recipe import RECIPE
 from calibnet.training.samples import collate, make_sample
 from tests.support.scene import make_frame
