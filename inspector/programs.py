@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import secrets
 import shutil
 import signal
 import socket
@@ -11,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from ipaddress import ip_address
 from pathlib import Path
 
 from calibnet.errors import ConfigError
@@ -42,12 +44,41 @@ def open_command(file: Path) -> str:
     return f"{program} {file}"
 
 
-def start_program(command: list[str], port: int, outlives_us: bool = False) -> subprocess.Popen[bytes]:
+def own_address() -> str:
+    """An address for servers of Rerun's, which only this machine reaches and no page from elsewhere can know.
+
+    They answer requests that name any host, so that a page whose name leads to 127.0.0.1 could read what they show. On
+    Linux all of 127.0.0.0/8 is this machine, and the address is one of 16 million; other systems have but the one.
+    """
+    if sys.platform != "linux":
+        return LOCALHOST
+    return str(ip_address("127.0.0.2") + secrets.randbelow((1 << 24) - 3))
+
+
+def open_window(*shown: str) -> str:
+    """Open Rerun's viewer in a window that outlives this process; returns the address to send it data.
+
+    Args:
+        shown: what it opens with, files or addresses.
+
+    Raises:
+        ConfigError: it does not start.
+    """
+    host, port = own_address(), free_port()
+    command = [rerun_binary(), *shown, "--port", str(port), "--bind", host, "--hide-welcome-screen"]
+    start_program(command, port, host, outlives_us=True)
+    return f"rerun+http://{host}:{port}/proxy"
+
+
+def start_program(
+    command: list[str], port: int, host: str = LOCALHOST, outlives_us: bool = False
+) -> subprocess.Popen[bytes]:
     """Start a program in its own session, so that Ctrl-C reaches only this one; wait for its port.
 
     Args:
         command: the program.
         port: that it opens.
+        host: address that it opens it at.
         outlives_us: it goes on when this process ends, as a window does; else Linux ends it even if this one is killed.
     """
     process = subprocess.Popen(
@@ -64,7 +95,7 @@ def start_program(command: list[str], port: int, outlives_us: bool = False) -> s
         if process.poll() is not None or time.monotonic() > deadline:
             process.kill()
             raise ConfigError("The Rerun viewer did not start; use --headless and look at the file later.")
-        if listening_since is None and listening(LOCALHOST, port):
+        if listening_since is None and listening(host, port):
             listening_since = time.monotonic()
         time.sleep(0.05)
     return process

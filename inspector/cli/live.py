@@ -204,9 +204,9 @@ def in_a_window(make: Callable[..., LiveSession], connect: str | None) -> None:
     from inspector.live.keys import keyboard
     from inspector.live.terminal import Terminal, help_text
     from inspector.live.window import WindowRecording
-    from inspector.record.outputs import open_viewer
+    from inspector.programs import open_window
 
-    window = WindowRecording(rr.GrpcSink(connect or open_viewer()), help_text())
+    window = WindowRecording(rr.GrpcSink(connect or open_window()), help_text())
     session = make(stream=window)
     say("Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, ? tells all, Esc ends.")
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import sys
 import warnings
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from importlib.metadata import version
 import click
 
 from calibnet import __version__
+from calibnet.errors import ConfigError
 from inspector.cli.errors import run
 
 
@@ -127,10 +129,17 @@ def cli() -> None:
     exceeded, 2 wrong usage, 3 bad input or environment, 4 cannot tell, 70 a fault of the
     program, 130 interrupted.
     """
+    threads = os.environ.get("OMP_NUM_THREADS", "1")
+    if not re.fullmatch(r"\s*0*[1-9]\d{0,3}\s*(,\s*\d+\s*)*", threads):
+        raise ConfigError(f"OMP_NUM_THREADS={threads[:40]!r} is no number of threads; unset it, or give one from 1 on.")
 
 
 RERUN_LOG = "warn,re_log_encoding::rrd::file_sink=error"
 """What Rerun may print: not that a growing recording has no footer, which it gets in the end."""
+
+SPINS = "20000"
+"""How often a thread of libgomp's looks for work before it sleeps; its own 300,000 make a frame take several times as
+long where other programs use the cores too, and no shorter where none does."""
 
 
 def main() -> None:
@@ -138,4 +147,5 @@ def main() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # they are for us; what a user has to know is a sentence of ours
     os.environ.setdefault("RUST_LOG", RERUN_LOG)
+    os.environ.setdefault("GOMP_SPINCOUNT", SPINS)  # read when torch is imported, so not before here
     sys.exit(run(cli))

@@ -37,6 +37,10 @@ def console_beside(json_file: str | None) -> Console:
     return make_console(stderr=json_file == "-")
 
 
+NARROWEST = 60
+"""Columns of a table; in fewer, numbers are left out, and a line that the terminal breaks is better."""
+
+
 def make_console(stderr: bool = True) -> Console:
     """A console that quotes the foreign text in what it prints, as `say` does."""
     from rich.console import Console
@@ -45,7 +49,10 @@ def make_console(stderr: bool = True) -> Console:
         def print(self, *objects: Any, **options: Any) -> None:
             super().print(*(lines(one) if isinstance(one, str) else one for one in objects), **options)
 
-    return Quoting(stderr=stderr, highlight=False)
+    console = Quoting(stderr=stderr, highlight=False)
+    if console.width < NARROWEST:
+        console.width = NARROWEST
+    return console
 
 
 def say(text: object, err: bool = False) -> None:

@@ -19,7 +19,7 @@ from calibnet.runtime.text import one_line
 from inspector import entities
 from inspector.fleet.extra import require_extra
 from inspector.fleet.table import Row
-from inspector.programs import LOCALHOST
+from inspector.programs import own_address
 
 DATASET = "fleet"
 RUN, OUTCOME = f"property:{entities.RUN}", f"property:{entities.OUTCOME}"
@@ -78,7 +78,7 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     with ExitStack() as stack:
         layouts = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
         try:
-            server = stack.enter_context(rr.server.Server(host=LOCALHOST, datasets={DATASET: list(files)}))
+            server = stack.enter_context(rr.server.Server(host=own_address(), datasets={DATASET: list(files)}))
             dataset = server.client().get_dataset(DATASET)
             columns = {field.name for field in dataset.segment_table().schema()}
             table_layout(columns).save(entities.APPLICATION_ID, layouts / "table.rbl")

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
-from urllib.parse import quote
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import quote, urlsplit
+
+from starlette.applications import Starlette
 
 from calibnet.errors import ConfigError
-from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
+from inspector.programs import open_window
 from inspector.record.outputs import has_display
+from inspector.serving.files import file_route
+from inspector.serving.server import PageServer
+from inspector.serving.viewer_files import fetch_viewer, viewer_files
 
 
 @contextmanager
@@ -18,26 +25,20 @@ def open_viewer(address: str, in_browser: bool, headless: bool) -> Iterator[str]
 
     Args:
         address: what it shows.
-        in_browser: serve the web viewer instead of opening a window.
+        in_browser: serve the web viewer, behind the guard of all pages, instead of opening a window.
         headless: open no window.
     """
     if in_browser:
-        port, web_port = free_port(), free_port()
-        ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
-        server = start_program([rerun_binary(), "--serve-web", "--bind", LOCALHOST, *ports], web_port)
-        try:
-            yield f"In a browser: http://{LOCALHOST}:{web_port}/?url={quote(address, safe='')}"
-        finally:
-            server.terminate()
-            server.wait()
+        data = f"http://{urlsplit(address).netloc}"
+        with TemporaryDirectory(prefix="calib-inspect-") as folder:
+            fetch_viewer(Path(folder))
+            pages = Starlette(routes=[file_route(viewer_files(Path(folder)))])
+            with PageServer(pages, data=data) as server:
+                yield f"In a browser: {server.address}?url={quote(address, safe='')}&hide_welcome_screen=1"
         return
+    opened = False
     if has_display() and not headless:
-        port = free_port()
-        command = [rerun_binary(), address, "--port", str(port), "--bind", LOCALHOST, "--hide-welcome-screen"]
-        try:
-            start_program(command, port, outlives_us=True)
-            yield "The viewer has opened."
-            return
-        except (ConfigError, subprocess.SubprocessError):
-            pass
-    yield f"Open it with: rerun {address}"
+        with suppress(ConfigError, subprocess.SubprocessError):
+            open_window(address)
+            opened = True
+    yield "The viewer has opened." if opened else f"Open it with: rerun {address}"

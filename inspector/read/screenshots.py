@@ -21,7 +21,7 @@ from rerun.experimental import ViewerClient
 from calibnet.errors import ConfigError
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
-from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
+from inspector.programs import free_port, own_address, rerun_binary, start_program
 
 PATIENCE_S: Final = 120.0
 PAUSE_S: Final = 0.3
@@ -46,13 +46,13 @@ class HeadlessViewer:
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> HeadlessViewer:
-        port = free_port()
-        command = [rerun_binary(), "--headless", "--port", str(port), "--bind", LOCALHOST]
+        host, port = own_address(), free_port()
+        command = [rerun_binary(), "--headless", "--port", str(port), "--bind", host, "--window-size", self._size]
         try:
-            self._process = start_program([*command, "--window-size", self._size, "--hide-welcome-screen"], port)
+            self._process = start_program([*command, "--hide-welcome-screen"], port, host)
         except ConfigError as error:
             raise ConfigError(f"{error} ({VULKAN_HINT})") from None
-        self.client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+        self.client = ViewerClient.connect(f"rerun+http://{host}:{port}/proxy")
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:

@@ -36,39 +36,44 @@ SORTED = b"rerun:is_sorted"
 """Of a column that was found to be sorted; Rerun finds that out anew where it is not said."""
 
 
-class NoRoomError(CalibnetError):
-    """The disk has no room for a second copy, which the index is written with."""
+class NotIndexedError(CalibnetError):
+    """The recording keeps its data but gets no index: there is no room for a second copy, or it was not waited for."""
+
+    def __init__(self, file: Path, why: str, remedy: str) -> None:
+        """Say why, and when to do what."""
+        super().__init__(
+            f"{file} has no index, {why}, and is read like one that was cut off; {remedy}: "
+            f"rerun rrd optimize {file} -o NEW.rrd."
+        )
 
 
 def index(
-    file: Path, opened: Callable[[Path], rr.RecordingStream], advance: Callable[[], object] | None = None
+    file: Path, opened: Callable[[Path], rr.RecordingStream], advance: Callable[[int, int], bool] | None = None
 ) -> None:
     """Write a recording anew with its footer; what it was before stays until that is complete.
 
     Args:
         file: a recording without a footer, which nothing writes to any more.
         opened: makes the stream of the same recording to another file, with its blueprint.
-        advance: called again and again, to show that something is done.
+        advance: called again and again with the bytes written and about how many there will be; says whether to go on.
 
     Raises:
-        NoRoomError: the disk has no room for it; the recording stays as it is.
+        NotIndexedError: the disk has no room for it, or ``advance`` said no; the recording stays as it is.
         RecordingLostError: it can no longer be written, for instance because of a quota; likewise.
         OSError: the file cannot be replaced.
     """
     size = file.stat().st_size
     if shutil.disk_usage(file.parent).free < size:
-        raise NoRoomError(
-            f"{file} has no index, for which the disk lacks {size / 1e6:.0f} MB, and is read like one that was cut "
-            f"off; with more room: rerun rrd optimize {file} -o NEW.rrd."
-        )
+        raise NotIndexedError(file, f"for which the disk lacks {size / 1e6:.0f} MB", "with more room")
 
     def write(partial: Path) -> None:
         stream = opened(partial)
         for chunk in merged(_chunks(file)):
             rr.send_chunks(chunk, recording=stream)
             flush(stream)
-            if advance is not None:
-                advance()
+            if advance is not None and not advance(partial.stat().st_size, size):
+                stream.disconnect()
+                raise NotIndexedError(file, "as its making was interrupted", "to make it")
         stream.disconnect()
 
     write_whole(file, write, Kind.RECORDING)

@@ -22,7 +22,7 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.interruption import StopRequest
 from calibnet.runtime.writing import Kind
-from inspector.programs import LOCALHOST, free_port, listening, rerun_binary, start_program
+from inspector.programs import LOCALHOST, listening, open_window
 
 SWITCHED_OFF = ("0", "off", "false", "no")
 """Values of the variable RERUN with which Rerun records nothing, without a word."""
@@ -131,7 +131,7 @@ class Outputs:
 
     def _open_viewer(self) -> list[Any]:
         try:
-            return [rr.GrpcSink(open_viewer())]
+            return [rr.GrpcSink(open_window())]
         except ConfigError:
             if self.file is None:
                 raise
@@ -147,18 +147,6 @@ class Outputs:
         fetch_viewer(folder)
         server = self._serving.enter_context(PageServer(recording_app(file, folder, self._ended), self.bind))
         self.page = f"{server.address}?url={quote(server.address + RECORDING, safe='')}&hide_welcome_screen=1"
-
-
-def open_viewer() -> str:
-    """Open a viewer in a window, on this machine only, which outlives this process, and return its address.
-
-    Raises:
-        ConfigError: it does not start.
-    """
-    port = free_port()
-    command = [rerun_binary(), "--port", str(port), "--bind", LOCALHOST, "--hide-welcome-screen"]
-    start_program(command, port, outlives_us=True)
-    return f"rerun+http://{LOCALHOST}:{port}/proxy"
 
 
 def check_viewer(url: str) -> None:

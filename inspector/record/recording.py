@@ -137,11 +137,11 @@ class Recording:
         log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
         self._stream.flush()
 
-    def close(self, advance: Callable[[], object] | None = None) -> str:
+    def close(self, advance: Callable[[int, int], bool] | None = None) -> str:
         """Flush and write the footer; nothing, where nothing can be written any more.
 
         Args:
-            advance: called again and again while that takes long.
+            advance: see `inspector.record.indexing.index`.
 
         Returns:
             What a user has to know about how it was closed; empty for nothing.

@@ -14,7 +14,7 @@ import rerun_bindings
 
 from calibnet.errors import CalibnetError, ConfigError
 from inspector.record.flushing import RecordingLostError, flush
-from inspector.record.indexing import NoRoomError, index
+from inspector.record.indexing import NotIndexedError, index
 
 FLUSH_BYTES = 1024 * 1024 * 1024
 """Above any batch, so that only the flushes cut chunks."""
@@ -71,11 +71,11 @@ class Stream:
             rec.stdout(default_blueprint=self._blueprint)
         return rec
 
-    def close(self, advance: Callable[[], object] | None = None) -> None:
+    def close(self, advance: Callable[[int, int], bool] | None = None) -> None:
         """Flush, and give the files their footers; nothing, where nothing can be written any more.
 
         Args:
-            advance: called again and again while that takes long.
+            advance: see `inspector.record.indexing.index`.
         """
         if self._sinks_gone:
             return
@@ -84,7 +84,7 @@ class Stream:
         for file in self._files:
             try:
                 index(file, lambda partial: self._opened([rr.FileSink(partial)], False), advance)
-            except NoRoomError as error:
+            except NotIndexedError as error:
                 self.remark = str(error)
 
     def flush(self) -> None:

@@ -44,6 +44,7 @@ from inspector.run.summary import Summary
 
 MOST_EXPLAINED = 1
 """Frames of a run that causes are looked for in; it takes as long as a dozen frames, and one frame mostly tells."""
+INDEX = "index of the recording, MB"
 STOPPING = "Stopping after this frame; once more stops at once."
 
 
@@ -156,10 +157,15 @@ class Session:
         return SolvedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
 
     def _close(self, recording: Recording) -> None:
-        """Close the recording, which of a long one takes a while."""
-        with frame_progress(self.console) as progress:
-            task = progress.add_task("index of the recording", total=None)
-            remark = recording.close(lambda: progress.update(task, advance=1))
+        """Close the recording, which of a long one takes a while; after Ctrl-C it is whole, but without an index."""
+        with StopRequest() as stop, frame_progress(self.console) as progress:
+            task = progress.add_task(INDEX, total=None)
+
+            def advance(written: int, expected: int) -> bool:
+                progress.update(task, completed=written // 1_000_000, total=max(written, expected) // 1_000_000)
+                return not stop.requested
+
+            remark = recording.close(advance)
         if remark:
             self.console.print(remark, style="yellow", markup=False, soft_wrap=True)
 
@@ -259,7 +265,9 @@ def drive_observer(progress: Progress, stop: StopRequest) -> Callable[[int, int]
 
 class _FramesPerSecond(ProgressColumn):
     def render(self, task: Task) -> Text:
-        return Text("" if task.speed is None or task.total is None else f"{task.speed:.1f} frames/s")
+        return Text(
+            "" if task.speed is None or task.total is None or "MB" in task.description else f"{task.speed:.1f} frames/s"
+        )
 
 
 def frame_progress(console: Console) -> Progress:

@@ -13,7 +13,7 @@ from starlette.responses import StreamingResponse
 from starlette.routing import Route
 
 from inspector.serving.files import file_route
-from inspector.serving.viewer_files import VIEWER_FILES
+from inspector.serving.viewer_files import viewer_files
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -36,8 +36,7 @@ def recording_app(file: Path, viewer: Path, ended: threading.Event) -> Starlette
     async def answer(_: Request) -> StreamingResponse:
         return StreamingResponse(_growing(file, ended), media_type="application/octet-stream")
 
-    files = {"/": viewer / "index.html", **{f"/{name}": viewer / name for name in VIEWER_FILES}}
-    return Starlette(routes=[Route(f"/{RECORDING}", answer), file_route(files)])
+    return Starlette(routes=[Route(f"/{RECORDING}", answer), file_route(viewer_files(viewer))])
 
 
 async def _growing(path: Path, ended: threading.Event) -> AsyncIterator[bytes]:

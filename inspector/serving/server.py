@@ -32,12 +32,13 @@ class PageServer:
         address: where the app's root is, with the token that opens it.
     """
 
-    def __init__(self, app: ASGIApp, bind: str = LOCALHOST) -> None:
+    def __init__(self, app: ASGIApp, bind: str = LOCALHOST, data: str = "") -> None:
         """Listen on a free port; `inspector.serving.guard.Guard` stands before the app.
 
         Args:
             app: to serve.
             bind: address of this machine to listen on; of another than 127.0.0.1 whoever has the token may come.
+            data: see `Guard`.
 
         Raises:
             ConfigError: this machine has no such address.
@@ -57,7 +58,7 @@ class PageServer:
         shown = LOCALHOST if bind == ANY else f"[{bind}]" if ":" in bind else bind
         self.address = f"http://{shown}:{port}/{token}/"
         config = uvicorn.Config(
-            Guard(app, port, token, only_here=bind == LOCALHOST),
+            Guard(app, port, token, only_here=bind == LOCALHOST, data=data),
             lifespan="off",
             log_config=None,
             access_log=False,

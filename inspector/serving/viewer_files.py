@@ -13,6 +13,11 @@ from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 
 
+def viewer_files(folder: Path) -> dict[str, Path]:
+    """The files that `fetch_viewer` put into a folder, by the paths of their addresses."""
+    return {"/": folder / "index.html", **{f"/{name}": folder / name for name in VIEWER_FILES}}
+
+
 class ViewerFilesError(CalibnetError):
     """The web viewer's files cannot be had from the installed Rerun."""
 

@@ -10,7 +10,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from calibnet.datasets.bag.messages import stamp_of
+from calibnet.datasets.bag.unpacking import bound_unpacking
 from calibnet.errors import DatasetError
+from calibnet.runtime.reading import MEGABYTE, require_file
+
+METADATA_BYTES = 16 * MEGABYTE
+"""Of a ROS 2 bag's metadata.yaml."""
 
 
 class Topic(NamedTuple):
@@ -54,6 +59,10 @@ class BagRecording:
                 raise DatasetError(
                     f"Bag {path} does not exist; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder."
                 )
+            for file in _files(path):  # which also makes them inputs, so that no output replaces them
+                largest = METADATA_BYTES if file.suffix == ".yaml" else None
+                require_file(file, "Bag", largest, DatasetError, "copy it again")
+        bound_unpacking()
         old = any(path.suffix == ".bag" for path in self.paths)
         with self.failures():
             self._reader = AnyReader(
@@ -127,6 +136,13 @@ class BagRecording:
 
     def _connections(self, topic: str) -> list[Any]:
         return [one for one in self._reader.connections if one.topic == topic]
+
+
+def _files(path: Path) -> list[Path]:
+    """The files of a bag, which libraries open by their names."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.suffix in (".yaml", ".db3", ".mcap", ".zstd"))
 
 
 def _close(reader: Any) -> None:

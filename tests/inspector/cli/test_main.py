@@ -11,11 +11,13 @@ from pathlib import Path
 
 import click
 import pytest
+from rich.table import Table
 
 from calibnet import __version__
 from calibnet.errors import CalibnetError, DatasetError
 from inspector.cli import errors
 from inspector.cli.main import COMMANDS, cli
+from inspector.cli.output import make_console
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -165,3 +167,32 @@ def test_shell_completion_knows_commands_options_and_values(
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     errors.run(cli, [])
     assert [line.partition(",")[2] for line in capsys.readouterr().out.splitlines()] == completions
+
+
+@pytest.mark.parametrize("threads", ["abc", "-1", "0", "", "2;3", "9" * 50])
+def test_a_number_of_threads_that_is_none_is_a_sentence(
+    threads: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
+    assert errors.run(cli, ["info"]) == 3
+    assert capsys.readouterr().err == (
+        f"calib-inspect: OMP_NUM_THREADS={threads[:40]!r} is no number of threads; unset it, or give one from 1 on.\n"
+    )
+
+
+@pytest.mark.parametrize("threads", ["2", "4,2", "016"])
+def test_numbers_of_threads(threads: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
+    assert errors.run(cli, ["info", "--help"]) == 0
+
+
+@pytest.mark.parametrize("columns", ["1", "0", "-5", "x"])
+def test_a_table_has_its_numbers_on_any_terminal(
+    columns: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    console = make_console(stderr=False)
+    table = Table("module", "parameters")
+    table.add_row("total", "2.651 M")
+    console.print(table)
+    assert "2.651 M" in capsys.readouterr().out

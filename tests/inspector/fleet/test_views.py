@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.parse import quote, urlsplit
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ import pytest
 from calibnet.errors import DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.training.data import open_data
+from inspector.fleet import viewing
 from inspector.fleet.drives import Drive
 from inspector.fleet.history import histories
 from inspector.fleet.page import make_page
@@ -133,7 +137,9 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
     invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0")
     with serve(list(rows_of(Path("all")).values()), Path("all").absolute()) as catalogue:
         address, _, entry = catalogue.address.partition("/entry/")
-        assert address.startswith("rerun+http://127.0.0.1:")
+        host = str(urlsplit(address).hostname)
+        assert host.startswith("127.")
+        assert host != "127.0.0.1", "Rerun's server answers any Host, so its address must not be known"
         (dataset,) = (one for one in CatalogClient(address).datasets() if str(one.id) == entry)
         table = dataset.segment_table().to_pydict()
         names = [one[0] for one in table["property:run:drive"]]
@@ -141,6 +147,23 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
         assert len(dataset.blueprints()) == 2
         assert dataset.default_blueprint() is not None
     assert dict(zip(names, words, strict=True)) == {"monday": "accepted", "tuesday": "failed"}
+
+
+def test_the_catalogue_in_a_browser_is_behind_the_guard_of_all_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viewing, "fetch_viewer", lambda folder: (folder / "index.html").write_text("the viewer"))
+    data = "rerun+http://127.7.8.9:4711/entry/abc"
+    with viewing.open_viewer(data, in_browser=True, headless=False) as said:
+        page = said.removeprefix("In a browser: ")
+        address, _, query = page.partition("?")
+        assert f"url={quote(data, safe='')}" in query
+        with urlopen(address) as answer:
+            assert answer.read() == b"the viewer"
+            assert "http://127.7.8.9:4711;" in answer.headers["content-security-policy"]
+        stranger = Request(address, headers={"Host": "evil.example"})
+        for code, request in ((403, stranger), (404, Request(f"http://{urlsplit(address).netloc}/"))):
+            with pytest.raises(HTTPError) as refused:
+                urlopen(request)
+            assert refused.value.code == code
 
 
 def test_a_list_gives_training_the_drives_with_a_good_calibration(invoke: Invoke, cars: Path) -> None:

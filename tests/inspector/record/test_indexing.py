@@ -15,7 +15,7 @@ from rerun.chunk import Chunk, RrdReader
 
 from inspector.record import indexing
 from inspector.record import stream as stream_module
-from inspector.record.indexing import NoRoomError
+from inspector.record.indexing import NotIndexedError
 from inspector.record.stream import Stream
 
 FRAMES = 40
@@ -102,6 +102,27 @@ def test_without_room_the_recording_stays_as_it_was(tmp_path: Path, monkeypatch:
     assert list(tmp_path.iterdir()) == [file]
 
 
+def test_who_does_not_wait_for_the_index_keeps_the_recording(tmp_path: Path) -> None:
+    file = tmp_path / "run.rrd"
+    stream, told = write(file), []
+    before = file.stat().st_size
+
+    def advance(written: int, expected: int) -> bool:
+        told.append((written, expected))
+        return len(told) < 3
+
+    stream.close(advance)
+    assert stream.remark == (
+        f"{file} has no index, as its making was interrupted, and is read like one that was cut off; to make it: "
+        f"rerun rrd optimize {file} -o NEW.rrd."
+    )
+    assert [expected for _, expected in told] == [before] * 3
+    assert 0 < told[0][0] < told[1][0] < told[2][0] < before
+    assert file.stat().st_size == before
+    assert len(rows(file, "small", "Scalars:scalars")) == FRAMES
+    assert list(tmp_path.iterdir()) == [file]
+
+
 def test_an_error_while_the_index_is_written_leaves_the_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,7 +137,7 @@ def test_an_error_while_the_index_is_written_leaves_the_recording(
 
 
 def fails_in_the_middle(file: Path, opened: Any, _: Any) -> None:
-    def interrupt() -> None:
+    def interrupt(*_: int) -> bool:
         raise KeyboardInterrupt
 
     indexing.index(file, opened, interrupt)
@@ -129,5 +150,5 @@ def test_no_room_is_an_error_with_what_to_do(tmp_path: Path, monkeypatch: pytest
         free = 1000
 
     monkeypatch.setattr(indexing.shutil, "disk_usage", lambda _: Full)
-    with pytest.raises(NoRoomError, match=r"lacks 3 MB.*rerun rrd optimize"):
+    with pytest.raises(NotIndexedError, match=r"lacks 3 MB.*rerun rrd optimize"):
         indexing.index(tmp_path / "run.rrd", lambda _: rr.RecordingStream("x"))

@@ -16,6 +16,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from calibnet.errors import ConfigError, DatasetError
+from inspector import programs
 from inspector.read.file import RecordingFile
 from inspector.read.run import read_run
 from inspector.record import outputs as outputs_module
@@ -196,7 +197,7 @@ def test_a_display_that_is_not_there_is_none(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_viewer_that_does_not_start_leaves_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outputs_module, "rerun_binary", lambda: "false")
+    monkeypatch.setattr(programs, "rerun_binary", lambda: "false")
     assert len(Outputs(tmp_path / "run.rrd", viewer=True).open()) == 1
     with pytest.raises(ConfigError, match="did not start"):
         Outputs(viewer=True).open()
