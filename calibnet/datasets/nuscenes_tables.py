@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import codecs
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from calibnet.datasets.calibration_files import values
 from calibnet.errors import DatasetError
@@ -20,7 +19,11 @@ from calibnet.runtime.reading import MEGABYTE, open_file
 LARGEST_BYTES = 4096 * MEGABYTE
 """Of a table."""
 LARGEST_RECORD = MEGABYTE
+BETWEEN = re.compile(r"\s*,?\s*")
+"""Two records."""
 REMEDY = "get it from nuScenes's metadata"
+LATEST = 1e16
+"""Microseconds since 1970: the year 2286."""
 LIDAR = "LIDAR_TOP"
 NEEDED = ("sample_data", "calibrated_sensor", "sensor", "ego_pose")
 """Tables without which nothing can be read; ``sample`` and ``scene`` tell scenes apart."""
@@ -177,7 +180,8 @@ def read_poses(tables: Path, tokens: Collection[str]) -> dict[str, Transform]:
     """
     path = tables / "ego_pose.json"
     wanted = set(tokens)
-    found = {str(one["token"]): pose(one, path) for one in records(tables, "ego_pose") if one.get("token") in wanted}
+    poses = ((text(one, "token", tables, "ego_pose"), one) for one in records(tables, "ego_pose"))
+    found = {token: pose(one, path) for token, one in poses if token in wanted}
     if missing := wanted - found.keys():
         raise DatasetError(f"{path} lacks {len(missing)} of {len(wanted)} poses, {min(missing)} among them; {REMEDY}.")
     return found
@@ -199,33 +203,34 @@ def records(tables: Path, table: str) -> Iterator[Record]:
     path = tables / f"{table}.json"
     decoder, decode = json.JSONDecoder(), codecs.getincrementaldecoder("utf-8")()
     damaged = DatasetError(f"Table {path} is damaged or no list of records; {REMEDY}.")
-    buffer, begun, ended = "", False, False
+    buffer, at, begun, ended = "", 0, False, False
     try:
         with open_file(path, LARGEST_BYTES) as file:
             while True:
-                buffer = buffer.lstrip()
-                if not begun and buffer:
-                    if buffer[0] != "[":
+                between = BETWEEN.match(buffer, at)
+                at = between.end() if between else at
+                if not begun and at < len(buffer):
+                    if buffer[at] != "[":
                         raise damaged
-                    begun, buffer = True, buffer[1:].lstrip()
-                buffer = buffer.removeprefix(",").lstrip()
-                if begun and buffer.startswith("]"):
+                    begun, at = True, at + 1
+                    continue
+                if begun and buffer.startswith("]", at):
                     return
                 try:
-                    record, end = decoder.raw_decode(buffer) if begun and buffer else (None, 0)
-                except ValueError:
+                    record, end = decoder.raw_decode(buffer, at) if at < len(buffer) else (None, 0)
+                except ValueError:  # the rest of it may come with the next bytes
                     record, end = None, 0
                 if end:
                     if not isinstance(record, dict):
                         raise damaged
-                    buffer = buffer[end:]
+                    at = end
                     yield record
                     continue
                 data = b"" if ended else file.read(MEGABYTE)
-                if ended or len(buffer) > LARGEST_RECORD + MEGABYTE:
+                if ended or len(buffer) - at > LARGEST_RECORD + MEGABYTE:
                     raise damaged
                 ended = not data
-                buffer += decode.decode(data, ended)
+                buffer, at = buffer[at:] + decode.decode(data, ended), 0
     except (OSError, UnicodeDecodeError, RecursionError) as error:
         raise DatasetError(f"Table {path} cannot be read ({error}); {REMEDY}.") from None
 
@@ -247,10 +252,12 @@ def _taken(one: Record, tables: Path, root: Path) -> Taken:
     if name.is_absolute() or ".." in name.parts:
         raise DatasetError(f"Table {tables / 'sample_data.json'} names {name}, which is not below {root}; {REMEDY}.")
     sides = [one.get(side) if isinstance(one.get(side), int) else 0 for side in ("width", "height")]
-    time = values.numbers([one.get("timestamp")], "timestamp", tables / "sample_data.json", (1,))[0]
+    time = one.get("timestamp")
+    if isinstance(time, bool) or not isinstance(time, int | float) or not 0 <= time < LATEST:
+        raise DatasetError(f"Table {tables / 'sample_data.json'} has a timestamp that is none; {REMEDY}.")
     return Taken(
         root / name,
-        float(np.float64(time) * 1e-6),
+        time * 1e-6,
         text(one, "calibrated_sensor_token", tables, "sample_data"),
         text(one, "ego_pose_token", tables, "sample_data"),
         (int(sides[0] or 0), int(sides[1] or 0)),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from calibnet.runtime.writing import Kind, OutputError, check_output, partials_of
+from calibnet.runtime.writing import Kind, OutputError, check_output, remove_partials
 
 PATIENCE_S = 0.2
 """How long a lock is waited for: the last run that had it may just be ending."""
@@ -64,9 +64,7 @@ class Claim:
             OSError: it cannot be.
         """
         check_output(self.path, self.kind)
-        for left in partials_of(self.path):
-            with contextlib.suppress(OSError):
-                left.unlink()  # of a run that was killed at its end: we have the lock, so nobody is writing it
+        remove_partials(self.path)  # of a run that was killed at its end: we have the lock
         if self.path.exists():
             earlier = self.path.with_stem(f"{self.path.stem}.earlier-{secrets.token_hex(4)}")
             self.path.rename(earlier)

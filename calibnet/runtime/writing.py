@@ -143,9 +143,11 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
     return replaced
 
 
-def partials_of(path: Path) -> list[Path]:
-    """What `write_whole` was writing ``path`` to when it was killed, and what it is writing to now."""
-    return list(path.parent.glob(f"{glob.escape(_before(path))}{'[a-z0-9_]' * 8}{PARTIAL}"))
+def remove_partials(path: Path) -> None:
+    """Remove what `write_whole` was writing ``path`` to when it was killed; only who has its lock may do that."""
+    for left in path.parent.glob(f"{glob.escape(_before(path))}{'[a-z0-9_]' * 8}{PARTIAL}"):
+        with contextlib.suppress(OSError):
+            left.unlink()
 
 
 def _before(path: Path) -> str:

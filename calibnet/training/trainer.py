@@ -20,7 +20,7 @@ from calibnet.network.network import CalibrationNetwork
 from calibnet.network.target import Target
 from calibnet.runtime.claim import locked
 from calibnet.runtime.interruption import StopRequest
-from calibnet.runtime.writing import Kind, check_output
+from calibnet.runtime.writing import Kind, check_output, remove_partials
 from calibnet.training.batches import Batch, next_batch, open_batches
 from calibnet.training.build import Training
 from calibnet.training.checkpoint import read_checkpoint, restore, save_checkpoint
@@ -96,6 +96,8 @@ class Trainer:
             CalibrationError: the loss is no number any more.
         """
         with locked(self.checkpoint) if self.fabric.is_global_zero else nullcontext():
+            if self.fabric.is_global_zero:  # and has the lock, so nobody is writing them
+                remove_partials(self.checkpoint)
             return self._run()
 
     def _run(self) -> Path:

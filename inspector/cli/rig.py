@@ -13,7 +13,7 @@ from calibnet.geometry.types import Transform
 from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES
 from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES, TOLERANCE
-from inspector.cli.output import JSON_FILE, make_console, prepare_json, say, write, write_json
+from inspector.cli.output import JSON_FILE, make_console, prepare, prepare_json, say, write, write_json
 from inspector.cli.preparing import describe_provenance
 from inspector.cli.run import recording_to
 from inspector.cli.viewing import next_lines, saved_lines, viewing_options
@@ -94,8 +94,11 @@ def rig(
 
     if rigid and tolerance is not None:
         raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")
-    prepare_json(json_file)
     cameras = open_rig(folders)
+    prepare_json(json_file)
+    files = {camera: output / f"{camera}.yaml" for camera in cameras} if output is not None else {}
+    for file in files.values():
+        prepare(file, Kind.EXPORT)
     name = f"rig/{folders[0].resolve().name}" if len(folders) == 1 else f"rig/{'+'.join(cameras)}"
     outputs = viewing.outputs(name)
     outputs.check()
@@ -135,11 +138,10 @@ def rig(
         for line in said:
             say(line, err=beside)
         write_json(json_file, solved.as_dict())
-        if output is not None:
-            output.mkdir(parents=True, exist_ok=True)
-            for camera, exported in solved.exported().items():
-                write(output / f"{camera}.yaml", export_as("yaml", exported).encode(), Kind.EXPORT)
-                say(f"Saved {output / f'{camera}.yaml'}.", err=beside)
+        exported = solved.exported()
+        for camera, file in files.items():
+            write(file, export_as("yaml", exported[camera]).encode(), Kind.EXPORT)
+            say(f"Saved {file}.", err=beside)
         if outputs.file is not None:
             for line in [*saved_lines(outputs, shown), *next_lines(outputs.file, rig=True)]:
                 say(line, err=beside)
