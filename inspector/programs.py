@@ -18,6 +18,8 @@ from pathlib import Path
 from calibnet.errors import ConfigError
 
 LOCALHOST = "127.0.0.1"
+SWITCHED_OFF = ("0", "off", "false", "no")
+"""Values of the variable RERUN with which Rerun records nothing, without a word."""
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
 PR_SET_PDEATHSIG = 1

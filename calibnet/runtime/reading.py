@@ -123,7 +123,10 @@ def read_file(
     """
     try:
         with open_file(path, largest) as file:
-            data = file.read(largest + 1)
+            size = os.fstat(file.fileno()).st_size
+            data = file.read(size + 1)  # not `largest`, which would be allocated at once
+            if len(data) > size:
+                data += file.read(max(0, largest + 1 - len(data)))
         if len(data) > largest:  # it grows while it is read
             raise TooLargeError(0, _too_large(len(data), largest), str(path))
         if data.startswith(LFS_POINTER):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
+from inspector.cli.options import FRAMES, RANGE, SEED, THREADS, USUAL_THREADS
 from inspector.cli.output import (
     JSON_FILE,
     console_beside,
@@ -34,7 +34,9 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--preset", "presets", multiple=True, help="Network. Repeatable.  [default: compact and paper]")
 @click.option("--range", "range_", type=RANGE, default="5/0.5", show_default=True, help="Of weights and errors.")
 @click.option(
-    "--weights", type=FOLDER, help="Folder that `train --ablation NAME --output DIR` filled, a folder a row within it."
+    "--weights",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    help="Folder that `train --ablation NAME --output DIR` filled, a folder a row within it.",
 )
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
@@ -43,7 +45,7 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--timed", type=click.IntRange(0), default=3, show_default=True, help="Looks whose median is the latency; 0: none."
 )
-@click.option("--threads", type=click.IntRange(1), default=2, show_default=True, help="Of the CPU.")
+@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Of the CPU.")
 @click.option(
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier run."
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED
+from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, THREADS, USUAL_THREADS
 from inspector.cli.output import (
     JSON_FILE,
     console_beside,
@@ -66,7 +66,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
     "--ours", multiple=True, type=NamedFolder(), help="A further row of the cascade, with weights of DIR. Repeatable."
 )
 @click.option("--masks", type=FOLDER, metavar="DIR", help="Masks for calib-anything, as in seq.")
-@click.option("--threads", type=click.IntRange(1), default=2, show_default=True, help="Of the CPU.")
+@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Of the CPU.")
 @click.option(
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier bench."
 )

@@ -15,7 +15,7 @@ import click
 
 from calibnet.runtime.writing import OutputError
 from inspector.cli.errors import ExitCode
-from inspector.cli.options import DETAIL, FRAMES
+from inspector.cli.options import DETAIL, FRAMES, SIZE
 from inspector.cli.output import overwrite_option, say
 
 if TYPE_CHECKING:
@@ -43,10 +43,9 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Do it on a Dask cluster that runs already.")
 @click.option(
     "--memory",
-    default="auto",
-    show_default=True,
+    type=SIZE,
     metavar="SIZE",
-    help="Of a worker, for instance 4GB; auto: its share.",
+    help="Of a worker, for instance 4GB.  [default: its share of the machine]",
 )
 @click.option(
     "--detail", type=DETAIL, default="overview", show_default=True, help="How much of each frame is recorded."
@@ -65,7 +64,7 @@ def fleet(
     out: str,
     workers: int | None,
     scheduler: str | None,
-    memory: str,
+    memory: int | None,
     detail: Detail,
     frames: str | None,
     options: str,
@@ -98,7 +97,7 @@ def fleet(
     run = secrets.token_hex(8)
     tasks = [Task(drive, store, str(detail), force, run) for drive in drives]
     store.check()
-    engine = Engine(default_workers() if workers is None else workers, scheduler, memory, prepare_worker)
+    engine = Engine(default_workers() if workers is None else workers, scheduler, memory or "auto", prepare_worker)
     claim = None if store.local is None else Claim(store.local / TABLE, Kind.PARQUET)
     try:
         return run_fleet(tasks, engine)

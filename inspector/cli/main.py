@@ -15,6 +15,7 @@ import click
 from calibnet import __version__
 from calibnet.errors import ConfigError
 from inspector.cli.errors import run
+from inspector.programs import SWITCHED_OFF
 
 
 @dataclass(frozen=True)
@@ -141,11 +142,24 @@ SPINS = "20000"
 """How often a thread of libgomp's looks for work before it sleeps; its own 300,000 make a frame take several times as
 long where other programs use the cores too, and no shorter where none does."""
 
+NOT_FOR_US = ("OPENCV_IO_MAX_IMAGE_", "RERUN_FLUSH_", "RERUN_CHUNK_")
+"""Beginnings of variables that change what libraries do, or end the process where one is no number; bounds of pictures
+and sizes of chunks are ours."""
+
+
+def settle_environment() -> None:
+    """Take out of the environment what would change results or print lines of libraries, before they are imported."""
+    for name in [name for name in os.environ if name.startswith(NOT_FOR_US)]:
+        del os.environ[name]
+    if os.environ.get("RERUN", "").lower() not in SWITCHED_OFF:
+        os.environ.pop("RERUN", None)
+    os.environ.setdefault("RUST_LOG", RERUN_LOG)
+    os.environ.setdefault("GOMP_SPINCOUNT", SPINS)
+
 
 def main() -> None:
     """Entry point of the console script."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # they are for us; what a user has to know is a sentence of ours
-    os.environ.setdefault("RUST_LOG", RERUN_LOG)
-    os.environ.setdefault("GOMP_SPINCOUNT", SPINS)  # read when torch is imported, so not before here
+    settle_environment()
     sys.exit(run(cli))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from enum import StrEnum
 from pathlib import Path
@@ -153,7 +154,31 @@ class NumberRange(click.FloatRange):
         return number
 
 
+UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
+
+
+class Size(click.ParamType[int]):
+    """A number of bytes, as ``30MiB``."""
+
+    name = "size"
+
+    def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Bytes of the text."""
+        if isinstance(value, int):
+            return value
+        match = re.fullmatch(rf"(\d{{1,9}}(?:\.\d{{1,9}})?) ?({'|'.join(UNITS)})", value)
+        if match is None:
+            self.fail(f"{value!r} is no size; write it as 30MiB or 4GB.", param, ctx)
+        return int(float(match[1]) * UNITS[match[2]])
+
+
+SIZE = Size()
 SEED = click.IntRange(0, 2**63 - 1)
+CORES = os.cpu_count() or 1
+THREADS = click.IntRange(1, CORES)
+"""Of the CPU: torch ends the process at many more than there can be."""
+USUAL_THREADS = min(2, CORES)
+"""That latencies are measured with."""
 """Of everything random; recordings keep it as a 64-bit number."""
 RANGE = RangeType()
 STAGES = StagesType()

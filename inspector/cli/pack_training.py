@@ -2,31 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from calibnet.training.options import TrainingOptions
-from inspector.cli.options import FOLDER
-
-UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
-
-
-class Size(click.ParamType[int]):
-    """A number of bytes, as ``30MiB``."""
-
-    name = "size"
-
-    def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Bytes of the text."""
-        if isinstance(value, int):
-            return value
-        match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(KiB|MiB|GiB)", value)
-        if match is None:
-            self.fail(f"{value!r} is no size; write it as 30MiB, with KiB, MiB or GiB.", param, ctx)
-        return int(float(match[1]) * UNITS[match[2]])
+from inspector.cli.options import FOLDER, SIZE
 
 
 @click.command("pack-training")
@@ -39,7 +21,7 @@ class Size(click.ParamType[int]):
 @click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
-@click.option("--max-size", type=Size(), default="30MiB", show_default=True, help="Of a part.")
+@click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Of a part.")
 def pack_training(
     data: tuple[str, ...],
     validate: tuple[str, ...],

@@ -138,10 +138,9 @@ def rig(
         for line in said:
             say(line, err=beside)
         write_json(json_file, solved.as_dict())
-        exported = solved.exported()
-        for camera, file in files.items():
-            write(file, export_as("yaml", exported[camera]).encode(), Kind.EXPORT)
-            say(f"Saved {file}.", err=beside)
+        for camera, exported in solved.exported().items() if files else ():
+            write(files[camera], export_as("yaml", exported).encode(), Kind.EXPORT)
+            say(f"Saved {files[camera]}.", err=beside)
         if outputs.file is not None:
             for line in [*saved_lines(outputs, shown), *next_lines(outputs.file, rig=True)]:
                 say(line, err=beside)

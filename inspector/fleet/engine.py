@@ -60,7 +60,7 @@ class Engine:
 
     workers: int
     scheduler: str | None = None
-    memory: str = "auto"
+    memory: int | str = "auto"
     prepare: Callable[[int], None] = field(default=lambda threads: None)
 
     @property

@@ -86,7 +86,9 @@ def simulate(
         write_whole(folder / TRUTH, _table(fleet, truth=True))
         write_whole(folder / LIST, _table(fleet, truth=False))
     except OSError as error:
-        raise ConfigError(f"{error.filename or folder} cannot be written ({error.strerror}); choose another.") from None
+        raise ConfigError(
+            f"{error.filename or folder} cannot be written ({error.strerror}); choose another folder."
+        ) from None
     return folder / LIST
 
 

@@ -22,10 +22,8 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.interruption import StopRequest
 from calibnet.runtime.writing import Kind
-from inspector.programs import LOCALHOST, listening, open_window
+from inspector.programs import LOCALHOST, SWITCHED_OFF, listening, open_window
 
-SWITCHED_OFF = ("0", "off", "false", "no")
-"""Values of the variable RERUN with which Rerun records nothing, without a word."""
 RESERVE_BYTES = 32 * 1024 * 1024
 """Free disk space below which recording stops, while what is at hand can still be written."""
 

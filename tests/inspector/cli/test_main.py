@@ -8,6 +8,7 @@ import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from unittest import mock
 
 import click
 import pytest
@@ -16,7 +17,7 @@ from rich.table import Table
 from calibnet import __version__
 from calibnet.errors import CalibnetError, DatasetError
 from inspector.cli import errors
-from inspector.cli.main import COMMANDS, cli
+from inspector.cli.main import COMMANDS, cli, settle_environment
 from inspector.cli.output import make_console
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -196,3 +197,14 @@ def test_a_table_has_its_numbers_on_any_terminal(
     table.add_row("total", "2.651 M")
     console.print(table)
     assert "2.651 M" in capsys.readouterr().out
+
+
+def test_variables_of_libraries_that_change_what_they_do_are_taken_out() -> None:
+    given = {"OPENCV_IO_MAX_IMAGE_PIXELS": "abc", "RERUN_FLUSH_NUM_BYTES": "-1", "RERUN_CHUNK_MAX_ROWS": "1"}
+    kept = {"RERUN_STRICT": "0", "RUST_LOG": "info", "HOME": "/"}
+    with mock.patch.dict(os.environ, given | kept | {"RERUN": "maybe"}, clear=True):
+        settle_environment()
+        assert dict(os.environ) == kept | {"GOMP_SPINCOUNT": "20000"}
+    with mock.patch.dict(os.environ, {"RERUN": "Off"}, clear=True):
+        settle_environment()
+        assert os.environ["RERUN"] == "Off", "which is said, as nothing is recorded then"
