@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import random
 import signal
 import subprocess
@@ -31,6 +32,7 @@ from tests.hostile import calibrations, clouds, pictures, weights
 from tests.hostile.recordings import VERDICT
 from tests.support.clouds import npy, npz, with_fields
 
+os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own reserves addresses by the gigabyte
 HANG_S, GIGABYTES = 10, 2.0
 """An input that takes longer, or grows the process by more, is a finding."""
 LARGEST = 1 << 16

@@ -1,4 +1,4 @@
-"""Kill -9 at random moments of recording, indexing, reporting and exporting, and what is left.
+"""Kill -9 at random moments of recording, indexing, reporting, exporting, of a fleet and of `live`, and what is left.
 
     python -m tests.kills [--times 5] [--seed 0] [KIND ...]
 
@@ -18,6 +18,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+
+from tests.support.folder import write_folder
 
 WITH_TESTS = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
 """For processes in another folder, which have the installed packages but not these tests."""
@@ -44,6 +46,19 @@ outputs.complete()
 COMMAND = (
     "import sys; print('begun', flush=True); from inspector.cli.main import main; sys.argv[0] = 'calib-inspect'; main()"
 )
+
+FAKED = """
+import sys
+from calibnet.cascade.cascade import Cascade
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from tests.support.fakes import FakeCascade
+Cascade.load = staticmethod(lambda *_, **__: FakeCascade((3, 4, 5)))
+print("begun", flush=True)
+sys.exit(run(cli, sys.argv[1:]))
+"""
+"""A command whose cascade costs nothing, beside three cars."""
+CARS = ("car-0", "car-1", "car-2")
 
 
 @dataclass(frozen=True)
@@ -107,6 +122,24 @@ def check_export(folder: Path, _: list[str]) -> None:
         json.loads((folder / "out.json").read_text())
 
 
+def check_fleet(folder: Path, _: list[str]) -> None:
+    """What the table has of a drive is whole, and the drives are as they were."""
+    from inspector.fleet.table import TABLE, read_table
+    from inspector.read.run import read_run
+
+    if (folder / "fleet" / TABLE).exists():
+        for row in read_table(folder / "fleet" / TABLE):
+            assert row.verdict != "failed", row.reason
+            assert read_run(folder / "fleet" / row.recording).frames
+    check_cars(folder, _)
+
+
+def check_cars(folder: Path, _: list[str]) -> None:
+    """The cars' folders hold what they held."""
+    for name in CARS:
+        assert {path.name for path in (folder / name).iterdir()} == {"images", "clouds", "calibration.yaml"}
+
+
 KINDS = {
     "recording": Kind([sys.executable, "-c", RECORD, "run.rrd", "1000"], "2", 3.0, check_recording),
     "indexing": Kind([sys.executable, "-c", RECORD, "run.rrd", "25"], "indexing", 0.6, check_recording),
@@ -119,6 +152,10 @@ KINDS = {
         6.0,
         check_export,
     ),
+    "fleet": Kind(
+        [sys.executable, "-c", FAKED, "fleet", *CARS, "--out", "fleet", "--workers", "0"], "begun", 15.0, check_fleet
+    ),
+    "live": Kind([sys.executable, "-c", FAKED, "live", "folder", CARS[0], "--no-open"], "begun", 15.0, check_cars),
 }
 
 
@@ -132,6 +169,8 @@ def main() -> None:
     draw = random.Random(asked.seed)
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base)
+        for name in CARS:
+            write_folder(folder / name, 2)
         record = [sys.executable, "-c", RECORD, "whole.rrd", "3"]
         subprocess.run(record, cwd=folder, env=WITH_TESTS, check=True, capture_output=True)
         for name in asked.kinds or KINDS:

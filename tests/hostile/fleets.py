@@ -31,6 +31,10 @@ def rows() -> Iterator[Row]:
 
         code = FINE if not words else 3
         yield Row(f"list of drives: {what}", write, code, (words,) if words else (), ("out",))
+    for memory in ("-5 potatoes", "0", "4", "1e9GB"):
+        yield Row(
+            f"fleet --memory {memory}", lambda _, memory=memory: ["fleet", ".", "--out", "o", "--memory", memory], 2
+        )
     for make in (fifo, endless, dangling, loop, folder, giant):
         yield Row(f"list of drives: {make.__name__}", partial(_at, make, LIST, _fleet()), 3, (LIST,), ("out",))
         yield Row(f"table of a fleet: {make.__name__}", partial(_at, make, TABLE, ["fleet-report", "."]), 3, (TABLE,))

@@ -73,6 +73,8 @@ OTHERS: list[tuple[int, list[str]]] = [
     (BAD, ["pictures", "run.rrd", "--animate", "x.mp4"]),
     (USAGE, ["benchmark", "--threads", "100000"]),
     (USAGE, ["benchmark", "--threads", "0"]),
+    (USAGE, ["bench", "--threads", "100000"]),
+    (USAGE, ["ablate", "--threads", "100000"]),
     (USAGE, ["benchmark", "--repeats", "0"]),
     (BAD, ["benchmark", "--preset", "nonsense"]),
     (BAD, ["info", "--preset", "nonsense"]),

@@ -9,7 +9,19 @@ from collections.abc import Iterator
 from typing import Any
 from unittest import mock
 
-from tests.hostile import calibrations, clouds, fleets, names, options, outputs, pictures, recordings, texts, weights
+from tests.hostile import (
+    calibrations,
+    clouds,
+    features,
+    fleets,
+    names,
+    options,
+    outputs,
+    pictures,
+    recordings,
+    texts,
+    weights,
+)
 
 ROWS = list(
     itertools.chain(
@@ -23,6 +35,7 @@ ROWS = list(
         names.rows(),
         options.rows(),
         fleets.rows(),
+        features.rows(),
     )
 )
 
