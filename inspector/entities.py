@@ -45,7 +45,9 @@ OVERLAY_MISCALIBRATED = "overlay/miscalibrated"
 OVERLAY_CORRECTED = "overlay/corrected"
 OVERLAY_REFERENCE = "overlay/reference"
 OVERLAY_CURRENT = "overlay/current"
-"""On `STEP` one after the other: start, every stage, reference, result; on the other timelines the result."""
+"""On `STEP` one after the other: start, every stage, reference, result; on the other timelines the result.
+
+The result is that of the whole drive once it is solved as one."""
 OVERLAY_DRIVE = "overlay/drive"
 """Points under the extrinsic that all frames agree on."""
 DRIVE_TEXT = "drive/verdict"
@@ -122,6 +124,11 @@ def error_stage(kind: str, number: int) -> str:
 def error_corrected(kind: str) -> str:
     """Error curve of the final result: the last stage's, whichever it is."""
     return f"error/{kind}/corrected"
+
+
+def error_drive(kind: str) -> str:
+    """Error curve of what all frames of a run agree on, in comparisons."""
+    return f"error/{kind}/drive"
 
 
 def error_limit(kind: str) -> str:

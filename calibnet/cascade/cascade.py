@@ -205,7 +205,7 @@ class Cascade:
         Args:
             frames: of one camera and LiDAR on one mount; each is read at least once, and some several times.
             initial: ``camera_from_lidar`` to start from, 4x4.
-            observer: called before each frame is read, with the number of frames read so far and to be read in all.
+            observer: called before each frame is read and at the end, with how many are read so far, and in all.
 
         Raises:
             CalibrationError: no frame could be calibrated.

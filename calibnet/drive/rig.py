@@ -86,7 +86,7 @@ def solve_rig(
         cameras: of the rig; each frame is read in the last look, and some before.
         initial: ``rig_from_lidar`` to start from.
         common: covariance of what the networks get wrong in all frames of one camera alike.
-        observer: called before each frame is read, with the number of frames read so far and to be read in all.
+        observer: called before each frame is read and at the end, with how many are read so far, and in all.
         held: what is known of the rig's pose beforehand.
         tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for a rigid rig.
 
@@ -163,6 +163,8 @@ def solve_rig(
         )
         mean, covariance = align(() if too_far else [Evidence((term,)) for term in terms], mean, covariance)
     found = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
+    if observer is not None:
+        observer(total, total)
     return RigEstimate(
         found.camera_from_lidar,
         found.covariance,

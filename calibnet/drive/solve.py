@@ -71,7 +71,7 @@ def solve_drive(
         frames: of one camera and LiDAR on one mount; each is read in the last look, and some before.
         initial: ``camera_from_lidar`` to start from.
         common: covariance of what the networks get wrong in all frames alike.
-        observer: called before each frame is read, with the number of frames read so far and to be read in all.
+        observer: called before each frame is read and at the end, with how many are read so far, and in all.
         held: what is known of the extrinsic beforehand.
 
     Raises:
@@ -114,6 +114,8 @@ def solve_drive(
     of_networks = consensus.estimate()
     final = estimate(consensus, of_networks, *convergence.latest)
     convergence.end(final)
+    if observer is not None:
+        observer(total, total)
     return DriveEstimate(
         final.camera_from_lidar,
         final.covariance,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,8 +33,8 @@ def compare(
 ) -> int:
     """Put recorded runs of one sequence side by side: other weights, miscalibration or preset.
 
-    Shows their overlays, their error curves in one plot, and a table of medians, 95th percentiles and
-    success rates with the differences to the first run.
+    Shows what each made of the whole drive, their error curves in one plot, and a table of medians, 95th
+    percentiles and success rates of single frames with the differences to the first run.
     """
     if len(recordings) < 2:
         raise click.UsageError("Give two recordings or more.")
@@ -61,13 +62,26 @@ def compare(
         outputs.close()
 
 
-def finish(comparison: Comparison, outputs: Outputs) -> int:
-    """Print the medians and where the comparison is; serve until Ctrl-C where that was asked for."""
+def lines(comparison: Comparison) -> Iterator[str]:
+    """A sentence on each run: how far off it is or, without a reference, how far from the first."""
     for run in comparison.runs:
-        metrics = run.corrected
+        drive, metrics, off = run.run.drive_error, run.corrected, "off"
+        if metrics is None and run is not comparison.first:
+            metrics, off = run.distance(comparison.first), f"from {comparison.first.name}"
+        parts = []
+        if drive is not None:
+            parts.append(f"{drive.rotation_deg:.2f}° / {drive.translation_cm:.1f} cm off as one drive")
         if metrics is not None:
-            rotation, translation = metrics.rotation_deg.median, metrics.translation_cm.median
-            say(f"{run.name}: {rotation:.2f}° / {translation:.1f} cm, median over {len(run.frames)} frames.")
+            median = f"{metrics.rotation_deg.median:.2f}° / {metrics.translation_cm.median:.1f} cm {off}"
+            parts.append(f"{median}, median over {len(run.frames)} frames")
+        if parts:
+            yield f"{run.name}: {'; '.join(parts)}."
+
+
+def finish(comparison: Comparison, outputs: Outputs) -> int:
+    """Print how the runs did and where the comparison is; serve until Ctrl-C where that was asked for."""
+    for line in lines(comparison):
+        say(line)
     if outputs.file is not None:
         for line in saved_lines(outputs, len(comparison.indices)):
             say(line)

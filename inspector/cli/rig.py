@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -90,7 +90,7 @@ def rig(
     from inspector.record.recording import RunDescription
     from inspector.record.rig import record_rig
     from inspector.run.rig import open_rig, solve
-    from inspector.run.session import STOPPING, frame_progress
+    from inspector.run.session import STOPPING, drive_observer, frame_progress
 
     if rigid and tolerance is not None:
         raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")
@@ -110,17 +110,7 @@ def rig(
             for note in folder.notes:
                 say(f"{camera}: {note}", err=True)
         with StopRequest(STOPPING) as stop, frame_progress(make_console()) as progress:
-
-            def observer(name: str) -> Callable[[int, int], None]:
-                task = progress.add_task(name, total=None)
-
-                def advance(read: int, total: int) -> None:
-                    progress.update(task, completed=read, total=total)
-                    if stop.requested:
-                        raise KeyboardInterrupt
-
-                return advance
-
+            observer = partial(drive_observer, progress, stop)
             solved = solve(cascade, cameras, rigid, miscalibration, observer, tolerance)
             options = {
                 "sequence": name,

@@ -1,12 +1,23 @@
-"""The layout of a comparison: overlays side by side, curves of all runs in one plot, the table."""
+"""The layout of a comparison: overlays side by side, curves of all runs in one plot, the table.
+
+The overlays are those of whole drives, of runs that solved theirs; each frame's own stand on the second tab.
+"""
 
 from __future__ import annotations
 
 import rerun.blueprint as rrb
 
 from inspector import entities
-from inspector.compare.comparison import Comparison
-from inspector.record.tabs.views import LEGEND_HEIGHT, SCREEN_HEIGHT, SCREEN_WIDTH, View, legend, overlay_view
+from inspector.compare.comparison import ComparedRun, Comparison, of_kind
+from inspector.record.tabs.views import (
+    LEGEND_HEIGHT,
+    SCREEN_HEIGHT,
+    SCREEN_WIDTH,
+    View,
+    curve_view,
+    legend,
+    overlay_view,
+)
 
 COMPARISON_TABLE = "comparison/table"
 LEGEND_RUNS = "legend/runs"
@@ -36,29 +47,30 @@ def results_tab(comparison: Comparison) -> View:
     table = rrb.TextDocumentView(origin=f"/{COMPARISON_TABLE}", name="The runs in figures")
     below: View = table
     if any(run.run.has_reference for run in comparison.runs):
-        curves = [_curves(comparison, kind, unit) for kind, unit in entities.ERROR_KINDS.items()]
-        plots = rrb.Vertical(*curves, legend("Runs", LEGEND_RUNS), row_shares=[1.0, 1.0, 0.2])
-        below = rrb.Horizontal(plots, table, column_shares=[1.0, 1.2])
-    overlays = side_by_side(_corrected(comparison))
+        curves = rrb.Horizontal(*(_curves(comparison, kind, unit) for kind, unit in entities.ERROR_KINDS.items()))
+        plots = rrb.Vertical(curves, legend("Runs", LEGEND_RUNS), row_shares=[1.0, 0.15])
+        below = rrb.Horizontal(plots, table, column_shares=[0.8, 1.0])
     height = _overlay_height(comparison)
-    if not comparison.one_coloring:
-        return rrb.Vertical(overlays, below, row_shares=[height, SCREEN_HEIGHT - height], name="Comparison")
     shares = [height, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - height]
-    colors = legend("Colours of the points", entities.LEGEND_POINTS)
-    return rrb.Vertical(overlays, colors, below, row_shares=shares, name="Comparison")
+    answers = side_by_side([_answer(comparison, run) for run in comparison.runs])
+    return rrb.Vertical(answers, _point_legends(comparison), below, row_shares=shares, name="Comparison")
 
 
 def overlays_tab(comparison: Comparison) -> View:
-    """Before and after, and the truth where it is known."""
+    """Start and truth above, what each run made of it below, of each frame alone as well where drives were solved."""
     start = entities.OVERLAY_MISCALIBRATED
-    truth = []
-    if any(run.run.has_reference for run in comparison.runs):
-        truth.append(_overlay(comparison, "Reference (truth)", entities.OVERLAY_REFERENCE))
     if comparison.one_start:
-        before = [_overlay(comparison, "Start of all runs", comparison.first.path(start)), *truth]
-        return rrb.Vertical(side_by_side(before), side_by_side(_corrected(comparison)), name="Before and after")
-    before = [_overlay(comparison, f"{run.name}: start", run.path(start)) for run in comparison.runs]
-    return rrb.Vertical(side_by_side(before), side_by_side(_corrected(comparison)), *truth, name="Before and after")
+        before = [_overlay(comparison, "Start of all runs", comparison.first.path(start))]
+    else:
+        before = [_overlay(comparison, f"{run.name}: start", run.path(start)) for run in comparison.runs]
+    if any(run.run.has_reference for run in comparison.runs):
+        before.append(_overlay(comparison, "Reference (truth)", entities.OVERLAY_REFERENCE))
+    rows = [before, [_answer(comparison, run) for run in comparison.runs]]
+    if comparison.drives:
+        rows.append([_alone(comparison, run) for run in comparison.runs])
+    pictures = map(side_by_side, rows)
+    shares = [SCREEN_HEIGHT - LEGEND_HEIGHT, LEGEND_HEIGHT]
+    return rrb.Vertical(rrb.Vertical(*pictures), _point_legends(comparison), row_shares=shares, name="Before and after")
 
 
 def side_by_side(views: list[rrb.Spatial2DView]) -> View:
@@ -66,10 +78,14 @@ def side_by_side(views: list[rrb.Spatial2DView]) -> View:
     return rrb.Grid(*views, grid_columns=min(len(views), MOST_COLUMNS))
 
 
-def _corrected(comparison: Comparison) -> list[rrb.Spatial2DView]:
-    return [
-        _overlay(comparison, f"{run.name}: corrected", run.path(entities.OVERLAY_CORRECTED)) for run in comparison.runs
-    ]
+def _answer(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
+    if run.run.drive is None:
+        return _alone(comparison, run)
+    return _overlay(comparison, f"{run.name}: whole drive as one", run.path(entities.OVERLAY_DRIVE))
+
+
+def _alone(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
+    return _overlay(comparison, f"{run.name}: each frame alone", run.path(entities.OVERLAY_CORRECTED))
 
 
 def _overlay(comparison: Comparison, name: str, points: str) -> rrb.Spatial2DView:
@@ -79,21 +95,18 @@ def _overlay(comparison: Comparison, name: str, points: str) -> rrb.Spatial2DVie
     return overlay_view(name, points, size)
 
 
+def _point_legends(comparison: Comparison) -> View:
+    """What the points' colours stand for: once, or for each run where they were recorded in different ones."""
+    runs = comparison.runs[:1] if comparison.one_coloring else comparison.runs
+    return rrb.Horizontal(*(legend("Colours of the points", run.path(entities.LEGEND_POINTS)) for run in runs))
+
+
 def _curves(comparison: Comparison, kind: str, unit: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=[f"/{run.path(entities.error_corrected(kind))}" for run in comparison.runs],
-        name=f"{kind.capitalize()} error of the corrected extrinsic [{unit}]",
-        plot_legend=rrb.PlotLegend(visible=False),  # it would lie over the curves' ends
-        axis_y=rrb.ScalarAxis(range=(0.0, HEADROOM * _largest(comparison, kind))),
-    )
-
-
-def _largest(comparison: Comparison, kind: str) -> float:
     errors = [frame.error(frame.corrected) for run in comparison.runs for frame in run.frames]
-    return max(
-        error.rotation_deg if kind == "rotation" else error.translation_cm for error in errors if error is not None
-    )
+    largest = max(of_kind(error, kind) for error in errors if error is not None)
+    paths = [f"/{run.path(entities.error_corrected(kind))}" for run in comparison.runs]
+    paths += [f"/{run.path(entities.error_drive(kind))}" for run in comparison.runs if run.run.drive_error is not None]
+    return curve_view(f"{kind.capitalize()} error [{unit}]", "/", *paths, highest=HEADROOM * largest)
 
 
 def _overlay_height(comparison: Comparison) -> float:

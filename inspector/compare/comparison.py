@@ -88,6 +88,11 @@ class Comparison:
         return f"{self.first.run.settings.get('sequence', 'frames')}: {names}"
 
     @property
+    def drives(self) -> bool:
+        """Whether any of the runs solved its drive as one."""
+        return any(run.run.drive is not None for run in self.runs)
+
+    @property
     def one_start(self) -> bool:
         """Whether all runs start from the same extrinsics."""
         return all(run.starts_like(self.first) for run in self.runs[1:])
@@ -128,6 +133,11 @@ class Comparison:
         for run, frames in zip(runs[1:], chosen[1:], strict=True):
             _check_same_frames(runs[0], chosen[0], run, frames)
         return cls(tuple(ComparedRun(*compared) for compared in zip(names, runs, chosen, strict=True)))
+
+
+def of_kind(error: PoseError, kind: str) -> float:
+    """Degrees or centimetres of an error, ``kind`` as in `entities.ERROR_KINDS`."""
+    return error.rotation_deg if kind == "rotation" else error.translation_cm
 
 
 def _check_names(names: Sequence[str]) -> None:

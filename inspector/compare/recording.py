@@ -14,9 +14,9 @@ import rerun as rr
 from rerun.chunk import Chunk
 
 from inspector import entities
-from inspector.colors import Rgb
+from inspector.colors import GROUND, Rgb
 from inspector.compare.blueprint import COMPARISON_TABLE, LEGEND_RUNS, make_comparison_blueprint
-from inspector.compare.comparison import ComparedRun, Comparison
+from inspector.compare.comparison import ComparedRun, Comparison, of_kind
 from inspector.compare.table import comparison_table
 from inspector.record.pictures.legends import log_names
 from inspector.record.stream import Stream
@@ -25,11 +25,21 @@ from inspector.record.subtree import Subtree
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
 
-SHARED = (f"{entities.IMAGE}/**", f"{entities.LEGEND_POINTS}/**", f"{entities.OVERLAY_REFERENCE}/**")
+SHARED = (f"{entities.IMAGE}/**", f"{entities.OVERLAY_REFERENCE}/**")
 """The same in all runs, and taken from one."""
-OWN = (f"{entities.OVERLAY_MISCALIBRATED}/**", f"{entities.OVERLAY_CORRECTED}/**")
+OWN = tuple(
+    f"{entity}/**"
+    for entity in (
+        entities.OVERLAY_MISCALIBRATED,
+        entities.OVERLAY_CORRECTED,
+        entities.OVERLAY_DRIVE,
+        entities.LEGEND_POINTS,
+    )
+)
 """Of every run."""
 RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
+DRIVES_ARE_LEVEL = "level: whole drive as one"
+"""What the legend says of lines that are the same at all frames."""
 CHUNKS_A_FLUSH = 16
 
 
@@ -53,7 +63,8 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> str:
         table = rr.TextDocument(comparison_table(comparison), media_type=rr.MediaType.MARKDOWN)
         stream.rec.log(COMPARISON_TABLE, table, static=True)
         shown = {run.name: RUN_COLORS[number % len(RUN_COLORS)] for number, run in enumerate(comparison.runs)}
-        log_names(Subtree(stream.rec), LEGEND_RUNS, shown)
+        words = {DRIVES_ARE_LEVEL: GROUND} if any(run.run.drive_error for run in comparison.runs) else {}
+        log_names(Subtree(stream.rec), LEGEND_RUNS, shown | words)
         for run in comparison.runs:
             _log_curves(stream.rec, run, shown[run.name])
         for count, chunk in enumerate(_copied(comparison), start=1):
@@ -74,12 +85,16 @@ def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
         rr.TimeColumn(entities.FRAME, sequence=[frame.index for frame in run.frames]),
         rr.TimeColumn(entities.TIME, duration=[frame.seconds for frame in run.frames]),
     ]
-    curves = {"rotation": [error.rotation_deg for error in errors], "translation": [e.translation_cm for e in errors]}
-    for kind, values in curves.items():
+    drive = [] if run.run.drive_error is None else [run.run.drive_error] * len(errors)
+    for kind in entities.ERROR_KINDS:
         path = run.path(entities.error_corrected(kind))
-        rec.send_columns(path, times, rr.Scalars.columns(scalars=values))
+        rec.send_columns(path, times, rr.Scalars.columns(scalars=[of_kind(error, kind) for error in errors]))
         line = rr.SeriesLines(names=run.name, colors=color, widths=2.0)
         rec.log(path, line, rr.SeriesPoints(names=run.name, colors=color, marker_sizes=3.0), static=True)
+        if drive:
+            path = run.path(entities.error_drive(kind))
+            rec.send_columns(path, times, rr.Scalars.columns(scalars=[of_kind(error, kind) for error in drive]))
+            rec.log(path, rr.SeriesLines(names=f"{run.name}, drive", colors=color, widths=1.0), static=True)
 
 
 def _copied(comparison: Comparison) -> Iterator[Chunk]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from calibnet.evaluation.metrics import Metrics
+from calibnet.geometry import PoseError, pose_error
 from calibnet.methods.registry import CASCADE
 from inspector.compare.comparison import ComparedRun, Comparison
 from inspector.record.tabs.table import NOTHING, markdown
@@ -43,11 +44,41 @@ COLUMNS: tuple[Column, ...] = (
 def comparison_table(comparison: Comparison) -> str:
     """Markdown: errors, how far the results lie apart, and the settings that differ."""
     known = [run.corrected is not None for run in comparison.runs]
-    lines = [*_errors(comparison), ""] if any(known) else []
+    lines = [*_drives(comparison), ""] if comparison.drives else []
+    lines += [*_errors(comparison), ""] if any(known) else []
     if not all(known):
         lines += ["*A run without a reference has no errors.*", ""]
-    lines += [f"### How far the results lie from those of {comparison.first.name}", "", *_distances(comparison), ""]
+    lines += [f"### How far each frame's result lies from {comparison.first.name}'s", "", *_distances(comparison), ""]
     return "\n".join([*lines, "### What was set differently", "", *_settings(comparison), ""])
+
+
+def _drives(comparison: Comparison) -> list[str]:
+    """What each run made of the whole drive: its verdict, how far off it is and how sure of itself."""
+    first, with_errors = comparison.first, any(run.run.drive_error for run in comparison.runs)
+    off = ["off the reference by"] if with_errors else []
+    of_first = first.run.drive
+    away = [] if of_first is None else [f"from {first.name}'s"]
+    rows = []
+    for run in comparison.runs:
+        drive, verdict = run.run.drive, run.run.drive_verdict
+        row = [f"**{run.name}**", _word(run)]
+        row += [_pair(run.run.drive_error) for _ in off]
+        if of_first is not None:
+            row.append(_pair(None if drive is None or run is first else pose_error(drive, of_first)))
+        sure = None if verdict is None or verdict.covariance is None else verdict
+        row.append(NOTHING if sure is None else f"{sure.sigma_rotation_deg:.2f}° / {sure.sigma_translation_cm:.1f} cm")
+        rows.append(row)
+    return ["### Whole drive as one", "", *markdown(["", "verdict", *off, *away, "sure to (1σ)"], rows)]
+
+
+def _word(run: ComparedRun) -> str:
+    if run.run.drive is None:
+        return "not solved"
+    return NOTHING if run.run.drive_verdict is None else run.run.drive_verdict.word
+
+
+def _pair(error: PoseError | None) -> str:
+    return NOTHING if error is None else f"{_degrees(error.rotation_deg)} / {_centimetres(error.translation_cm)}"
 
 
 def _errors(comparison: Comparison) -> list[str]:
@@ -60,12 +91,8 @@ def _errors(comparison: Comparison) -> list[str]:
         [f"**{run.name}**", *_figures(run.corrected, None if run is first else first.corrected)]
         for run in comparison.runs
     ]
-    drives = [(run.name, run.run.drive_error) for run in comparison.runs if run.run.drive_error is not None]
-    as_one = [[name, f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"] for name, error in drives if error]
-    table = ["### Whole drive as one", "", *markdown(["", "rotation", "translation"], as_one), ""] if as_one else []
     return [
-        *table,
-        f"### Errors over {count} frame{'' if count == 1 else 's'}",
+        f"### Errors of each frame alone, over {count} frame{'' if count == 1 else 's'}",
         "",
         *markdown(["", *(name for name, _, _ in COLUMNS)], rows),
         "",

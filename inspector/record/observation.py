@@ -149,6 +149,7 @@ class Layout:
         with_watch: whether it also tells if the mount moved meanwhile.
         with_fit: whether its stages say what error they expect of their matches.
         method: name of the method that ran; empty for the cascade.
+        frames: numbers of the first and the last frame; None where the last is not known yet.
     """
 
     stages: tuple[StageLayout, ...]
@@ -161,6 +162,7 @@ class Layout:
     with_fit: bool = True
     with_watch: bool = False
     method: str = ""
+    frames: tuple[int, int] | None = None
 
     @property
     def start(self) -> str:

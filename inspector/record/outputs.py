@@ -53,7 +53,9 @@ class Outputs:
     _claim: Claim | None = field(default=None, init=False, repr=False)
     page: str | None = field(default=None, init=False)
     _serving: ExitStack = field(default_factory=ExitStack, init=False, repr=False)
+    _begun: threading.Event = field(default_factory=threading.Event, init=False, repr=False)
     _ended: threading.Event = field(default_factory=threading.Event, init=False, repr=False)
+    _shown: list[Any] | None = field(default=None, init=False, repr=False)
 
     def check(self) -> None:
         """Find out before the work whether the outputs can be opened, and claim the file until `close`.
@@ -81,21 +83,28 @@ class Outputs:
                 "free some space or choose another --save."
             )
 
-    def open(self) -> Sequence[Any]:
-        """Create the file, start what has to be started, and return the file's path and Rerun's sinks."""
-        sinks: list[Any] = []
-        if self.file is not None:
-            sinks.append(self._claimed(self.file).begin())
+    def show(self) -> bool:
+        """Open the viewer and serve the page, before there is anything in them; returns whether they were not yet."""
+        if self._shown is not None:
+            return False
+        self._shown = []
         if self.serve:
             folder = Path(self._serving.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
-            if not sinks:
-                sinks.append(folder / "served.rrd")
-            self._serve(sinks[0], folder)
+            if self.file is None:
+                self._shown.append(folder / "served.rrd")
+            self._serve(self.file or self._shown[0], folder)
         if self.viewer:
-            sinks += self._open_viewer()
+            self._shown += self._open_viewer()
         if self.connect is not None:
-            sinks.append(rr.GrpcSink(self.connect))
-        return sinks
+            self._shown.append(rr.GrpcSink(self.connect))
+        return True
+
+    def open(self) -> Sequence[Any]:
+        """Create the file, see that everything is shown, and return the file's path and Rerun's sinks."""
+        file = [] if self.file is None else [self._claimed(self.file).begin()]
+        self.show()
+        self._begun.set()
+        return [*file, *(self._shown or [])]
 
     def wait_while_serving(self) -> None:
         """Return at Ctrl-C or SIGTERM; at once where nothing is served. The recording grows no more."""
@@ -143,7 +152,8 @@ class Outputs:
         from inspector.serving.viewer_files import fetch_viewer
 
         fetch_viewer(folder)
-        server = self._serving.enter_context(PageServer(recording_app(file, folder, self._ended), self.bind))
+        app = recording_app(file, folder, self._begun, self._ended)
+        server = self._serving.enter_context(PageServer(app, self.bind))
         self.page = f"{server.address}?url={quote(server.address + RECORDING, safe='')}&hide_welcome_screen=1"
 
 

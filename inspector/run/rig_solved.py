@@ -13,8 +13,8 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.export.exported import Exported
 from inspector.verdicts import explained
 
-COLUMNS = ("camera", "verdict", "matches off", "alone it says", "sure to", "off the reference", "corrected by")
-"""Of a table with a row a camera."""
+COLUMNS = ("camera", "verdict", "off the reference", "sure to (1σ)", "alone it says", "corrected by", "matches off")
+"""Of a table with a row a camera, what matters most first: a narrow window cuts the rest off."""
 
 
 class Residual(NamedTuple):
@@ -82,7 +82,7 @@ class SolvedCamera:
             "" if residual.rotation_deg is None else f"{residual.rotation_deg:.2f}° / {residual.translation_cm:.1f} cm"
         )
         px = "" if math.isnan(residual.match_error_px) else f"{residual.match_error_px:.1f} px"
-        return [self.name, self.verdict.word, px, alone, sure, off, f"{turned:.2f}° / {shifted:.1f} cm"]
+        return [self.name, self.verdict.word, off, sure, alone, f"{turned:.2f}° / {shifted:.1f} cm", px]
 
     def recorded(self) -> dict[str, Any]:
         """What a recording keeps of it, besides its pictures."""

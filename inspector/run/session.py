@@ -21,7 +21,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from calibnet.datasets.frame import Sequence
+from calibnet.datasets.frame import Frame, Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
@@ -114,10 +114,9 @@ class Session:
                         continue
                     if recording is None:
                         layout = Layout.of(observation, self.contents, self.drive)
-                        layout = replace(layout, with_watch=self.drive and self.watching is not None)
+                        watched = self.drive and self.watching is not None
+                        layout = replace(layout, with_watch=watched, frames=self._range(observation.frame))
                         recording = Recording(self.outputs.open(), self.description, layout)
-                        if self.outputs.page is not None:
-                            self.console.print(f"Watch it at {self.outputs.page}", markup=False, soft_wrap=True)
                         initial, reference = observation.trace.initial, observation.reference
                     one_mount &= bool(np.allclose(observation.trace.initial, initial, atol=1e-9))
                     self.outputs.check_space()
@@ -154,11 +153,25 @@ class Session:
             return self.cascade
         assert isinstance(self.cascade, DriveCalibrator)
         initial = self.start.initial(first_readable(self.frames))
+        self._show()
         return SolvedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
+
+    def _show(self) -> None:
+        """Open the viewer or the page, and say where it is, once."""
+        if self.outputs.show() and self.outputs.page is not None:
+            self.console.print(f"Watch it at {self.outputs.page}", markup=False, soft_wrap=True)
+
+    def _range(self, first: Frame) -> tuple[int, int]:
+        """Numbers of the first and the last frame; of datasets that leave numbers out only the last frame knows it."""
+        last = first
+        if len(self.positions) > 1:
+            with contextlib.suppress(DatasetError):
+                last = self.sequence[self.positions[-1]]
+        return first.index, last.index
 
     def _close(self, recording: Recording) -> None:
         """Close the recording, which of a long one takes a while; after Ctrl-C it is whole, but without an index."""
-        with StopRequest() as stop, frame_progress(self.console) as progress:
+        with StopRequest() as stop, frame_progress(self.console, transient=True) as progress:
             task = progress.add_task(INDEX, total=None)
 
             def advance(written: int, expected: int) -> bool:
@@ -173,6 +186,7 @@ class Session:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
         try:
             frame = self.sequence[position]
+            self._show()
             initial = self.start.initial(frame)
             trace = method.calibrate(frame, initial, detail=self.contents.inside)
             if trace.verdict is not None and summary.explained < MOST_EXPLAINED:
@@ -251,9 +265,9 @@ class Session:
         return kept if earlier is None else f"{kept} The earlier recording of that name is kept as {earlier}."
 
 
-def drive_observer(progress: Progress, stop: StopRequest) -> Callable[[int, int], None]:
+def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole drive") -> Callable[[int, int], None]:
     """What shows how far the solving of a drive is, and ends it when a stop is requested."""
-    task = progress.add_task("whole drive", total=None)
+    task = progress.add_task(name, total=None)
 
     def advance(read: int, total: int) -> None:
         progress.update(task, completed=read, total=total)
@@ -270,7 +284,17 @@ class _FramesPerSecond(ProgressColumn):
         )
 
 
-def frame_progress(console: Console) -> Progress:
-    """A bar that counts frames."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _FramesPerSecond())
-    return Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=console, speed_estimate_period=10.0)
+class _Left(TimeRemainingColumn):
+    def render(self, task: Task) -> Text:
+        return Text("") if task.finished or task.total is None else super().render(task).append(" left")
+
+
+class _Counted(MofNCompleteColumn):
+    def render(self, task: Task) -> Text:
+        return Text("") if task.total is None else super().render(task)
+
+
+def frame_progress(console: Console, transient: bool = False) -> Progress:
+    """A bar that counts frames; a transient one leaves nothing behind."""
+    columns = (TextColumn("{task.description}"), BarColumn(), _Counted(), _FramesPerSecond(), _Left())
+    return Progress(*columns, console=console, speed_estimate_period=10.0, transient=transient)

@@ -24,22 +24,27 @@ PAUSE_S = 0.1
 """Between looks at whether the file has grown."""
 
 
-def recording_app(file: Path, viewer: Path, ended: threading.Event) -> Starlette:
+def recording_app(file: Path, viewer: Path, begun: threading.Event, ended: threading.Event) -> Starlette:
     """The app for `inspector.serving.server.PageServer`.
 
     Args:
         file: the recording; it may be replaced as a whole while it is given out.
         viewer: folder with the files of Rerun's web viewer.
+        begun: set when the file is the recording's; one of its name that was there before is not given out.
         ended: set when the recording grows no more.
     """
 
     async def answer(_: Request) -> StreamingResponse:
-        return StreamingResponse(_growing(file, ended), media_type="application/octet-stream")
+        return StreamingResponse(_growing(file, begun, ended), media_type="application/octet-stream")
 
     return Starlette(routes=[Route(f"/{RECORDING}", answer), file_route(viewer_files(viewer))])
 
 
-async def _growing(path: Path, ended: threading.Event) -> AsyncIterator[bytes]:
+async def _growing(path: Path, begun: threading.Event, ended: threading.Event) -> AsyncIterator[bytes]:
+    while not begun.is_set():
+        if ended.is_set():
+            return
+        await asyncio.sleep(PAUSE_S)
     with path.open("rb") as file:
         while True:
             last = ended.is_set()  # asked before the file is read, so that nothing written in between is lost

@@ -188,6 +188,8 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
             read.append(frames[position])
         except DatasetError as error:
             skipped.append(BadFrame(position, str(error)))
+    if observer is not None:
+        observer(total, total)
     alike = [frame for frame in read if same_camera(frame.camera, read[0].camera)]
     first, poses = longest_run([frame.points for frame in alike]) if alike else (0, [])
     chosen = alike[first : first + len(poses)]

@@ -21,7 +21,16 @@ from inspector.record.pictures.matches import StartingPoints, chosen_match, matc
 from inspector.record.pictures.search_window import SearchWindow
 from inspector.record.pictures.slices import slice_marks, slices_picture
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, image_view, legend, map_legends, map_view, tensor_view, with_legend
+from inspector.record.tabs.views import (
+    View,
+    image_view,
+    legend,
+    map_legends,
+    map_view,
+    scale_name,
+    tensor_view,
+    with_legend,
+)
 
 NAME = "Cost volumes"
 
@@ -94,8 +103,10 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
         name = "Which displacement won" if Part.TENSORS in parts else stage.title
         pages.append(_maps_page(stage, layout, name))
     if Part.TENSORS in parts:
-        slices = rrb.Vertical(*(_slice_row(stage.number, grid) for grid in stage.grids))
+        slices = rrb.Grid(*(_slices_view(stage.number, grid) for grid in stage.grids), grid_columns=2)
         pages.append(with_legend(slices, legend("Framed tiles", LEGEND_SLICES), "All displacements"))
+        rows = (_tensor_row(stage.number, grid) for grid in stage.grids)
+        pages.append(rrb.Vertical(*rows, name="One displacement, by sliders"))
         return rrb.Tabs(*pages, name=stage.title)
     return pages[0]
 
@@ -110,7 +121,7 @@ def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     def path(name: str) -> str:
         return entities.of_scale(number, grid.stride, name)
 
-    scale, cell = f"1/{grid.stride}", path(CHOSEN_CELL)
+    scale, cell = scale_name(grid), path(CHOSEN_CELL)
     views: list[View] = [map_view(f"{scale}: displacement that won", path(BEST_MATCH), number, grid, cell)]
     if layout.has_reference:
         views.append(map_view(f"{scale}: true displacement", path(TRUE_MATCH), number, grid, cell))
@@ -123,17 +134,21 @@ def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])
 
 
-def _slice_row(number: int, grid: Grid) -> View:
-    def path(name: str) -> str:
-        return entities.of_scale(number, grid.stride, name)
+def _slices_view(number: int, grid: Grid) -> View:
+    every = f"{scale_name(grid)}: a tile a displacement, dx → dy ↓; bright = probable"
+    return image_view(every, entities.of_scale(number, grid.stride, SLICES))
 
-    scale = f"1/{grid.stride}"
-    every = f"{scale}: a tile for every displacement, dx → dy ↓, steps of {grid.stride} px; bright = probable"
+
+def _tensor_row(number: int, grid: Grid) -> View:
+    kinds = {COST_VOLUME: "matching scores", PROBABILITY: "probability after the hourglass"}
     return rrb.Horizontal(
-        image_view(every, path(SLICES)),
-        tensor_view(f"{scale}: raw scores, sliders dy dx", path(COST_VOLUME)),
-        tensor_view(f"{scale}: probability, sliders dy dx", path(PROBABILITY)),
-        column_shares=[2.0, 1.0, 1.0],
+        *(
+            tensor_view(
+                f"{scale_name(grid)}: {kind}, displaced by dy, dx (middle: not at all)",
+                entities.of_scale(number, grid.stride, name),
+            )
+            for name, kind in kinds.items()
+        )
     )
 
 

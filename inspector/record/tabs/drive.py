@@ -17,19 +17,17 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate, Estimate
 from calibnet.verdict import Verdict
 from inspector import colors, entities
-from inspector.record.contents import Contents
+from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation
 from inspector.record.pictures.frame_overlays import FrameOverlays
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.table import matrix_lines
-from inspector.record.tabs.views import View, curve_view, legend, with_legend
+from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
 from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NAME = "Whole drive as one"
 
-BAND = 2.0
-"""Standard deviations on either side of the estimate: 95 % of the errors, if it is right about itself."""
 PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
 """Of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
@@ -61,12 +59,12 @@ def wanted(layout: Layout) -> bool:
 
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log the names and colours of the curves."""
-    names = {"estimate from the frames so far": colors.FOUND, f"± {BAND:g} standard deviations": colors.LIMIT}
-    log_names(rec, LEGEND_CURVES, names)
+    names = {"estimate from the frames so far": colors.FOUND, "± one standard deviation": colors.LIMIT}
+    log_names(rec, LEGEND_CURVES, names | frames_named(layout))
     rec.log_once(entities.DRIVE_TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
     for name in PARAMETERS:
         for kind, color in CURVES.items():
-            label = {"upper": f"+{BAND:g} σ", "lower": f"-{BAND:g} σ"}.get(kind, kind)
+            label = {"upper": "+1σ", "lower": "-1σ"}.get(kind, kind)
             width = 2.5 if kind == "estimate" else 1.0
             rec.log_once(curve(name, kind), rr.SeriesLines(names=label, colors=color, widths=width))
 
@@ -102,7 +100,7 @@ def log_drive(
         rec.log(entities.EXTRINSIC_DRIVE, rr.AnyValues(camera_from_lidar=current.camera_from_lidar.flatten()))
         error = pose_error(current.camera_from_lidar, origin)
         for name in PARAMETERS:
-            value, band = offset(error, name), BAND * deviation(current, name)
+            value, band = offset(error, name), deviation(current, name)
             for kind, level in (("estimate", value), ("upper", value + band), ("lower", value - band)):
                 rec.log(curve(name, kind), rr.Scalars(level))
 
@@ -126,6 +124,10 @@ def log_drive_overlay(rec: Subtree, observation: Observation, contents: Contents
     color = colors.LETTERS if verdict is None else colors.VERDICTS[verdict.word]
     overlays = FrameOverlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_DRIVE, name, observation.trace.initial, color)
+    if Part.OVERLAYS in contents.parts:  # in place of the frame's own result
+        rec.set_step(observation.frame.index, entities.STEP_RESULT)
+        overlays.log(rec, entities.OVERLAY_CURRENT, name, observation.trace.initial, color)
+        rec.set_step(observation.frame.index, 0)
 
 
 def _lines(
@@ -135,17 +137,20 @@ def _lines(
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     if estimate.verdict is not None:
         lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
+        if estimate.verdict.covariance is not None:
+            lines.pop()  # how sure it is and how far off make one paragraph
     solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"
     if reference is not None:
         error = pose_error(estimate.camera_from_lidar, reference)
         lines += [f"**Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm**, {solved}.", ""]
     else:
         lines += [f"{solved.capitalize()}.", ""]
-    for remark in remarks:
-        lines += [remark, ""]
+    lines += [*matrix_lines("The drive's", estimate.camera_from_lidar), ""]
+    if remarks:
+        lines += [f"Each frame alone: {' '.join(remarks)}", ""]
     if estimate.skipped:
         lines += ["Skipped:", "", *(f"- frame {bad.frame}: {bad.why}" for bad in estimate.skipped), ""]
-    return [*lines, *matrix_lines("The drive's", estimate.camera_from_lidar)]
+    return lines
 
 
 def offset(error: PoseError, name: str) -> float:

@@ -21,7 +21,7 @@ from inspector.record.pictures.legends import log_decided_legend
 from inspector.record.pictures.maps import decidedness, mass_on_truth, matching_probability, share_image
 from inspector.record.pictures.matches import StartingPoints
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, image_view, legend, map_view, with_legend
+from inspector.record.tabs.views import View, image_view, legend, map_view, scale_name, with_legend
 
 NAME = "Hourglass"
 
@@ -76,7 +76,7 @@ def _stage_pages(stage: StageLayout, layout: Layout) -> View:
 
 
 def _probability_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
-    scale = f"1/{grid.stride}"
+    scale = scale_name(grid)
     names = {DECIDED_BEFORE: "decided, before the hourglass", DECIDED_AFTER: "decided, after it"}
     if layout.has_reference:
         names |= {TRUTH_BEFORE: "share on the truth, before", TRUTH_AFTER: "share on the truth, after"}
@@ -88,7 +88,7 @@ def _probability_row(number: int, grid: Grid, layout: Layout, alone: bool) -> Vi
 
 
 def _channels_row(number: int, grid: Grid) -> View:
-    scale = f"1/{grid.stride}"
+    scale = scale_name(grid)
     return rrb.Horizontal(
         image_view(f"{scale}: channels before the hourglass", entities.of_scale(number, grid.stride, BEFORE)),
         image_view(f"{scale}: the same channels after it", entities.of_scale(number, grid.stride, AFTER)),

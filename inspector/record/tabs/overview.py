@@ -1,8 +1,8 @@
 """Tab *Overview*: the answer first, as one large picture and in words.
 
-The picture can be changed for that of the start, of the reference and, where all frames are solved as one, of a single
-frame's result, which on the timeline `entities.STEP` walks from the start to the reference; below it are the curves
-over the frames, and small pictures of start and reference.
+The large picture is that of the result: of the whole drive where it is solved as one. On the timeline `entities.STEP`
+it walks from the start through every stage and the reference to the result, and by the names above it it can be changed
+for these. Below it are the curves over the frames; beside it words, and under these the start and the reference.
 Its overlays are in every recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
 """
 
@@ -27,6 +27,7 @@ from inspector.record.tabs.views import (
     TITLE_HEIGHT,
     View,
     curve_view,
+    frames_named,
     legend,
     overlay_view,
     point_legend,
@@ -36,10 +37,8 @@ NAME = "Overview"
 
 LARGE_SHARE = 0.62
 """Of the tab's width that the large picture takes."""
-LARGEST_OVERLAY = 600.0
-"""Height in pixels beyond which what lies below it would have too little room."""
-SMALL_SHARE = 0.3
-"""Height of the small pictures, in heights of the text above them."""
+LARGEST_OVERLAY, LARGEST_SMALL = 600.0, 250.0
+"""Heights in pixels beyond which what else is in their column would have too little room."""
 _SMALL = (entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_REFERENCE)
 
 FIT = "fit"
@@ -84,39 +83,42 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 
 def view(layout: Layout) -> View:
     """The large picture above curves, and beside them what is to be said of it."""
-    corrected = {"Corrected": entities.OVERLAY_CORRECTED}
-    if layout.stages and Part.OVERLAYS in layout.contents.parts:
-        corrected = {"Corrected (on “step”: every stage)": entities.OVERLAY_CURRENT}
-    names = corrected | {layout.start: entities.OVERLAY_MISCALIBRATED}
-    if layout.with_drive:
-        names = {"Whole drive as one": entities.OVERLAY_DRIVE} | names
-    if layout.has_reference:
-        names["Reference (truth)"] = entities.OVERLAY_REFERENCE
+    names = _pictures(layout)
     pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
     left: list[View] = [rrb.Tabs(*pictures, active_tab=0, name="Result"), point_legend(layout)]
-    shares = [_large_height(layout), LEGEND_HEIGHT]
+    shares = [min(_height(layout, LARGE_SHARE) + 2 * TITLE_HEIGHT, LARGEST_OVERLAY), LEGEND_HEIGHT]
     if _curve_views(layout) and layout.stages and Part.CURVES in layout.contents.parts:
         curves = rrb.Horizontal(*_curve_views(layout))
         left += [curves, legend("Curves", LEGEND_CURVES)]
         shares += [SCREEN_HEIGHT - sum(shares) - LEGEND_HEIGHT, 0.8 * LEGEND_HEIGHT]
-    said: list[View] = [rrb.TextDocumentView(origin=entities.TABLE, name="This frame: what every stage did")]
+    said: list[View] = [rrb.TextDocumentView(origin=entities.TABLE, name="This frame, stage by stage")]
     if layout.with_drive:
-        said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The whole drive as one: the answer"))
-    small = [overlay_view(name, path, layout.image, caption=False) for name, path in names.items() if path in _SMALL]
-    right = [*said, rrb.Horizontal(*small)]
+        said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The answer: whole drive as one"))
+    small = [overlay_view(name, path, layout.image) for name, path in names.items() if path in _SMALL]
+    heights = [min(_height(layout, 1.0 - LARGE_SHARE) + TITLE_HEIGHT, LARGEST_SMALL)] * len(small)
     return rrb.Horizontal(
         rrb.Vertical(*left, row_shares=shares),
-        rrb.Vertical(*right, row_shares=[1.0] * len(said) + [SMALL_SHARE * len(said)]),
+        rrb.Vertical(rrb.Tabs(*said, active_tab=0), *small, row_shares=[SCREEN_HEIGHT - sum(heights), *heights]),
         column_shares=[LARGE_SHARE, 1.0 - LARGE_SHARE],
         name=NAME,
     )
 
 
-def _large_height(layout: Layout) -> float:
-    """Of the large picture with its caption, its title and the row of names above, in pixels of the screen."""
+def _pictures(layout: Layout) -> dict[str, str]:
+    """The names above the large picture, and the overlay that each shows; the result first."""
+    names = {"Result (on “step”: every stage)": entities.OVERLAY_CURRENT}
+    if not layout.stages or Part.OVERLAYS not in layout.contents.parts:
+        names = {"Result": entities.OVERLAY_DRIVE if layout.with_drive else entities.OVERLAY_CORRECTED}
+    if layout.with_drive:
+        names["This frame alone"] = entities.OVERLAY_CORRECTED
+    names[layout.start] = entities.OVERLAY_MISCALIBRATED
+    return names | ({"Reference (truth)": entities.OVERLAY_REFERENCE} if layout.has_reference else {})
+
+
+def _height(layout: Layout, share: float) -> float:
+    """Of a picture with its caption that takes this share of the screen's width, in pixels."""
     width, height = layout.image
-    picture = LARGE_SHARE * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
-    return min(picture + 2 * TITLE_HEIGHT, LARGEST_OVERLAY)
+    return share * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
 
 
 def _curve_views(layout: Layout) -> list[View]:
@@ -166,7 +168,8 @@ def _log_fit(rec: Subtree, observation: Observation) -> None:
 
 def _log_curve_styles(rec: Subtree, layout: Layout) -> None:
     looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
-    log_names(rec, LEGEND_CURVES, {f"after {name}": color for name, color in looks.values()} | {"limit": colors.LIMIT})
+    names = {f"after {name}": color for name, color in looks.values()} | {"limit": colors.LIMIT}
+    log_names(rec, LEGEND_CURVES, names | frames_named(layout))
     curves = {fit_stage(number): look for number, look in looks.items()} if layout.with_fit else {}
     limits = {FIT_LIMIT: "believed: below"} if layout.with_fit else {}
     for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():

@@ -97,12 +97,12 @@ def view(layout: Layout) -> View:
     if layout.has_reference:
         compared["reference"] = "reference"
     views = [_scene_view(f"Coloured through: {name}", part, cameras, layout) for name, part in compared.items()]
-    pages = [
-        _scene_view(name, through, list(dict.fromkeys([camera, *truth])), layout)
-        for name, (through, camera) in seen.items()
-    ]
-    side_by_side = with_legend(rrb.Horizontal(*views), legend("Cameras", LEGEND_CAMERAS), "Side by side")
-    return rrb.Tabs(side_by_side, *pages, name=NAME)
+    pages = {"Side by side": rrb.Horizontal(*views)}
+    for name, (through, camera) in seen.items():
+        shown = list(dict.fromkeys([camera, *truth]))
+        pages[name] = _scene_view(f"Coloured through: {uncapitalized(name)}", through, shown, layout)
+    legends = (legend("Cameras", LEGEND_CAMERAS) for _ in pages)
+    return rrb.Tabs(*map(with_legend, pages.values(), legends, pages), name=NAME)
 
 
 def frustum(

@@ -19,7 +19,7 @@ from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 NOTHING = "–"
 READING_AID = (
     "Where the calibration is right, jumps in the points' colours lie on the edges of the picture: change between the "
-    "pictures by their names above them, or choose *Corrected* and the timeline `step` below, and play: start, every "
+    "pictures by their names above them, or choose the timeline `step` below and press the arrow keys: start, every "
     "stage, truth and result of each frame follow one another in the same place."
 )
 

@@ -68,6 +68,11 @@ def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> r
     )
 
 
+def scale_name(grid: Grid) -> str:
+    """What a scale of a cost volume is called in names of views."""
+    return f"{grid.stride} px cells"
+
+
 def legend(name: str, path: str) -> rrb.Spatial2DView:
     """A static legend, without a title bar: its labels say it."""
     return rrb.Spatial2DView(origin=f"/{path}", name=name, titlebar=False, background=colors.GROUND)
@@ -92,17 +97,33 @@ def with_legend(view: View, below: View, name: str) -> View:
     return rrb.Vertical(view, below, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=name)
 
 
-def curve_view(name: str, origin: str, *contents: str) -> rrb.TimeSeriesView:
+def curve_view(name: str, origin: str, *contents: str, highest: float | None = None) -> rrb.TimeSeriesView:
     """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose.
 
-    Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them.
+    Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them. The range
+    of frames is left to the viewer, since one that is given would hold on the other timelines as well. It draws no tick
+    at the last frame, so that legends name that, see `frames_named`.
+
+    Args:
+        name: of the view.
+        origin: entity that lies above the curves.
+        contents: expressions that choose among them.
+        highest: value that just fits in, above zero; None for what the curves need.
     """
     return rrb.TimeSeriesView(
         origin=origin,
         contents=list(contents) or "$origin/**",
         name=name,
         plot_legend=rrb.PlotLegend(visible=False),
+        axis_y=None if highest is None else rrb.ScalarAxis(range=(0.0, highest)),
     )
+
+
+def frames_named(layout: Layout) -> dict[str, colors.Rgb]:
+    """What the legend of curves says of their ends, in a colour that has no dot."""
+    if layout.frames is None or layout.frames[0] == layout.frames[1]:
+        return {}
+    return {"from frame {} to {}".format(*layout.frames): colors.GROUND}
 
 
 def tensor_view(name: str, path: str) -> rrb.TensorView:

@@ -5,7 +5,8 @@ It is there where `Layout.with_watch` says so; a recording of ``calib-inspect wa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -16,20 +17,18 @@ from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
-from inspector.record.tabs.views import View, curve_view, legend, with_legend
+from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
 from inspector.run.watching import AXES, in_units
 
 NAME = "Did it move?"
 
-BAND = 2.0
-"""Standard deviations on either side: 95 % of the errors of a window, if noise is as it is measured."""
 TEXT = "watch/result"
 LEGEND = "legend/watch"
 CURVES = {
     "frames": ("single frames", colors.REST, 1.0),
     "estimate": (f"mean of {WINDOW} frames", colors.FOUND, 2.5),
-    "upper": (f"+{BAND:g} sigma", colors.LIMIT, 1.0),
-    "lower": (f"-{BAND:g} sigma", colors.LIMIT, 1.0),
+    "upper": ("+1σ", colors.LIMIT, 1.0),
+    "lower": ("-1σ", colors.LIMIT, 1.0),
 }
 """Of every axis: its name, colour and width."""
 CHANGE = "change"
@@ -52,7 +51,7 @@ def wanted(layout: Layout) -> bool:
 
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log names and colours of the curves."""
-    log_curve_styles(rec)
+    log_curve_styles(rec, frames_named(layout))
     rec.log_once(TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
 
 
@@ -60,10 +59,11 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
     """Log nothing of a single frame: a change needs those around it, see `log_watch`."""
 
 
-def log_curve_styles(rec: Subtree) -> None:
-    """Names and colours of the curves, and their legend."""
+def log_curve_styles(rec: Subtree, more: Mapping[str, colors.Rgb] = MappingProxyType({})) -> None:
+    """Names and colours of the curves, and their legend, in which more may stand."""
     names = {CURVES["frames"][0]: colors.REST, CURVES["estimate"][0]: colors.FOUND}
-    log_names(rec, LEGEND, names | {f"± {BAND:g} sigma": colors.LIMIT, "the mount has moved": colors.INITIAL})
+    names |= {"± one standard deviation": colors.LIMIT, "the mount has moved": colors.INITIAL}
+    log_names(rec, LEGEND, {**names, **more})
     mark = rr.SeriesPoints(names="the mount has moved", colors=colors.INITIAL, marker_sizes=MARK_SIZE)
     for axis in AXES:
         for kind, (name, color, width) in CURVES.items():
@@ -85,7 +85,7 @@ def log_watch(rec: Subtree, found: Watch | None, lines: Sequence[str], to_frame:
     if found is None:
         return
     moved = {change.frame for change in found.changes if change.until is None}
-    said, means, sigma = in_units(found.offsets), in_units(found.windowed), BAND * in_units(found.sigma)
+    said, means, sigma = in_units(found.offsets), in_units(found.windowed), in_units(found.sigma)
     levels = {"frames": said, "estimate": means, "upper": means + sigma, "lower": means - sigma}
     for row, frame in enumerate(found.frames):
         to_frame(int(frame))

@@ -26,12 +26,35 @@ def get(address: str, path: str = "", **headers: str) -> http.client.HTTPRespons
     return connection.getresponse()
 
 
+def happened() -> threading.Event:
+    event = threading.Event()
+    event.set()
+    return event
+
+
 @pytest.fixture
 def grown(tmp_path: Path) -> Iterator[tuple[Path, threading.Event, str]]:
     file, ended = tmp_path / "run.rrd", threading.Event()
     file.write_bytes(b"RRF2 first")
-    with PageServer(recording_app(file, tmp_path, ended)) as server:
+    with PageServer(recording_app(file, tmp_path, happened(), ended)) as server:
         yield file, ended, server.address
+
+
+def test_who_watches_from_before_the_first_frame_is_not_shown_an_earlier_run(tmp_path: Path) -> None:
+    file, begun, ended = tmp_path / "run.rrd", threading.Event(), threading.Event()
+    file.write_bytes(b"RRF2 earlier")
+    with PageServer(recording_app(file, tmp_path, begun, ended)) as server:
+        answer = get(server.address, RECORDING)
+        file.write_bytes(b"RRF2 now")
+        begun.set()
+        assert answer.read(8) == b"RRF2 now"
+        ended.set()
+        assert answer.read() == b""
+
+
+def test_who_watches_a_run_that_never_begins_is_let_go(tmp_path: Path) -> None:
+    with PageServer(recording_app(tmp_path / "run.rrd", tmp_path, threading.Event(), happened())) as server:
+        assert get(server.address, RECORDING).read() == b""
 
 
 def test_who_watches_gets_what_is_recorded_and_then_the_end(grown: tuple[Path, threading.Event, str]) -> None:
@@ -89,7 +112,7 @@ def test_an_address_that_is_none_is_one_sentence(bind: str) -> None:
 
 def test_beyond_this_machine_the_token_alone_is_asked_for(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("viewer")
-    with PageServer(recording_app(tmp_path / "run.rrd", tmp_path, threading.Event()), "0.0.0.0") as server:
+    with PageServer(recording_app(tmp_path / "run.rrd", tmp_path, happened(), threading.Event()), "0.0.0.0") as server:
         port = urlsplit(server.address).port
         assert get(server.address, Host=f"car.example:{port}").read() == b"viewer"
         assert get(server.address, Host=f"car.example:{port}", Origin="http://evil.example").status == 403
