@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 import threading
 import uuid
+from datetime import timedelta
 
 import rerun as rr
 
@@ -54,7 +55,8 @@ class TryRecording:
             tabs: that are shown where there is data for them.
         """
         rr.set_strict_mode(True)
-        self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=uuid.uuid4().hex)
+        whole = rr.ChunkBatcherConfig(flush_tick=timedelta(days=1))  # few chunks: a viewer takes some a picture
+        self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=uuid.uuid4().hex, batcher_config=whole)
         self._stream.set_log_time_enabled(False)
         self._rec = TrySubtree(self._stream)
         self._all_tabs, self._tabs = tabs, list[Tab]()
@@ -81,10 +83,11 @@ class TryRecording:
 
     def _open(self, layout: Layout) -> None:
         self._tabs = [tab for tab in self._all_tabs if tab.wanted(layout)]
+        # first of all: a slow viewer shows what it has, which would be every legend in a view of its own
+        self._stream.send_blueprint(make_blueprint(layout, self._tabs, timeline=TIMELINE, following=True))
         self._stream.send_recording_name("live")
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
-        self._stream.send_blueprint(make_blueprint(layout, self._tabs, timeline=TIMELINE, following=True))
 
     def _keep(self) -> None:
         """Hand on what was logged."""

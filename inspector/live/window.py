@@ -101,10 +101,10 @@ class WindowRecording(TryRecording):
         self._hand.number = number
         self._hand.set_frame(frame.index, 0.0)
         if self._shown is None:
-            self._stream.send_recording_name("live")
             layout = Layout.of(observation, CONTENTS)
-            self._picture.log_once(self._hand, layout)
             self._stream.send_blueprint(make_blueprint(layout, [self._picture], timeline=TIMELINE, following=True))
+            self._stream.send_recording_name("live")
+            self._picture.log_once(self._hand, layout)
         if frame is not self._shown:
             log_image(self._hand, frame)
             words = rr.TextDocument(NO_ANSWER.format(frame.index), media_type=rr.MediaType.MARKDOWN)

@@ -96,6 +96,14 @@ class Observation:
         """Error of an extrinsic against the reference; None without one."""
         return None if self.reference is None else pose_error(camera_from_lidar, self.reference)
 
+    @property
+    def worse(self) -> bool:
+        """Whether the result is known to be farther off than the start, in angle or place."""
+        before, after = self.error(self.trace.initial), self.error(self.trace.corrected)
+        if before is None or after is None:
+            return False
+        return after.rotation_deg > before.rotation_deg or after.translation_cm > before.translation_cm
+
 
 class Grid(NamedTuple):
     """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width`` of them."""

@@ -49,6 +49,7 @@ class Summary:
     started: float = field(default_factory=time.monotonic)
     ended: float | None = None
     _numbers: list[int] = field(default_factory=list, repr=False)
+    _worse: list[int] = field(default_factory=list, repr=False)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
     _change: list[PoseError] = field(default_factory=list, repr=False)
@@ -63,6 +64,8 @@ class Summary:
             self.verdicts[observation.frame.index] = trace.verdict
         if observation.reference is not None:
             self._numbers.append(observation.frame.index)
+        if observation.worse:
+            self._worse.append(observation.frame.index)
         word = None if trace.verdict is None else trace.verdict.word
         self.found = trace.corrected if self.frames == 1 and word != REJECTED else None
         self._change.append(pose_error(trace.corrected, trace.initial))
@@ -117,16 +120,9 @@ class Summary:
         if len(self._corrected) > 1:
             worst = max(range(len(self._corrected)), key=lambda position: self._corrected[position].translation_cm)
             lines.append(f"Worst: frame {self._numbers[worst]}, {_figures(self._corrected[worst])} left.")
-        worse = [
-            number
-            for number, before, after in zip(self._numbers, self._initial, self._corrected, strict=True)
-            if after.rotation_deg > before.rotation_deg or after.translation_cm > before.translation_cm
-        ]
-        if worse:
-            numbers = ", ".join(map(str, worse))
-            lines.append(
-                f"{len(worse)} of {_frames(len(self._corrected))} worse than before, in angle or place: {numbers}."
-            )
+        if self._worse:
+            count, numbers = len(self._worse), ", ".join(map(str, self._worse))
+            lines.append(f"{count} of {_frames(len(self._corrected))} worse than before, in angle or place: {numbers}.")
         return lines
 
     def matrix_lines(self) -> list[str]:

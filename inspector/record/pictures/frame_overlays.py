@@ -54,7 +54,8 @@ class FrameOverlays:
         """Log the points under what is believed in the end, and the verdict on it above."""
         trace = self._observation.trace
         word = "" if trace.verdict is None else trace.verdict.word
-        name = f"{REJECTED}, left as it was" if trace.rejected else ", ".join(filter(None, ["corrected", word]))
+        became = "worse than before" if self._observation.worse else "corrected"
+        name = f"{REJECTED}, left as it was" if trace.rejected else ", ".join(filter(None, [became, word]))
         self.log(rec, entity, name, trace.corrected, colors.VERDICTS.get(word, colors.LETTERS))
 
     def _under(self, camera_from_lidar: Extrinsic) -> Overlay:

@@ -59,15 +59,15 @@ def view(layout: Layout) -> View:
     """A page for every stage that shows something."""
     stages = [stage for stage in layout.stages if _shown(stage)]
     if len(stages) == 1:
-        return _page(stages[0], NAME)
-    return rrb.Tabs(*(_page(stage, stage.title) for stage in stages), name=NAME)
+        return _page(stages[0], layout, NAME)
+    return rrb.Tabs(*(_page(stage, layout, stage.title) for stage in stages), name=NAME)
 
 
 def _shown(stage: StageLayout) -> bool:
     return bool(stage.exhibits or stage.curves)
 
 
-def _page(stage: StageLayout, name: str) -> View:
+def _page(stage: StageLayout, layout: Layout, name: str) -> View:
     views: list[View] = [
         image_view(title, exhibit(stage.number, position)) for position, title in enumerate(stage.exhibits)
     ]
@@ -79,7 +79,9 @@ def _page(stage: StageLayout, name: str) -> View:
         )
         for position, title in enumerate(stage.curves)
     ]
-    return rrb.Grid(*views, grid_columns=min(COLUMNS, len(views)), name=name)
+    width, height = layout.image
+    columns = 1 if width > COLUMNS * height and len(views) <= COLUMNS else min(COLUMNS, len(views))
+    return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
 def _picture(shown: Exhibit) -> rr.EncodedImage | rr.Image:

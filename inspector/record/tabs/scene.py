@@ -97,7 +97,7 @@ def view(layout: Layout) -> View:
     if layout.has_reference:
         compared["reference"] = "reference"
     views = [_scene_view(f"Coloured through: {name}", part, cameras, layout) for name, part in compared.items()]
-    pages = {"Side by side": rrb.Horizontal(*views)}
+    pages: dict[str, View] = {"Side by side": rrb.Horizontal(*views)}
     for name, (through, camera) in seen.items():
         shown = list(dict.fromkeys([camera, *truth]))
         pages[name] = _scene_view(f"Coloured through: {uncapitalized(name)}", through, shown, layout)

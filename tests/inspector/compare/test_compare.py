@@ -64,7 +64,7 @@ def test_each_run_keeps_its_overlays_and_curves_and_nothing_else(
     file = tmp_path / "AB.rrd"
     code, out, _ = call(capsys, files["A"], files["B"], "--save", file)
     assert code == 0
-    assert out.startswith("A: 0.16° / 1.4 cm")
+    assert out.startswith("A: 0.16° / 1.4 cm off, median over 3 frames.")
     own = {"overlay/miscalibrated", "overlay/corrected", "error/rotation/corrected", "error/translation/corrected"}
     expected = {"/image", "/overlay/reference", *(f"/{name}/{path}" for name in "AB" for path in own)}
     rows = rows_of(file)
@@ -84,7 +84,7 @@ def test_every_view_has_data(files: dict[str, Path], tmp_path: Path, capsys: pyt
     paths = {chunk.entity_path for chunk in RrdReader(file).store().stream()}
     comparison = Comparison.of([read_run(files["A"]), read_run(files["B"])], names.split(","))
     shown = list(views(make_comparison_blueprint(comparison).root_container))
-    assert {"first: corrected", "second run: corrected", "second run: start", "Reference (truth)"} <= {
+    assert {"first: each frame alone", "second run: each frame alone", "second run: start", "Reference (truth)"} <= {
         str(view.name) for view in shown
     }
     for view in shown:
@@ -106,7 +106,7 @@ def test_other_frames_need_the_flag(files: dict[str, Path], tmp_path: Path, caps
 
 def test_the_table_says_what_changed(runs: dict[str, RecordedRun]) -> None:
     table = comparison_table(Comparison.of([runs["A"], runs["B"]], ["A", "B"]))
-    assert "### Errors over 3 frames" in table
+    assert "### Errors of each frame alone, over 3 frames" in table
     assert "| A, at the start |" in table
     assert "| seed | 1 | 2 |" in table
     assert "detail" not in table

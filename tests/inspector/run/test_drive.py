@@ -17,6 +17,7 @@ from inspector import entities
 from inspector.check import Limit, check_run
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from inspector.compare.blueprint import results_tab
 from inspector.compare.comparison import Comparison
 from inspector.compare.table import comparison_table
 from inspector.read.run import RecordedRun, read_run
@@ -24,6 +25,7 @@ from inspector.read.understood import RecordingError
 from inspector.report.metrics import Figures
 from inspector.report.verdict import headline
 from tests.support.fakes import FakeCascade
+from tests.support.layout import views
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -54,6 +56,18 @@ def test_every_frame_has_its_points_under_the_drives_extrinsic(file: Path, read:
     assert [frame for frame, _ in shown] == [0, 1, 2]
     captions = [row.as_py()[0] for _, row in read(file, entities.caption(entities.OVERLAY_DRIVE), "text")]
     assert captions == ["whole drive as one: 0.10°, 0.0 cm off"] * 3
+
+
+def test_on_steps_the_picture_walks_to_the_drives_result(file: Path, read: Read) -> None:
+    caption = entities.caption(entities.OVERLAY_CURRENT)  # of the rows at a time viewers show the last
+    said = {step: row.as_py()[0] for step, row in read(file, caption, "text", entities.STEP)}
+    for frame in range(3):
+        first = entities.STEPS_PER_FRAME * frame
+        assert said[first].startswith("miscalibrated: ")
+        assert said[first + entities.STEP_REFERENCE] == "reference"
+        assert said[first + entities.STEP_RESULT] == "whole drive as one: 0.10°, 0.0 cm off"
+    on_frames = {frame: row.as_py()[0] for frame, row in read(file, caption, "text")}
+    assert on_frames == dict.fromkeys(range(3), "whole drive as one: 0.10°, 0.0 cm off")
 
 
 def test_the_answer_has_the_matrix_and_the_frames_beside_it(file: Path, recorded: RecordedRun) -> None:
@@ -97,10 +111,28 @@ def test_check_holds_it_or_the_worst_frame_against_limits(recorded: RecordedRun,
         check_run(read_run(full_recording), [Limit("rotation", 1.0, "drive")])
 
 
-def test_a_comparison_has_both_drives(recorded: RecordedRun) -> None:
-    table = comparison_table(Comparison.of([recorded, recorded], ["A", "B"]))
-    assert "### Whole drive as one" in table
-    assert "| A | 0.10° | 0.0 cm |" in table and "| B | 0.10° | 0.0 cm |" in table
+def test_a_comparison_leads_with_the_drives(
+    file: Path,
+    record: Callable[..., Any],
+    read: Read,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    record(tmp_path / "alone.rrd", detail="overview", strides=(32,), drive=False)
+    together = tmp_path / "both.rrd"
+    assert run(cli, ["compare", str(file), str(tmp_path / "alone.rrd"), "--save", str(together), "--headless"]) == 0
+    drive, alone = capsys.readouterr().out.splitlines()[:2]
+    assert drive.startswith("drive: 0.10° / 0.0 cm off as one drive; ") and drive.endswith("median over 3 frames.")
+    assert alone.startswith("alone: 0.16° / 1.4 cm off, median")
+    comparison = Comparison.of([read_run(file), read_run(tmp_path / "alone.rrd")], ["drive", "alone"])
+    first = comparison_table(comparison).split("###")[1]
+    assert first.startswith(" Whole drive as one")
+    assert "| **drive** | – | 0.10° / 0.0 cm | – | – |" in first and "| **alone** | not solved | – | – | – |" in first
+    answers = [view.name for view in views(results_tab(comparison))][:2]
+    assert answers == ["drive: whole drive as one", "alone: each frame alone"]
+    (level,) = {row.as_py()[0] for _, row in read(together, "drive/error/rotation/drive", "Scalars:scalars")}
+    assert level == pytest.approx(0.1, abs=1e-6)
+    assert len(read(together, f"drive/{entities.OVERLAY_DRIVE}", "Points2D:positions")) == 3
 
 
 def test_frames_of_several_mounts_are_no_drive(record: Callable[..., Any], tmp_path: Path) -> None:

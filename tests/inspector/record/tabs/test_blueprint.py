@@ -54,7 +54,7 @@ def test_every_stage_and_scale_has_its_views() -> None:
     views = names(make_blueprint(layout()))
     for stage in ("stage 3 (±5°/0.5 m)", "stage 5 (±1°/0.1 m)"):
         assert f"After {stage}" in views
-    won = ["displacement that won", "true displacement", "how surely", "raw scores"]
+    won = ["displacement that won", "true displacement", "how surely", "matching scores"]
     for part in (*won, "decided, before", "share on the truth, after", "channels before"):
         assert sum(part in name for name in views) == 4, part
 
@@ -63,9 +63,13 @@ def test_every_stage_and_scale_has_its_views() -> None:
     ("has_reference", "contents", "absent"),
     [
         (False, Contents.of(Detail.FULL), ("eference", "error", "true", "iscalibrated")),
-        (True, Contents.of(Detail.OVERVIEW), ("raw scores", "sliders", "a tile for every")),
+        (True, Contents.of(Detail.OVERVIEW), ("matching scores", "sliders", "a tile a displacement")),
         (True, Contents.of(Detail.CUSTOM, frozenset({Part.SCENE})), ("After", "error", "hourglass", "displacement")),
-        (True, Contents.of(Detail.CUSTOM, frozenset({Part.CURVES})), ("oloured through", "After", "sliders")),
+        (
+            True,
+            Contents.of(Detail.CUSTOM, frozenset({Part.CURVES})),
+            ("oloured through", "After", "sliders"),
+        ),
     ],
 )
 def test_no_view_without_data(has_reference: bool, contents: Contents, absent: tuple[str, ...]) -> None:
@@ -102,8 +106,8 @@ def test_below_a_prefix_every_path_of_every_view_has_it() -> None:
         "- /car/left/error/rotation/corrected",
         "- /car/left/error/rotation/initial",
     ]
-    corrected = "Corrected (on “step”: every stage)"
-    assert queries(moved, corrected) == ["/car/left/image", "/car/left/overlay/current/**"]
+    result = "Result (on “step”: every stage)"
+    assert queries(moved, result) == ["/car/left/image", "/car/left/overlay/current/**"]
     assert queries(moved, "Yaw off the reference [deg]") == ["$origin/**"]
 
 

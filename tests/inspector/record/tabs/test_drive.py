@@ -113,5 +113,5 @@ def test_curves_and_the_result_are_recorded(tmp_path: Path, full_recording: Path
             if chunk.entity_path == f"/{curve('yaw', name)}" and "Scalars:scalars" in batch.schema.names:
                 curves.setdefault(name, []).extend(v[0] for v in batch.column("Scalars:scalars").to_pylist() if v)
     assert sorted(curves["estimate"]) == pytest.approx([0.5, 2.0])
-    assert sorted(curves["upper"]) == pytest.approx([0.5 + 0.4, 2.0 + 0.8])
-    assert sorted(curves["lower"]) == pytest.approx([0.5 - 0.4, 2.0 - 0.8])
+    assert sorted(curves["upper"]) == pytest.approx([0.5 + 0.2, 2.0 + 0.4])
+    assert sorted(curves["lower"]) == pytest.approx([0.5 - 0.2, 2.0 - 0.4])
