@@ -1,7 +1,7 @@
 """What takes long in a live session: running stages, solving the drive, looking for the worst frame, looking there.
 
 Each is a job of the session's worker. An answer is told before anything is recorded of it: its details, which cost as
-much again, are run and recorded when nobody waits.
+much again, are run stage by stage and recorded when nobody waits.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import contextlib
 import math
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from calibnet.errors import CalibrationError, ConfigError, DatasetError
 from calibnet.geometry import pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator
-from calibnet.trace import CascadeTrace, DriveEstimate
+from calibnet.trace import CascadeTrace, DriveEstimate, StageTrace
 from inspector.live.bench import Bench, StagedCalibrator
 from inspector.live.stream import TryRecording
 from inspector.live.tries import Try
@@ -119,10 +120,9 @@ class Answers:
         def compute(tell: Progress) -> Observation:
             if not seen:
                 self.stream.answer(made, answer)
-                tell(0, 2)
-                trace = method.calibrate(frame, made.steps[0].camera_from_lidar, detail=True)
+                trace = detailed(method, frame, answer.trace, tell)
                 seen.append(Observation(frame, trace, answer.reference))
-            tell(1, 2)
+            tell(1, 1)
             self.stream.log(made, seen[0])
             return seen[0]
 
@@ -206,6 +206,26 @@ class Answers:
             await found(float(np.linalg.norm(observation.frame.points[point, :3])))
 
         self._worker.ask(Job("looking there", compute, finish))
+
+
+def detailed(method: Calibrator, frame: Frame, answer: CascadeTrace, tell: Progress) -> CascadeTrace:
+    """An answer with all its details, looked at again stage by stage: between two of them it can make room.
+
+    Args:
+        method: that gave it.
+        frame: on this one.
+        answer: without details.
+        tell: called with (done, in all) before each stage; it may raise.
+    """
+    if not isinstance(method, StagedCalibrator):
+        tell(0, 1)
+        return method.calibrate(frame, answer.initial, detail=True)
+    stages = list[StageTrace]()
+    for done, stage in enumerate(answer.stages):
+        tell(done, len(answer.stages) + 1)
+        (seen,) = method.only(stage.number).calibrate(frame, stage.before, detail=True).stages
+        stages.append(replace(stage, detail=seen.detail, camera=seen.camera, upright=seen.upright))
+    return replace(answer, stages=tuple(stages))
 
 
 def _badness(trace: CascadeTrace, reference: Extrinsic | None) -> float:

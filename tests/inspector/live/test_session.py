@@ -12,7 +12,10 @@ import pytest
 
 from calibnet.datasets.folder import read_calibration_of
 from calibnet.errors import CalibrationError
+from calibnet.geometry import miscalibration
+from inspector.live.answers import detailed
 from inspector.live.session import LiveSession
+from inspector.live.worker import YieldedError
 from tests.support.fakes import REFERENCE, FakeCascade, make_frame
 
 Make = Callable[..., LiveSession]
@@ -212,3 +215,24 @@ def test_without_reference_there_are_no_errors(make: Make, heard_after: HeardAft
     assert all(step["error"] is None for step in told(heard, "try")[0]["steps"])
     assert told(heard, "problem")[0]["text"] == "No reference is known for these frames."
     np.testing.assert_allclose(session.bench.guess, REFERENCE)
+
+
+def test_details_are_those_of_a_whole_run_and_make_room_between_two_stages() -> None:
+    cascade, frame = FakeCascade(), make_frame(0)
+    initial = miscalibration([1, 0, 2], [0.1, 0, 0]) @ frame.camera_from_lidar
+    answer, whole = (cascade.calibrate(frame, initial, detail=detail) for detail in (False, True))
+    told = list[tuple[int, int]]()
+    found = detailed(cascade, frame, answer, lambda done, total: told.append((done, total)))
+    assert told == [(0, 4), (1, 4), (2, 4)]
+    assert found.verdict is answer.verdict
+    for mine, other in zip(found.stages, whole.stages, strict=True):
+        assert mine.detail is not None and other.detail is not None
+        np.testing.assert_array_equal(mine.detail.displacement, other.detail.displacement)
+        np.testing.assert_array_equal(mine.after, other.after)
+
+    def yields(done: int, _: int) -> None:
+        if done:
+            raise YieldedError
+
+    with pytest.raises(YieldedError):
+        detailed(cascade, frame, answer, yields)
