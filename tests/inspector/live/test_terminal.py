@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -63,7 +64,9 @@ class Window:
 
 
 @pytest.fixture
-def window(make: Callable[..., LiveSession], tmp_path: Path) -> Callable[..., Window]:
+def window(make: Callable[..., LiveSession], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Window]:
+    """Its keys are let go when they end, however long a busy machine takes between two of them."""
+    monkeypatch.setattr("inspector.live.terminal.RELEASE_S", math.inf)
     return lambda **given: Window(tmp_path / "window.rrd", make, **given)
 
 
