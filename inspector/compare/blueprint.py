@@ -79,7 +79,7 @@ def side_by_side(views: list[rrb.Spatial2DView]) -> View:
 
 
 def _answer(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
-    if run.run.drive is None:
+    if not run.shows_drive:
         return _alone(comparison, run)
     return _overlay(comparison, f"{run.name}: whole drive as one", run.path(entities.OVERLAY_DRIVE))
 

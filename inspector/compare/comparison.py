@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import rerun as rr
@@ -48,6 +49,11 @@ class ComparedRun:
     def corrected(self) -> Metrics | None:
         """Errors after the last stage; None without reference."""
         return self._metrics([frame.error(frame.corrected) for frame in self.frames])
+
+    @cached_property
+    def shows_drive(self) -> bool:
+        """Whether it has overlays of its drive; recordings of version 0.1.0 have only the drive's extrinsic."""
+        return next(self.run.chunks(entities.OVERLAY_DRIVE), None) is not None
 
     def distance(self, other: ComparedRun) -> Metrics:
         """How far the result lies from another run's, frame by frame."""
