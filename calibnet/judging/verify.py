@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -125,10 +126,17 @@ def probability_within(offset: Vector6, covariance: Matrix6, tolerance: Toleranc
         covariance: ``[6, 6]`` of it.
         tolerance: how far off is good.
     """
-    draws = np.random.default_rng(0).multivariate_normal(offset, covariance, SAMPLES, method="eigh")
-    turned, shifted = (np.linalg.norm(draws[:, rows], axis=1) for rows in (ROTATION, TRANSLATION))
-    within = (turned <= np.radians(tolerance.rotation_deg)) & (shifted <= tolerance.translation_cm / 100)
-    return float(within.mean())
+    variances, axes = np.linalg.eigh(covariance)
+    draws = offset[:, None] + (axes * np.sqrt(np.maximum(variances, 0.0))) @ _draws()
+    turned, shifted = ((draws[rows] ** 2).sum(axis=0) for rows in (ROTATION, TRANSLATION))
+    within = turned <= np.radians(tolerance.rotation_deg) ** 2
+    return float((within & (shifted <= (tolerance.translation_cm / 100) ** 2)).mean())
+
+
+@cache
+def _draws() -> Floats:
+    """``[6, SAMPLES]`` of the standard normal distribution: a fleet asks ten thousand times."""
+    return np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, 6)).T)
 
 
 def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> bool:

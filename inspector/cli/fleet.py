@@ -6,7 +6,7 @@ import secrets
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 LOOKING = 8
 """Threads that look which drives are done: they mostly wait for file systems."""
 EVERY_S = 30.0
-"""Seconds between two writings of the table while drives are done."""
+"""Seconds between two writings of the table while drives are done; a tenth of the time at most goes there."""
+MOST_NEWS = 10
+"""Cars that are named in the end; the page has all."""
 STOPPING = "Stopping when the drives under way are done; once more gives them up."
 
 
@@ -128,16 +130,19 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     pieces = [task for task, row in zip(tasks, looked, strict=True) if row is None]
     if rows:
         say(f"{len(rows)} of {len(tasks)} drives are done already, on the same input, weights and options.", err=True)
-    interrupted, gone, started, written = False, "", time.monotonic(), time.monotonic()
+    interrupted, gone, started = False, "", time.monotonic()
+    written, took = started, 0.0
     store = tasks[0].store
     try:
         with StopRequest(STOPPING) as stop, fleet_progress(len(pieces)) as progress:
             for outcome in run_all(engine, do_drive, pieces, stop, lambda text: say(text, err=True)) if pieces else ():
                 rows[outcome.work.drive.folder] = row = settled(outcome)
                 progress.advance(row)
-                if time.monotonic() - written > EVERY_S:
+                if time.monotonic() - written > max(EVERY_S, 10 * took):
+                    begun = time.monotonic()
                     keep_table(tasks, rows)
                     written = time.monotonic()
+                    took = written - begun
             interrupted = stop.requested and len(rows) < len(tasks)
     except KeyboardInterrupt:
         interrupted = True
@@ -147,6 +152,8 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     seconds = time.monotonic() - started
     new = len(in_order) - (len(tasks) - len(pieces))
     say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {new} of them done now, in {seconds:.0f} s.")
+    for sentence in news(in_order):
+        say(sentence)
     say(f"Table: {store.root}/{TABLE}")
     if interrupted or gone:
         again = shlex.join(["calib-inspect", *sys.argv[1:]]) if "--force" not in sys.argv else "it without --force"
@@ -154,6 +161,19 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
         return ExitCode.INTERRUPTED if interrupted else ExitCode.BAD_INPUT
     say(f"A page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
     return ExitCode.OK
+
+
+def news(rows: Sequence[Row]) -> Iterator[str]:
+    """What a fleet's people want to know first: what only cars tell, and whose mount moved."""
+    from inspector.fleet.history import histories
+    from inspector.fleet.ledger import told_together
+
+    if together := told_together(rows):
+        yield together
+    moved = [car for car in histories(rows) if car.moves]
+    yield from (f"{car.name}: {car.sentence}" for car in moved[:MOST_NEWS])
+    if len(moved) > MOST_NEWS:
+        yield f"{len(moved) - MOST_NEWS} more cars have a mount that moved."
 
 
 def needs_work_or_checked(task: Task) -> Row | None:
@@ -185,10 +205,11 @@ def settled(outcome: Outcome[Task, Row]) -> Row:
 
 
 def keep_table(tasks: Sequence[Task], rows: dict[str, Row]) -> list[Row]:
-    """Write the rows that there are, in the order of the list, and hand them back."""
+    """Write the rows that there are, in the order of the list, each judged by its car as well, and hand them back."""
+    from inspector.fleet.history import judged_by_cars
     from inspector.fleet.table import TABLE, table_bytes, write_table
 
-    in_order = [rows[task.drive.folder] for task in tasks if task.drive.folder in rows]
+    in_order = judged_by_cars([rows[task.drive.folder] for task in tasks if task.drive.folder in rows])
     store = tasks[0].store
     try:
         if store.local is not None:

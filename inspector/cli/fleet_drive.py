@@ -25,7 +25,7 @@ from inspector.cli.sequences import judged_options, over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
-from inspector.fleet.table import FAILED, PAGE, RECORDING, VERDICT, Row, of_verdict, row_of
+from inspector.fleet.table import FAILED, METRICS, PAGE, RECORDING, VERDICT, Row, flat, of_verdict, row_of
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
@@ -182,12 +182,20 @@ def _verified(task: Task, path: Path, started: float) -> Row:
             _record_sentence(drive, folder, FAILED, "", failed.sentence)
             raise failed from None
         said = json.loads(read_file(folder / VERDICT, "Verdict", LONGEST_JSON))
-        columns = of_verdict(said)
+        columns = of_verdict(said) | {"given_camera_from_lidar": _given(folder / METRICS)}
         if not (folder / RECORDING).exists():
             _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])
         files = {"json": VERDICT, "report": PAGE, "recording": RECORDING}
         there = {name: f"{drive.folder}/{file}" for name, file in files.items() if (folder / file).exists()}
     return row_of(drive, **columns, **there, seconds=time.monotonic() - started)
+
+
+def _given(metrics: Path) -> tuple[float, ...] | None:
+    """The calibration that a drive had, from the figures of its report; None where there is no report."""
+    if not metrics.exists():
+        return None
+    frames = json.loads(read_file(metrics, "Figures of a report", LONGEST_JSON))["per_frame"]
+    return flat(frames[0]["initial_camera_from_lidar"])
 
 
 def _commands(act: Callable[..., int]) -> click.Group:
@@ -219,7 +227,7 @@ def _clear(folder: Path) -> None:
     """Remove what an earlier run left: a drive that fails must not show another's report."""
     pictures = folder / "pictures"
     for path in (
-        *(folder / name for name in (ENTRY, VERDICT, PAGE, RECORDING, "metrics.json")),
+        *(folder / name for name in (ENTRY, VERDICT, PAGE, RECORDING, METRICS)),
         *pictures.glob("*.jpg"),
     ):
         path.unlink(missing_ok=True)

@@ -200,7 +200,8 @@ def _client(engine: Engine) -> Iterator[Client]:
     from distributed import Client, LocalCluster
     from distributed.security import Security
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):  # it gives some of them levels of their own
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     with ExitStack() as stack:
         if engine.scheduler is not None:
             try:

@@ -14,7 +14,7 @@ from calibnet.runtime.reading import parse_json
 from calibnet.runtime.schema import validated
 from inspector.fleet.drives import Drive
 from inspector.fleet.places import Store
-from inspector.fleet.table import FAILED, Row, row_of
+from inspector.fleet.table import FAILED, ORDER, Row, row_of
 
 ENTRY = "drive.json"
 LARGEST = 1 << 20
@@ -78,8 +78,12 @@ def failed_row(drive: Drive, sentence: str, seconds: float = 0.0, recording: str
 
 
 def counted(rows: Sequence[Row]) -> str:
-    """How many drives have each verdict, in words."""
-    from inspector.fleet.table import WORDS
-
-    counts = {word: sum(row.verdict == word for row in rows) for word in reversed(WORDS)}
+    """How many drives are what, in words, as `Row.word` has it."""
+    counts = {word: sum(row.word == word for row in rows) for word in reversed(ORDER)}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "none"
+
+
+def told_together(rows: Sequence[Row]) -> str:
+    """How many of them say that only with the other drives of their car; empty for none."""
+    count = sum(row.word != row.verdict for row in rows)
+    return f"{count} of them by what all drives of the car say together." if count else ""

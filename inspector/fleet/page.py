@@ -12,15 +12,15 @@ from urllib.parse import quote
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
-from inspector.fleet.ledger import counted
-from inspector.fleet.table import FAILED, TABLE, WORDS, Row, off, worst_first
+from inspector.fleet.ledger import counted, told_together
+from inspector.fleet.table import APART, FAILED, ORDER, TABLE, Row, off, worst_first
 from inspector.report.page import stylesheet
 
 PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
-GRADES = {"accepted": "good", "cannot tell": "fair", "rejected": "bad", FAILED: "none"}
-HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "frames", "why", "picture")
+GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
+HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
 PICTURES = tuple(f"pictures/{name}_corrected.jpg" for name in ("median", "best", "worst"))
 """Of a drive's report: its middle frame as it was corrected or, where there are few, another one."""
 
@@ -47,7 +47,7 @@ def make_page(rows: Sequence[Row], folder: Path) -> str:
     return template.substitute(
         style=stylesheet(),
         headline=escape(f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"),
-        about=escape(_moved(sum(bool(car.moves) for car in cars))),
+        about=escape(f"{told_together(rows)} {_moved(sum(bool(car.moves) for car in cars))}".strip()),
         cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
         more_cars=_more(len(cars), MOST_CARS, "cars"),
         heads="".join(_head(name) for name in HEADS),
@@ -71,8 +71,8 @@ def _car(car: History) -> str:
 
 
 def _square(row: Row, moved: bool) -> str:
-    css = GRADES[row.verdict] + (" moved" if moved else "")
-    title = escape(f"{row.drive} {row.date[:10]}: {row.verdict}")
+    css = GRADES[row.word] + (" moved" if moved else "")
+    title = escape(f"{row.drive} {row.date[:10]}: {row.word}")
     if not row.report:
         return f'<span class="{css}" title="{title}"></span>'
     return f'<a class="{css}" href="{_link(row.report)}" title="{title}" aria-label="{title}"></a>'
@@ -87,26 +87,37 @@ def _row(row: Row, folder: Path) -> str:
     linked = f'<a href="{_link(row.report)}">{drive}</a>' if row.report else drive
     recording = f'<br><a class="about" href="{_link(row.recording)}">recording</a>' if row.recording else ""
     cause = f"<br>{escape(row.cause)}" if row.cause else ""
+    alone = f'<br><span class="about">by its car; alone: {row.verdict}</span>' if row.word != row.verdict else ""
     used = f"{row.frames}" + (f"<br>{row.skipped} skipped" if row.skipped else "")
     cells = [
         f"<td>{escape(row.car)}</td>",
         f"<td>{linked}{recording}</td>",
         f"<td>{escape(row.date[:10])}</td>",
-        f'<td class="word {GRADES[row.verdict]}" data-key="{WORDS.index(row.verdict)}">{row.verdict}{cause}</td>',
-        _pair(row.moved_deg, row.moved_cm, off(row)),
-        _pair(row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
-        f'<td class="number" data-key="{row.frames}">{used}</td>',
-        f'<td class="reason">{escape(one_line(row.reason, 600))}</td>',
+        f'<td class="word {GRADES[row.word]}" data-key="{ORDER.index(row.word)}">{row.word}{cause}{alone}</td>',
+        _pair("moved", row.moved_deg, row.moved_cm, off(row)),
+        _pair("sigma", row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
+        _pair("by its car", row.by_car_moved_deg, row.by_car_moved_cm, row.by_car_moved_deg or 0.0),
+        f'<td class="number" data-key="{row.frames}" data-head="frames">{used}</td>',
+        f'<td class="reason">{_reasons(row)}</td>',
         f"<td>{_picture(row, folder)}</td>",
     ]
     return f"<tr>{''.join(cells)}</tr>"
 
 
-def _pair(degrees: float | None, centimetres: float | None, key: float) -> str:
+def _reasons(row: Row) -> str:
+    """Why: first what the word is for, then what else there is."""
+    alone, together = (escape(one_line(text, 600)) for text in (row.reason, row.by_car_reason))
+    if row.word != row.verdict:
+        return f'{together}<br><span class="about">Alone: {alone}</span>'
+    return alone + (f'<br><span class="about">By its car: {together}</span>' if together else "")
+
+
+def _pair(head: str, degrees: float | None, centimetres: float | None, key: float) -> str:
     """Rotation and translation in one cell, and what it is sorted by."""
     if degrees is None or centimetres is None:
         return '<td class="number" data-key=""></td>'
-    return f'<td class="number" data-key="{key:.4f}">{degrees:.2f}°<br>{centimetres:.1f} cm</td>'
+    text = f"{degrees:.2f}°<br>{centimetres:.1f} cm"
+    return f'<td class="number" data-key="{key:.4f}" data-head="{head}">{text}</td>'
 
 
 def _picture(row: Row, folder: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -12,6 +13,7 @@ from annotated_types import Len
 
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.judging.verify import DRIVE
 from calibnet.runtime.reading import require_file
 from calibnet.runtime.schema import validated
 from calibnet.runtime.text import one_line
@@ -22,8 +24,13 @@ from inspector.fleet.drives import Drive
 TABLE = "fleet.parquet"
 FAILED = "failed"
 WORDS = (FAILED, "rejected", "cannot tell", "accepted")
-"""Worst first."""
-RECORDING, VERDICT, PAGE = "recording.rrd", "verdict.json", "index.html"
+"""Of a drive by itself, worst first."""
+ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
+APART: ByCar = "apart"
+"""Of a drive that says something else than the others of its car."""
+ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
+"""Of what is known of a drive, worst first."""
+RECORDING, VERDICT, PAGE, METRICS = "recording.rrd", "verdict.json", "index.html", "metrics.json"
 """Files of a drive, in its folder."""
 LARGEST = 1 << 30
 
@@ -42,11 +49,17 @@ class Row:
         verdict: on the calibration that it had: accepted, rejected, cannot tell; or failed.
         cause: names of what is wrong with the input, with commas; empty where the mount moved or nothing is wrong.
         reason: a sentence.
+        by_car: verdict on the same calibration of all drives of the car together, ``inspector.fleet.history``;
+            apart, where this drive says something else than they; empty where they say nothing.
+        by_car_reason: a sentence.
+        by_car_moved_deg, by_car_moved_cm: from the calibration that it had to what the drives of the car find.
+        by_car_sigma_deg, by_car_sigma_cm: standard deviation of that.
         moved_deg, moved_cm: from the calibration that it had to what was found.
         sigma_deg, sigma_cm: standard deviation of what was found, over all axes.
         frames, skipped: how many were used, and left out.
         seconds: that it took.
-        camera_from_lidar: what was found, 16 numbers row by row.
+        given_camera_from_lidar: the calibration that it had, 16 numbers row by row.
+        camera_from_lidar: what was found, likewise.
         covariance: of it, 36 numbers row by row, ``(translation m, rotation rad)``.
         folder: of its results, below the fleet's.
         recording, report, json: files in the fleet's folder; empty where there is none.
@@ -64,6 +77,12 @@ class Row:
     verdict: Literal["accepted", "rejected", "cannot tell", "failed"]
     cause: str = ""
     reason: str = ""
+    by_car: ByCar = ""
+    by_car_reason: str = ""
+    by_car_moved_deg: float | None = None
+    by_car_moved_cm: float | None = None
+    by_car_sigma_deg: float | None = None
+    by_car_sigma_cm: float | None = None
     moved_deg: float | None = None
     moved_cm: float | None = None
     sigma_deg: float | None = None
@@ -71,12 +90,24 @@ class Row:
     frames: int = 0
     skipped: int = 0
     seconds: float = 0.0
+    given_camera_from_lidar: Sixteen | None = None
     camera_from_lidar: Sixteen | None = None
     covariance: ThirtySix | None = None
     folder: str = ""
     recording: str = ""
     report: str = ""
     json: str = ""
+
+    @property
+    def word(self) -> str:
+        """What is known of its calibration: by itself or, where that is less or better, by the drives of its car."""
+        heard = {"cannot tell": ("accepted", "rejected", APART), "accepted": ("rejected", APART)}
+        return self.by_car if self.by_car in heard.get(self.verdict, ()) else self.verdict
+
+    @property
+    def given(self) -> Extrinsic | None:
+        """The calibration that it had, 4x4."""
+        return None if self.given_camera_from_lidar is None else np.reshape(self.given_camera_from_lidar, (4, 4))
 
     @property
     def extrinsic(self) -> Extrinsic | None:
@@ -122,21 +153,26 @@ def of_verdict(content: dict[str, Any]) -> dict[str, Any]:
         "moved_cm": content["moved"]["translation_cm"],
         "sigma_deg": sigma["rotation_deg"],
         "sigma_cm": sigma["translation_cm"],
-        "camera_from_lidar": _flat(content["camera_from_lidar"]),
-        "covariance": _flat(sigma["covariance"]),
+        "camera_from_lidar": flat(content["camera_from_lidar"]),
+        "covariance": flat(sigma["covariance"]),
         "frames": content["frames"]["used"],
         "skipped": len(content["frames"]["skipped"]),
     }
 
 
 def worst_first(rows: Iterable[Row]) -> list[Row]:
-    """Failed, rejected, cannot tell, accepted; among equals those that moved most, against what is tolerated."""
-    return sorted(rows, key=lambda row: (WORDS.index(row.verdict), -off(row), row.car, row.date, row.drive))
+    """Failed, rejected, apart from their car's others, cannot tell, accepted; among equals those farthest off."""
+    return sorted(rows, key=lambda row: (ORDER.index(row.word), -off(row), row.car, row.date, row.drive))
 
 
 def off(row: Row) -> float:
-    """How far off a drive's calibration is, in tolerances of `calibnet.judging.verify.DRIVE`."""
-    return max((row.moved_deg or 0.0) / 0.5, (row.moved_cm or 0.0) / 15.0)
+    """How far off a drive's calibration is: in tolerances of `calibnet.judging.verify.DRIVE`, or in two deviations.
+
+    Whichever is more counts, so that what moved far for want of frames does not stand before what is sure.
+    """
+    turn = (row.moved_deg or 0.0) / math.hypot(DRIVE[-1].rotation_deg, 2 * (row.sigma_deg or 0.0))
+    shift = (row.moved_cm or 0.0) / math.hypot(DRIVE[-1].translation_cm, 2 * (row.sigma_cm or 0.0))
+    return max(turn, shift)
 
 
 def table_bytes(rows: Sequence[Row]) -> bytes:
@@ -177,5 +213,6 @@ def read_table(file: Path) -> list[Row]:
     return list(validated(tuple[Row, ...], rows, str(file), DatasetError, "make it with `calib-inspect fleet`"))
 
 
-def _flat(matrix: Sequence[Sequence[float]] | None) -> tuple[float, ...] | None:
+def flat(matrix: Sequence[Sequence[float]] | None) -> tuple[float, ...] | None:
+    """A matrix row by row, as a row of the table has it."""
     return None if matrix is None else tuple(float(value) for line in matrix for value in line)

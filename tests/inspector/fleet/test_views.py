@@ -16,7 +16,7 @@ from calibnet.geometry import miscalibration
 from calibnet.training.data import open_data
 from inspector.fleet import viewing
 from inspector.fleet.drives import Drive
-from inspector.fleet.history import histories
+from inspector.fleet.history import histories, judged_by_cars
 from inspector.fleet.page import make_page
 from inspector.fleet.table import FAILED, TABLE, Row, read_table, row_of, worst_first, write_table
 from tests.inspector.fleet.conftest import Invoke, rows_of
@@ -36,6 +36,7 @@ def row(drive: str, verdict: str = "accepted", found: np.ndarray = REFERENCE, **
         sigma_cm=1.7,
         moved_deg=0.0,
         moved_cm=0.0,
+        given_camera_from_lidar=tuple(REFERENCE.ravel().tolist()),
     )
     return replace(of, **more)  # type: ignore[arg-type]
 
@@ -70,6 +71,76 @@ def test_a_move_within_the_tolerance_is_none() -> None:
     little = miscalibration([0.0, 0.3, 0.0], [0.0, 0.0, 0.0]) @ REFERENCE
     (history,) = histories([row("d1"), row("d2", found=little)])
     assert history.moves == ()
+
+
+def unsure(drive: str, found: np.ndarray = REFERENCE, **more: object) -> Row:
+    """A drive that cannot tell by itself."""
+    wide = {"covariance": tuple((4 * COVARIANCE).ravel().tolist()), "sigma_deg": 0.18, "sigma_cm": 3.4}
+    return row(drive, "cannot tell", found, **wide, **more)
+
+
+def test_drives_that_cannot_tell_do_so_together() -> None:
+    rows = judged_by_cars([unsure("d1"), unsure("d2"), unsure("d3")])
+    assert [(one.verdict, one.by_car, one.word) for one in rows] == [("cannot tell", "accepted", "accepted")] * 3
+    assert rows[0].by_car_reason.startswith("3 drives of the car agree. The calibration is off by no more than")
+    assert rows[0].by_car_moved_deg == pytest.approx(0.0, abs=1e-6)
+    assert 0.17 < (rows[0].by_car_sigma_deg or 0.0) < 0.25, "what drives get wrong alike stays: 0.1° on three axes"
+
+
+def test_two_drives_do_not_say_more_than_each_by_itself() -> None:
+    rows = judged_by_cars([unsure("d1"), unsure("d2")])
+    assert [one.by_car for one in rows] == ["", ""]
+
+
+def test_a_mount_that_moved_is_told_by_drives_that_cannot_tell() -> None:
+    rows = [unsure(f"d{at}", REFERENCE if at < 4 else MOVED) for at in range(1, 7)]
+    (history,) = histories(rows)
+    (move,) = history.moves
+    assert (move.before.drive, move.after.drive, move.drives, move.certain) == ("d3", "d4", 3, True)
+    assert move.rotation_deg == pytest.approx(2.0, abs=1e-6)
+    judged = judged_by_cars(rows)
+    assert [one.word for one in judged] == ["accepted"] * 3 + ["rejected"] * 3
+    assert judged[3].by_car_moved_deg == pytest.approx(2.0, abs=1e-6)
+    assert [one.drive for one in worst_first(judged)][:3] == ["d4", "d5", "d6"]
+
+
+def test_the_last_drive_alone_only_seems_to_have_moved() -> None:
+    (history,) = histories([*(unsure(f"d{at}") for at in range(1, 6)), unsure("d6", MOVED)])
+    (move,) = history.moves
+    assert (move.before.drive, move.after.drive, move.certain) == ("d5", "d6", False)
+    assert "seems to have moved between d5 and d6, by 2.00°" in history.sentence
+    assert "too few drives yet" in history.sentence
+    assert [one.by_car for one in history.judged()] == ["accepted"] * 5 + ["apart"]
+
+
+def test_one_drive_in_the_middle_stands_apart() -> None:
+    rows = [unsure(f"d{at}", MOVED if at == 3 else REFERENCE) for at in range(1, 7)]
+    (history,) = histories(rows)
+    assert history.moves == ()
+    assert "d3 stands apart from the others." in history.sentence
+    judged = list(history.judged())
+    assert [one.word for one in judged].count("accepted") == 5
+    assert judged[2].word == "apart"
+    assert judged[2].by_car_reason == "It stands apart: 5 other drives find the mount 2.00° / 1 cm elsewhere."
+
+
+def test_a_car_whose_input_is_wrong_accepts_nothing() -> None:
+    wrong = [row(f"w{at}", "rejected", MOVED, cause="focal-length") for at in range(4)]
+    judged = judged_by_cars([*wrong, unsure("d1"), unsure("d2"), unsure("d3")])
+    assert [one.by_car for one in judged[4:]] == ["cannot tell"] * 3
+    assert [one.by_car for one in judged[:4]] == [""] * 4
+
+
+def test_what_a_car_says_does_not_stay_when_its_drives_are_gone() -> None:
+    (first, *_) = judged_by_cars([unsure("d1"), unsure("d2"), unsure("d3")])
+    (again,) = judged_by_cars([first])
+    assert again == unsure("d1")
+
+
+def test_an_accepted_drive_that_stands_apart_is_no_longer_accepted() -> None:
+    rows = [unsure(f"d{at}") for at in range(1, 4)] + [row("d4", "accepted", MOVED)] + [unsure("d5"), unsure("d6")]
+    judged = {one.drive: one for one in judged_by_cars(rows)}
+    assert (judged["d4"].verdict, judged["d4"].word) == ("accepted", "apart")
 
 
 def test_the_worst_comes_first() -> None:
