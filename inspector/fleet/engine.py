@@ -40,6 +40,7 @@ SETTINGS = {
     "distributed.scheduler.allowed-failures": TRIES - 1,
     "distributed.admin.tick.limit": "1h",  # a busy machine is no news
     "distributed.worker.memory.terminate": 0.95,
+    "distributed.deploy.lost-worker-timeout": "1000h",  # or one that takes long to come back is given up for ever
 }
 
 
@@ -166,19 +167,28 @@ def _on(
 
 
 def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Done:
-    """Do a piece on a worker that has room; one whose memory is taken ends first, and its nanny starts another.
+    """Do a piece on a worker that has room; one whose memory is taken retires first, and its nanny starts another.
 
     Libraries keep some memory of whatever they did, Rerun 7 MB a recording. Nothing is under way at this moment, so
-    nothing is lost; beyond 0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle.
+    nothing is lost; beyond 0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle. A
+    worker that simply ended would count against its piece, which finds the next one as full, for all fill alike.
     """
-    from distributed import get_worker
+    from distributed import Reschedule, get_worker
 
     worker = get_worker()
     limit = worker.memory_manager.memory_limit
     if limit and worker.nanny and worker.monitor.get_process_memory() > FULL * limit:
         time.sleep(FETCH_S)  # for the result of the piece before, which lies here
-        os._exit(0)
+        worker.loop.add_callback(_retire, worker)
+        raise Reschedule
     return act(piece)
+
+
+async def _retire(worker: Any) -> None:
+    """Take leave of the scheduler, and end; a worker that closes in order sometimes never does."""
+    leave = {"close_workers": False, "remove": True, "stimulus_id": f"memory-{time.time()}"}
+    await worker.scheduler.retire_workers(workers=[worker.address], **leave)
+    os._exit(0)
 
 
 def _not_begun(client: Client, works: dict[Any, Any]) -> list[Any]:

@@ -1,6 +1,6 @@
 """What the drives of a car say together: where its mount was, when it moved, and how good each calibration was.
 
-A drive alone often cannot tell; all drives of a car between two moves of its mount can (`calibnet.drive.mount`). What
+A drive alone often cannot tell; all drives of a car between two moves of its mount can (`calibnet.judging.mount`). What
 they agree on is held against the calibration that each of them had, as `verify` does it for one.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 
-from calibnet.drive.mount import Finding, Mount, Stay, difference, excess_of, mount_over
+from calibnet.judging.mount import Finding, Mount, Stay, difference, excess_of, mount_over
 from calibnet.judging.verify import DRIVE, verify
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict
 from inspector.fleet.table import APART, FAILED, ByCar, Row

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from calibnet.drive.mount import ALIKE_DEG, ALIKE_M, FEWEST, Finding, difference, excess_of, mount_over
+from calibnet.judging.mount import ALIKE_DEG, ALIKE_M, FEWEST, Finding, difference, excess_of, mount_over
 from calibnet.geometry import miscalibration, pose_error
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic

@@ -101,7 +101,8 @@ def mount_over(findings: Sequence[Finding], excess: float = USUAL_EXCESS) -> Mou
         findings: of its drives, in the order in which they were driven.
         excess: of their squared errors, `excess_of`.
     """
-    kept, apart = list(range(len(findings))), []
+    kept = list(range(len(findings)))
+    apart: list[int] = []
     while kept:
         said = _Said([findings[at] for at in kept], excess)
         stays = said.stays()
@@ -125,7 +126,7 @@ class _Said:
     def __init__(self, findings: Sequence[Finding], excess: float) -> None:
         self.origin = findings[len(findings) // 2].camera_from_lidar
         self.vectors = np.array([pose_vector(one.camera_from_lidar @ invert(self.origin)) for one in findings])
-        self.informations = np.linalg.inv(np.array([one.covariance for one in findings]) * excess)
+        self.informations = np.linalg.inv(np.array([one.covariance for one in findings], np.float64) * excess)
         informed = np.einsum("nij,nj->ni", self.informations, self.vectors)
         self._normal = _running(self.informations)
         self._right = _running(informed)
