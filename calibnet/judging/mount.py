@@ -126,7 +126,8 @@ class _Said:
     def __init__(self, findings: Sequence[Finding], excess: float) -> None:
         self.origin = findings[len(findings) // 2].camera_from_lidar
         self.vectors = np.array([pose_vector(one.camera_from_lidar @ invert(self.origin)) for one in findings])
-        self.informations = np.linalg.inv(np.array([one.covariance for one in findings], np.float64) * excess)
+        stated = np.array([one.covariance for one in findings])
+        self.informations: Floats = np.asarray(np.linalg.inv(stated * excess), np.float64)
         informed = np.einsum("nij,nj->ni", self.informations, self.vectors)
         self._normal = _running(self.informations)
         self._right = _running(informed)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from calibnet.judging.mount import ALIKE_DEG, ALIKE_M, FEWEST, Finding, difference, excess_of, mount_over
 from calibnet.geometry import miscalibration, pose_error
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.mount import ALIKE_DEG, ALIKE_M, FEWEST, Finding, difference, excess_of, mount_over
 from tests.support.fakes import REFERENCE
 
 COVARIANCE = np.diag([*[0.05**2] * 3, *[np.radians(0.1) ** 2] * 3])
