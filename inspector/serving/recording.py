@@ -30,7 +30,8 @@ def recording_app(file: Path, viewer: Path, begun: threading.Event, ended: threa
     Args:
         file: the recording; it may be replaced as a whole while it is given out.
         viewer: folder with the files of Rerun's web viewer.
-        begun: set when the file is the recording's; one of its name that was there before is not given out.
+        begun: set when the file, as soon as there is one, is the recording's; one that was there before is not given
+            out.
         ended: set when the recording grows no more.
     """
 
@@ -41,7 +42,7 @@ def recording_app(file: Path, viewer: Path, begun: threading.Event, ended: threa
 
 
 async def _growing(path: Path, begun: threading.Event, ended: threading.Event) -> AsyncIterator[bytes]:
-    while not begun.is_set():
+    while not (begun.is_set() and path.exists()):
         if ended.is_set():
             return
         await asyncio.sleep(PAUSE_S)

@@ -52,6 +52,16 @@ def test_who_watches_from_before_the_first_frame_is_not_shown_an_earlier_run(tmp
         assert answer.read() == b""
 
 
+def test_a_recording_that_has_begun_may_not_be_there_yet(tmp_path: Path) -> None:
+    file, ended = tmp_path / "run.rrd", threading.Event()
+    with PageServer(recording_app(file, tmp_path, happened(), ended)) as server:
+        answer = get(server.address, RECORDING)
+        file.write_bytes(b"RRF2 now")
+        assert answer.read(8) == b"RRF2 now"
+        ended.set()
+        assert answer.read() == b""
+
+
 def test_who_watches_a_run_that_never_begins_is_let_go(tmp_path: Path) -> None:
     with PageServer(recording_app(tmp_path / "run.rrd", tmp_path, threading.Event(), happened())) as server:
         assert get(server.address, RECORDING).read() == b""
