@@ -52,4 +52,8 @@ def open_sequence(dataset: str, root: Path | str, **options: Any) -> Sequence:
     except TypeError as error:
         signature = ", ".join(str(parameter) for parameter in inspect.signature(source).parameters)
         raise ConfigError(f"Dataset {dataset} takes ({signature}): {error}.") from None
-    return cast(Sequence, source(Path(root), **options))
+    opened = source(Path(root), **options)
+    lacks = [name for name in ("name", "rig", "__len__", "__getitem__", "__iter__") if not hasattr(opened, name)]
+    if lacks:
+        raise ConfigError(f"Dataset {dataset} is no sequence, for it lacks {', '.join(lacks)}; update its package.")
+    return cast(Sequence, opened)

@@ -9,18 +9,21 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, distributions
+from traceback import walk_tb
 from typing import Any
 
 from calibnet.errors import ConfigError
 
 PREFIX = "calib_inspect."
+GROUPS = ("datasets", "heads", "methods", "exports")
+OURS = {"calibnet", "inspector"}
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
     """What installed packages register, by name; of two with the same name, the one found first on the path.
 
     Args:
-        group: ``"datasets"``, ``"heads"``, ``"methods"`` or ``"exports"``.
+        group: one of `GROUPS`.
     """
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
@@ -28,6 +31,17 @@ def plugins(group: str) -> dict[str, EntryPoint]:
             for entry in distribution.entry_points.select(group=f"{PREFIX}{group}"):
                 found.setdefault(entry.name, entry)
     return found
+
+
+def package_at_fault(error: BaseException) -> str:
+    """The package whose plugin an error was raised in, or beneath; empty where it was in none."""
+    modules = {frame.f_globals.get("__name__", "").partition(".")[0] for frame, _ in walk_tb(error.__traceback__)}
+    entries = (entry for group in GROUPS for entry in plugins(group).values())
+    return next((_package(entry) for entry in entries if entry.module.partition(".")[0] in modules - OURS), "")
+
+
+def _package(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist else entry.module
 
 
 @dataclass(frozen=True)
@@ -63,9 +77,12 @@ class Registry:
         if entry is None:
             raise ConfigError(f"There is no {self.kind} {name!r}; choose one of {', '.join(self.names())}.")
         try:
-            return entry.load()
-        except Exception as error:
-            package = entry.dist.name if entry.dist else entry.module
+            found = entry.load()
+            if not callable(found):
+                raise TypeError("it is neither a class nor a function")
+            return found
+        except (Exception, SystemExit) as error:
+            package = _package(entry)
             reason = str(error).splitlines()[0] if str(error) else "no reason is given"
             raise ConfigError(
                 f"The {self.kind} {name!r} of package {package} cannot be imported ({type(error).__name__}: {reason}); "

@@ -15,6 +15,7 @@ from enum import IntEnum
 import click
 
 from calibnet.errors import CalibnetError
+from calibnet.runtime.plugins import package_at_fault
 from calibnet.runtime.reading import protecting_inputs
 from calibnet.runtime.text import lines, one_line
 from calibnet.runtime.writing import keeping_others
@@ -80,6 +81,8 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
         discard_stdout()
         return ExitCode.BROKEN_PIPE
     except SystemExit as leaving:  # click and rich leave with 1 when the reader of a pipe is gone
+        if package_at_fault(leaving):
+            return unforeseen(leaving)
         discard_stdout()
         return ExitCode.BROKEN_PIPE if leaving.code == 1 else int(leaving.code or 0)
     except MemoryError:
@@ -119,7 +122,9 @@ def unforeseen(error: BaseException) -> int:
         with os.fdopen(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
             file.write(text)
         where = f" together with {name}"
-    sentence = f"A fault of calib-inspect ended this ({one_line(what, 300)}). Please report it{where}."
+    package = package_at_fault(error)
+    whose, whom = (f"the package {package}", " to its makers") if package else ("calib-inspect", "")
+    sentence = f"A fault of {whose} ended this ({one_line(what, 300)}). Please report it{whom}{where}."
     return fail(sentence, ExitCode.UNFORESEEN)
 
 

@@ -153,6 +153,7 @@ def settle_environment() -> None:
         del os.environ[name]
     if os.environ.get("RERUN", "").lower() not in SWITCHED_OFF:
         os.environ.pop("RERUN", None)
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"  # it would read what every installed package registers
     os.environ.setdefault("RUST_LOG", RERUN_LOG)
     os.environ.setdefault("GOMP_SPINCOUNT", SPINS)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from calibnet.errors import ConfigError
 from calibnet.runtime.plugins import Registry
 from calibnet.runtime.text import one_line
 
@@ -41,5 +42,9 @@ def export_as(name: str, exported: Exported) -> str:
     Raises:
         ConfigError: there is no such format, or its package is broken.
     """
-    text: str = FORMATS.load(name)(replace(exported, origin=one_line(exported.origin)))
+    text = FORMATS.load(name)(replace(exported, origin=one_line(exported.origin)))
+    if not isinstance(text, str):
+        raise ConfigError(
+            f"The export format {name!r} gives {type(text).__name__} instead of text; update its package."
+        )
     return text

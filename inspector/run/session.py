@@ -16,7 +16,6 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
-    TextColumn,
     TimeRemainingColumn,
 )
 from rich.text import Text
@@ -29,6 +28,7 @@ from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
 from calibnet.runtime.interruption import StopRequest
+from calibnet.runtime.text import one_line
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import REJECTED, BadFrame
 from calibnet.watch import Watched
@@ -277,6 +277,13 @@ def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole dri
     return advance
 
 
+class _Description(ProgressColumn):
+    """As it is, where rich would take brackets in a name for its own."""
+
+    def render(self, task: Task) -> Text:
+        return Text(one_line(task.description))
+
+
 class _FramesPerSecond(ProgressColumn):
     def render(self, task: Task) -> Text:
         return Text(
@@ -296,5 +303,5 @@ class _Counted(MofNCompleteColumn):
 
 def frame_progress(console: Console, transient: bool = False) -> Progress:
     """A bar that counts frames; a transient one leaves nothing behind."""
-    columns = (TextColumn("{task.description}"), BarColumn(), _Counted(), _FramesPerSecond(), _Left())
+    columns = (_Description(), BarColumn(), _Counted(), _FramesPerSecond(), _Left())
     return Progress(*columns, console=console, speed_estimate_period=10.0, transient=transient)

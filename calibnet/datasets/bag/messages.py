@@ -143,7 +143,10 @@ def links_of(message: Any) -> Iterator[Link]:
 
 
 def _rotation(xyzw: NDArray[np.float64]) -> Rotation:
+    """Of a quaternion; NaN of one that is none, which no frame may depend on."""
     from scipy.spatial.transform import Rotation as ScipyRotation
 
     length = float(np.linalg.norm(xyzw))
-    return np.asarray(ScipyRotation.from_quat(xyzw).as_matrix(), np.float64) if length > 1e-6 else np.eye(3)
+    if not 1e-6 < length < np.inf:
+        return np.full((3, 3), np.nan)
+    return np.asarray(ScipyRotation.from_quat(xyzw).as_matrix(), np.float64)

@@ -51,6 +51,8 @@ def _ranges(points: NDArray[np.float32]) -> Floats:
     """The median range in each cell of directions; NaN where there is no point."""
     x, y, z = points[:, :3].astype(np.float64).T
     distance = np.sqrt(x * x + y * y + z * z)
+    real = np.isfinite(distance)
+    x, y, z, distance = x[real], y[real], z[real], distance[real]
     column = ((np.degrees(np.arctan2(y, x)) + 180) / CELL_DEG).astype(int)
     row = ((np.degrees(np.arctan2(z, np.hypot(x, y))) + 90) / CELL_DEG).astype(int)
     width = int(360 / CELL_DEG) + 1

@@ -48,13 +48,19 @@ def camera_from_lidar(links: Iterable[Link], choice: FrameChoice, path: Path | s
             image's.
     """
     tree: dict[str, dict[str, Transform]] = {}
+    broken: list[str] = []
     for parent, child, parent_from_child in links:
+        if not np.isfinite(parent_from_child).all():
+            broken.append(child)  # as ROS leaves it out
+            continue
         if not np.allclose(tree.get(parent, {}).get(child, parent_from_child), parent_from_child, atol=SAME):
             raise DatasetError(
                 f"{path} says twice, and differently, where {child} is in {parent}; give the right one by --guess FILE."
             )
         tree.setdefault(parent, {})[child] = parent_from_child
         tree.setdefault(child, {})[parent] = invert(parent_from_child)
+    if broken:
+        path = f"{path}, without {', '.join(broken[:5])} (a quaternion of length 0, or a number that is not finite),"
     lidar = _chosen(tree, choice.lidar, LIDAR, "lidar", path)
     reachable = _from(tree, lidar, path)
     near = {name: tree[name] for name in reachable}

@@ -204,7 +204,7 @@ def test_variables_of_libraries_that_change_what_they_do_are_taken_out() -> None
     kept = {"RERUN_STRICT": "0", "RUST_LOG": "info", "HOME": "/"}
     with mock.patch.dict(os.environ, given | kept | {"RERUN": "maybe"}, clear=True):
         settle_environment()
-        assert dict(os.environ) == kept | {"GOMP_SPINCOUNT": "20000"}
+        assert dict(os.environ) == kept | {"GOMP_SPINCOUNT": "20000", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
     with mock.patch.dict(os.environ, {"RERUN": "Off"}, clear=True):
         settle_environment()
         assert os.environ["RERUN"] == "Off", "which is said, as nothing is recorded then"

@@ -5,10 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
+import click
 import pytest
 
+from inspector.cli.errors import run
+from inspector.export.exported import Exported
+from inspector.export.registry import export_as
+from tests.support.fakes import REFERENCE, make_frame
 from tests.support.toy_package import install_toys
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -59,3 +65,41 @@ def test_a_dataset_of_another_package_is_calibrated(tmp_path: Path, monkeypatch:
     done = start(tmp_path, "folder", str(tmp_path), "--dataset", "toy", "--headless", "--frames", "9")
     assert (done.returncode, done.stdout) == (3, "")
     assert f"Frames '9' select nothing of toy/{tmp_path.name}, which has 2 frames" in done.stderr
+
+
+BODIES = {
+    "f = 5": (3, "The export format 'mine' of package mine cannot be imported (TypeError: it is neither a class nor"),
+    "raise SystemExit(0)": (3, "The export format 'mine' of package mine cannot be imported (SystemExit: 0)"),
+    "def f(e): raise ValueError('bad')": (
+        70,
+        "A fault of the package mine ended this (ValueError: bad). Please report",
+    ),
+    "def f(e): raise SystemExit(0)": (
+        70,
+        "A fault of the package mine ended this (SystemExit: 0). Please report",
+    ),
+    "def f(e): return 5": (3, "The export format 'mine' gives int instead of text; update its package."),
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_what_a_package_does_wrong_is_put_down_to_it(
+    body: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = f"mine_{list(BODIES).index(body)}"
+    (tmp_path / f"{module}.py").write_text(body)
+    registered = tmp_path / "mine-1.0.dist-info"
+    registered.mkdir()
+    (registered / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (registered / "entry_points.txt").write_text(f"[calib_inspect.exports]\nmine = {module}:f\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+
+    @click.command()
+    def command() -> None:
+        export_as("mine", Exported(REFERENCE, make_frame(0).camera, "a run"))
+
+    code, sentence = BODIES[body]
+    assert run(command, []) == code
+    assert capsys.readouterr().err.startswith(f"calib-inspect: {sentence}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from typing import Any
 
 import pytest
 from rerun.chunk import RrdReader
+from rich.console import Console
 
 from calibnet.errors import ConfigError, DatasetError
 from inspector import programs
@@ -21,6 +23,7 @@ from inspector.read.file import RecordingFile
 from inspector.read.run import read_run
 from inspector.record import outputs as outputs_module
 from inspector.record.outputs import Outputs, has_display
+from inspector.run.session import frame_progress
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -201,3 +204,11 @@ def test_a_viewer_that_does_not_start_leaves_the_file(tmp_path: Path, monkeypatc
     assert len(Outputs(tmp_path / "run.rrd", viewer=True).open()) == 1
     with pytest.raises(ConfigError, match="did not start"):
         Outputs(viewer=True).open()
+
+
+def test_a_bar_shows_a_foreign_name_as_it_is() -> None:
+    shown = io.StringIO()
+    with frame_progress(Console(file=shown, width=100)) as progress:
+        progress.add_task("a [red]b[/] \x1b[2J\nTr: 1", total=1)
+    assert "a [red]b[/] \\x1b[2J\\nTr: 1" in shown.getvalue()
+    assert "\x1b" not in shown.getvalue()

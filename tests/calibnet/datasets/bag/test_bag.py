@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from calibnet.conformance import check_dataset
 from calibnet.datasets.bag import Bag, BagOptions
 from calibnet.datasets.bag.messages import columns_of, levels_of
+from calibnet.datasets.bag.moments import change
 from calibnet.datasets.calibration_files import FrameChoice
 from calibnet.datasets.development import Development
 from calibnet.errors import DatasetError
@@ -212,3 +213,23 @@ def test_points_in_rows_with_something_behind_them(tmp_path: Path) -> None:
     data = np.concatenate([np.concatenate([row, np.full(8, 255, np.uint8)]) for row in message.data.reshape(3, -1)])
     rows = replace(message, height=3, width=20, row_step=20 * 32 + 8, data=data)
     assert_array_equal(columns_of(rows)["x"], FRAMES[0].points[:60, 0])
+
+
+@pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (np.nan, 0.0, 0.0, 1.0), (np.inf, 0.0, 0.0, 1.0)])
+def test_a_transform_that_is_none_is_left_out_as_ros_does(quaternion: tuple[float, ...], tmp_path: Path) -> None:
+    bag, frame = BagWriter(tmp_path / "broken", "mcap"), make_frame(0)
+    transforms = bag.transforms(frame.camera_from_lidar)
+    rotation = bag.make("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", quaternion, strict=True)))
+    object.__setattr__(transforms.transforms[0].transform, "rotation", rotation)
+    bag.write("/tf_static", transforms, 1.0)
+    bag.write("/cam/camera_info", bag.info(frame, "plumb_bob", [0.0] * 5), 1.0)
+    bag.write("/cam/image_raw", bag.raw(frame.image, "rgb8", 2.0), 2.0)
+    bag.write("/points", bag.cloud(frame.points, 2.01), 2.01)
+    with pytest.raises(DatasetError, match=r"without cam_optical \(a quaternion of length 0, or a number that is not"):
+        Bag([bag.close()])
+
+
+def test_points_without_a_place_do_not_move_a_scan() -> None:
+    points = make_frame(0).points
+    nowhere = np.vstack([points, np.full((3, 4), np.nan, np.float32), np.full((3, 4), np.inf, np.float32)])
+    assert change(points, nowhere) == 0.0
