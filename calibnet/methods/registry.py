@@ -50,6 +50,10 @@ def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calib
     for option in asked:
         if not accepts(maker, option):
             raise ConfigError(f"The method {name!r} takes no --{option.replace('_', '-')}; leave it out.")
+    try:
+        inspect.signature(maker).bind(range_, **asked)
+    except TypeError as error:
+        raise ConfigError(f"The method {name!r} is not made with a range ({error}); update its package.") from None
     method: Calibrator = maker(range_, **asked)
     return method
 
