@@ -89,8 +89,9 @@ def rig(
     from inspector.export.registry import export_as
     from inspector.record.recording import RunDescription
     from inspector.record.rig import record_rig
+    from inspector.run.progress import drive_observer, frame_progress
     from inspector.run.rig import open_rig, solve
-    from inspector.run.session import STOPPING, drive_observer, frame_progress
+    from inspector.run.session import STOPPING
 
     if rigid and tolerance is not None:
         raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")

@@ -10,15 +10,7 @@ from functools import partial
 
 import numpy as np
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TimeRemainingColumn,
-)
-from rich.text import Text
+from rich.progress import Progress
 
 from calibnet.datasets.frame import Frame, Sequence
 from calibnet.datasets.selection import PickedFrames
@@ -28,7 +20,6 @@ from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
 from calibnet.runtime.interruption import StopRequest
-from calibnet.runtime.text import one_line
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import REJECTED, BadFrame
 from calibnet.watch import Watched
@@ -38,6 +29,7 @@ from inspector.record.outputs import Outputs
 from inspector.record.recording import Recording, RunDescription
 from inspector.record.tabs.drive import drive_sentence
 from inspector.run.given import judge_given, suspected
+from inspector.run.progress import drive_observer, frame_progress
 from inspector.run.solved import SolvedDrive, first_readable
 from inspector.run.start import Start
 from inspector.run.summary import Summary
@@ -263,45 +255,3 @@ class Session:
         )
         earlier = self.outputs.earlier
         return kept if earlier is None else f"{kept} The earlier recording of that name is kept as {earlier}."
-
-
-def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole drive") -> Callable[[int, int], None]:
-    """What shows how far the solving of a drive is, and ends it when a stop is requested."""
-    task = progress.add_task(name, total=None)
-
-    def advance(read: int, total: int) -> None:
-        progress.update(task, completed=read, total=total)
-        if stop.requested:
-            raise KeyboardInterrupt
-
-    return advance
-
-
-class _Description(ProgressColumn):
-    """As it is, where rich would take brackets in a name for its own."""
-
-    def render(self, task: Task) -> Text:
-        return Text(one_line(task.description))
-
-
-class _FramesPerSecond(ProgressColumn):
-    def render(self, task: Task) -> Text:
-        return Text(
-            "" if task.speed is None or task.total is None or "MB" in task.description else f"{task.speed:.1f} frames/s"
-        )
-
-
-class _Left(TimeRemainingColumn):
-    def render(self, task: Task) -> Text:
-        return Text("") if task.finished or task.total is None else super().render(task).append(" left")
-
-
-class _Counted(MofNCompleteColumn):
-    def render(self, task: Task) -> Text:
-        return Text("") if task.total is None else super().render(task)
-
-
-def frame_progress(console: Console, transient: bool = False) -> Progress:
-    """A bar that counts frames; a transient one leaves nothing behind."""
-    columns = (_Description(), BarColumn(), _Counted(), _FramesPerSecond(), _Left())
-    return Progress(*columns, console=console, speed_estimate_period=10.0, transient=transient)

@@ -15,7 +15,8 @@ from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict import Verdict
 from inspector.run.given import judge_given, suspected
-from inspector.run.session import STOPPING, Session, drive_observer, frame_progress
+from inspector.run.progress import drive_observer, frame_progress
+from inspector.run.session import STOPPING, Session
 from inspector.run.summary import Summary
 
 UNKNOWN = np.full((4, 4), np.nan)

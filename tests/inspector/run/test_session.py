@@ -23,7 +23,7 @@ from inspector.read.file import RecordingFile
 from inspector.read.run import read_run
 from inspector.record import outputs as outputs_module
 from inspector.record.outputs import Outputs, has_display
-from inspector.run.session import frame_progress
+from inspector.run.progress import frame_progress
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
