@@ -121,6 +121,11 @@ class RecordedRun:
         return None if self.drive is None or reference is None else pose_error(self.drive, reference)
 
     @property
+    def believes_drive(self) -> bool:
+        """Whether a drive was solved, and its extrinsic is not rejected."""
+        return self.drive is not None and (self.drive_verdict is None or self.drive_verdict.word != REJECTED)
+
+    @property
     def one_mount(self) -> bool:
         """Whether the references of all frames are the same; true where there is none to tell."""
         references = [frame.reference for frame in self.frames if frame.reference is not None]

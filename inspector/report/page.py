@@ -44,13 +44,17 @@ AGAINST_MEDIAN = (
 )
 
 
+ALONE, AS_ONE = "this frame alone", "whole drive as one"
+"""Names of a frame's own result, where another leads, and of that."""
+
+
 class Example(NamedTuple):
     """A frame with its pictures.
 
     Attributes:
         name: worst, median or best.
         position: of the frame in the run.
-        pictures: file below the report's folder by what it shows, ``corrected`` last.
+        pictures: file below the report's folder by what it shows, the result last.
     """
 
     name: str
@@ -151,6 +155,9 @@ def _example(figures: Figures, example: Example) -> str:
     before, after = (state.errors[example.position] for state in (figures.initial, figures.corrected))
     if figures.has_reference:
         result = f"{_pair(before)} → {_pair(after)}"
+        as_one = figures.run.drive_error
+        if as_one is not None and AS_ONE in example.pictures:
+            result = f"{_pair(before)} → {_pair(as_one)} {AS_ONE}, {_pair(after)} alone"
     else:
         change = figures.changes[example.position]
         result = f"changed by {_pair(change)}"
@@ -178,7 +185,8 @@ def _choice(example: Example, lefts: Sequence[str]) -> str:
         f'data-name="{left}"{" checked" if left == lefts[0] else ""}>{left}</label>'
         for left in lefts
     )
-    return f'<span class="choice">Corrected against{"".join(radios)}</span>'
+    *_, result = example.pictures
+    return f'<span class="choice">{result.capitalize()} against{"".join(radios)}</span>'
 
 
 def _side(css: str, name: str, file: str, frame: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import shutil
@@ -14,9 +15,11 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
+from inspector.read.pictures import OverlayPoints
 from inspector.read.run import RecordedRun
+from inspector.read.understood import RecordingError
 from inspector.report.metrics import Figures
-from inspector.report.page import Example, make_page
+from inspector.report.page import ALONE, AS_ONE, Example, make_page
 from inspector.report.pictures import draw_overlay
 
 PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
@@ -94,21 +97,23 @@ def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) ->
     camera, image = run.frames[position].camera, run.image(index)
     size = (camera.width, camera.height)
     files = {}
-    for shown, entity in _overlays(run.has_reference).items():
-        files[shown] = f"{PICTURES}/{name}_{shown}.jpg"
-        write_whole(folder / files[shown], draw_overlay(image, *run.overlay(entity, index), size), Kind.JPEG)
+    for shown, points in _overlays(run, index).items():
+        files[shown] = f"{PICTURES}/{name}_{shown.replace(' ', '-')}.jpg"
+        write_whole(folder / files[shown], draw_overlay(image, *points, size), Kind.JPEG)
     return Example(name, position, files)
 
 
-def _overlays(has_reference: bool) -> Mapping[str, str]:
-    """What is shown of an example, the corrected last, and the entity that holds it."""
-    if not has_reference:
-        return {"start": entities.OVERLAY_MISCALIBRATED, "corrected": entities.OVERLAY_CORRECTED}
-    return {
-        "miscalibrated": entities.OVERLAY_MISCALIBRATED,
-        "reference": entities.OVERLAY_REFERENCE,
-        "corrected": entities.OVERLAY_CORRECTED,
-    }
+def _overlays(run: RecordedRun, index: int) -> Mapping[str, OverlayPoints]:
+    """What is shown of a frame, the result last: that of the whole drive, where it is believed and there are points."""
+    start = "miscalibrated" if run.has_reference else "start"
+    shown = {start: run.overlay(entities.OVERLAY_MISCALIBRATED, index)}
+    if run.has_reference:
+        shown["reference"] = run.overlay(entities.OVERLAY_REFERENCE, index)
+    own = run.overlay(entities.OVERLAY_CORRECTED, index)
+    if run.believes_drive:
+        with contextlib.suppress(RecordingError):  # the drive was solved without this frame
+            return shown | {ALONE: own, AS_ONE: run.overlay(entities.OVERLAY_DRIVE, index)}
+    return shown | {"corrected": own}
 
 
 def cannot_write(error: OSError, folder: Path) -> ConfigError:

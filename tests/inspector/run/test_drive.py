@@ -24,6 +24,7 @@ from inspector.read.run import RecordedRun, read_run
 from inspector.read.understood import RecordingError
 from inspector.report.metrics import Figures
 from inspector.report.verdict import headline
+from inspector.report.write import write_report
 from tests.support.fakes import FakeCascade
 from tests.support.layout import views
 
@@ -76,6 +77,14 @@ def test_the_answer_has_the_matrix_and_the_frames_beside_it(file: Path, recorded
     assert "Error, median over frames: " in text and "Worst: frame " in text
     assert recorded.drive is not None
     assert " ".join(f"{value:9.5f}" for value in recorded.drive[0]) in text
+
+
+def test_a_report_shows_the_drives_result_and_beside_it_each_frames_own(recorded: RecordedRun, tmp_path: Path) -> None:
+    page = write_report(recorded, tmp_path / "report").read_text(encoding="utf-8")
+    assert "0.10° / 0.0\u00a0cm whole drive as one, " in page and "Whole drive as one against" in page
+    shown = {file.name: file.read_bytes() for file in (tmp_path / "report" / "pictures").iterdir()}
+    assert shown["worst_whole-drive-as-one.jpg"] != shown["worst_this-frame-alone.jpg"]
+    assert "worst_corrected.jpg" not in shown
 
 
 def test_report_and_metrics_begin_with_it(recorded: RecordedRun) -> None:
