@@ -21,8 +21,12 @@ MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
-PICTURES = tuple(f"pictures/{name}_corrected.jpg" for name in ("median", "best", "worst"))
-"""Of a drive's report: its middle frame as it was corrected or, where there are few, another one."""
+PICTURES = tuple(
+    f"pictures/{name}_{result}.jpg"
+    for result in ("whole-drive-as-one", "corrected")
+    for name in ("median", "best", "worst")
+)
+"""Of a drive's report: the result on its middle frame or, where there are few, on another one."""
 
 
 def write_page(rows: Sequence[Row], folder: Path) -> Path:
