@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     type=click.Choice(METHODS.names()),
     help="Another method, on the same single frames or, where it knows whole drives alone, drives. Repeatable.",
 )
+@click.option("--method-weights", type=FOLDER, help="Folder of the weights of --method.  [default: that of --weights]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @overwrite_option
 def evaluate(
@@ -98,6 +99,7 @@ def evaluate(
     drives: bool,
     classical: bool,
     methods: tuple[str, ...],
+    method_weights: Path | None,
     json_file: str | None,
 ) -> None:
     """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
@@ -132,7 +134,7 @@ def evaluate(
         run_battery(cascade, opened, range_, repeats, seed, lambda: find_sequences(dataset, root), json_file)
         return
     references = measuring.classical(range_) if classical else {}
-    references |= {name: open_reference(name, range_, weights) for name in methods}
+    references |= {name: open_reference(name, range_, method_weights or weights) for name in methods}
     console = console_beside(json_file)
     with Bars() as bars:
         evaluation = measuring.measure(
@@ -152,7 +154,7 @@ def evaluate(
 
 
 def open_reference(name: str, range_: MiscalibrationRange, weights: Path | None) -> Calibrator:
-    """Another method; its weights lie in the same folder as those of the cascade."""
+    """Another method, with the weights of a folder where it has any."""
     told = {"weights": weights} if accepts(METHODS.load(name), "weights") else {}
     return open_method(name, range_, **told)
 

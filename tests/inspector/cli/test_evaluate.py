@@ -183,3 +183,14 @@ def test_the_battery_is_a_table_and_its_json_the_object_of_its_rows(rig: Path, t
     assert rows["mirrored", ""]["runs"] == rows["mirrored", ""]["rejected"] == rows["mirrored", ""]["cause_right"] == 2
     assert rows["none", ""]["cause_right"] == 0 and rows["late-scan", "+1"]["runs"] == 1
     assert content["false_accept_rate"] == 0.0
+
+
+def test_weights_of_another_method_lie_in_a_folder_of_their_own(
+    rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "methods"
+    own.mkdir()
+    arguments = ["--dataset", "folder", "--root", str(rig), "--range", "5/0.5", "--method", "lccnet"]
+    assert run(cli, ["evaluate", *arguments, "--method-weights", str(own)]) == 3
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{own}" in said and "lccnet" in said and KnownCascade.loaded["preset"] == "compact"
