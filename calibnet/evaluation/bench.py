@@ -125,6 +125,7 @@ def _entry(bench: Bench, contestant: Contestant, observer: Observer) -> dict[str
                 "samples_trained": card.samples_trained,
                 "trained_on": list(card.trained_on),
                 "latency_ms": latency(bench, method, range_),
+                "costs_of": str(range_),
             }
         for rig, sequences in bench.rigs.items():
             for of in kinds(method):

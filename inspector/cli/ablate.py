@@ -149,18 +149,28 @@ def measured(
 
 
 def print_ablation(content: dict[str, Any], console: Console) -> None:
-    """The tables on the terminal, and which rows have no errors."""
+    """The tables on the terminal, costs and errors apart since it is narrow, and which rows have no errors."""
+    from rich import box
     from rich.table import Table
 
-    from inspector.report.ablation_tables import tables, title, untrained
-    from inspector.report.markdown import WORDS
+    from inspector.report.ablation_tables import COSTS, ERRORS, tables, title, untrained
 
+    console.print(title(content), soft_wrap=True)
     for preset, heads, lines in tables(content):
-        table = Table(title=f"{preset}: {title(content)}")
-        for head in heads:
-            table.add_column(head, justify="left" if head in WORDS else "right", overflow="fold")
-        for line in lines:
-            table.add_row(*line)
-        console.print(table)
+        for chosen in (COSTS, ERRORS):
+            kept = [k for k in range(1, len(heads)) if heads[k] in chosen]
+            if len(kept) < 2:
+                continue  # nothing but what the paper says
+            table = Table(title=preset, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+            table.add_column(heads[0], no_wrap=True)
+            for k in kept:
+                table.add_column(heads[k], justify="right")
+            for line in lines:
+                if any(line[k] for k in kept):
+                    table.add_row(line[0], *(line[k] for k in kept))
+            console.print(table)
     if missing := untrained(content):
-        say(missing, err=console.stderr)
+        train = f"`calib-inspect train --preset PRESET --ablation ROW --range {content['range']} --output DIR`"
+        say(
+            f"{missing} {train} trains a row, and `ablate --weights DIR --data FRAMES` measures it.", err=console.stderr
+        )

@@ -10,7 +10,9 @@ from calibnet.geometry import MiscalibrationRange
 from inspector.report.bench_summary import NO_CORRECTION, known_and_other
 from inspector.report.markdown import markdown_table
 
-HEADS = ("without", "parameters", "multiply-adds", "a look", "samples", "rigs trained on", "other rigs", "the paper")
+COSTS = ("parameters", "multiply-adds", "a look", "samples")
+ERRORS = ("rigs trained on", "other rigs", "the paper")
+HEADS = ("without", *COSTS, *ERRORS)
 
 
 def title(content: dict[str, Any]) -> str:
@@ -59,11 +61,7 @@ def untrained(content: dict[str, Any]) -> str:
             which.append(f"{preset} ({'all rows' if len(missing) == len(rows) else ', '.join(missing)})")
     if not which:
         return ""
-    return (
-        f"Not trained, so without errors: {', '.join(which)}. "
-        f"`calib-inspect train --preset PRESET --ablation ROW --range {content['range']} --output DIR` trains a row, "
-        "and `ablate --weights DIR --data FRAMES` measures it."
-    )
+    return f"Not trained, so without errors: {', '.join(which)}."
 
 
 def as_markdown(content: dict[str, Any]) -> str:

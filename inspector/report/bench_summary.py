@@ -29,7 +29,9 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
     if initial:
         body.append([NO_CORRECTION, "frames", *known_and_other(initial, known), *[NOTHING] * (len(heads) - 4)])
     for name, entry in content["methods"].items():
-        beside = [*_pictures(entry, range_), *(costs(entry)[head] for head in COSTS), _claim(entry)]
+        here = entry.get("costs_of", range_) == range_  # another range is another number of networks
+        told = [costs(entry)[head] if here else NOTHING for head in COSTS]
+        beside = [*_pictures(entry, range_), *told, _claim(entry)]
         own = [row for row in of_range if row.method == name]
         for of in dict.fromkeys(row.of for row in own):  # what stands beside the errors, once
             measured = [row for row in own if row.of == of]

@@ -37,6 +37,7 @@ CONTENT = {
             [measured("A", 2, 2, 20, in_rig=False), {"range": "5/0.5", "rig": "C", "of": "frames", **REFUSED}],
             0,
             audit={"range": "1/0.1", "grey": HALF},
+            costs_of="1/0.1",
         ),
         "absent": method([{"range": "5/0.5", "rig": "", "in_rig": None, "why": "There are no weights."}], None),
     },
@@ -53,6 +54,7 @@ def test_means_are_over_runs_and_rigs_stand_where_trained_methods_know_them() ->
     assert (cells["trained"]["refused"], cells["untrained"]["refused"]) == ("1 of 12", "4 of 6")
     assert (cells["trained"]["grey picture"], cells["trained"]["other picture"]) == ("refused", "50% refused")
     assert cells["untrained"]["grey picture"] == "–", "its audit is of another range"
+    assert (cells["trained"]["parameters"], cells["untrained"]["parameters"]) == ("2.00 M", "–")
     assert cells["trained"]["its paper"] == "0.1° / 2 cm from ±1 m"
     assert set(list(cells["absent"].values())[1:6]) == {"–"}
 
