@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -11,6 +10,7 @@ import numpy as np
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
+from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Cause, Verdict, Word, moved
 
 SIGNIFICANT = 16.27
@@ -38,25 +38,40 @@ class Tolerance:
         return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"
 
 
-FRAME = (Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0))
-DRIVE = (Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0))
-"""What may be tolerated of a single frame's calibration, and of a drive's, finest first: the limits that the verdict
-holds results to, where a result is sure enough to tell so little, and what the others can tell."""
+@dataclass(frozen=True)
+class Standard:
+    """What the calibration of a frame, or of a drive, is held to.
+
+    Attributes:
+        tolerances: how far off is good, finest first: the limits that the verdict holds results to, where a result is
+            sure enough to tell so little, and what the others can tell.
+        farthest: how far from the truth a result of several frames is at most that is not sure enough to be accepted;
+            None where that is not known.
+    """
+
+    tolerances: tuple[Tolerance, ...]
+    farthest: Tolerance | None = None
 
 
-def verify(given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]) -> Verdict:
+FRAME = Standard((Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0)))
+DRIVE = Standard((Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0)), Tolerance(1.6, 40.0))
+"""Of a single frame, which may end anywhere as long as it is not accepted, and of a drive: half as far again as the
+farthest of those that the verdict was fitted to (1.1°, 26 cm)."""
+
+
+def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     """Hold a calibration against what was found from there.
 
     It is rejected if it is off by more than the finest tolerance that the covariance of what was found can tell, in
     rotation or in translation, and if that is significant (chi-square, 99.9 %). It is accepted if it is within one of
     the tolerances with a probability of 95 %, and the finest of these is told. Otherwise nobody can tell. Where what
-    was found is not accepted itself, the calibration is rejected if causes are known, for then the input is wrong, and
-    else nobody can tell.
+    was found is not accepted itself, the calibration is rejected if causes are known, for then the input is wrong, or
+    if it is farther from what was found than that can be from the truth; else nobody can tell.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.
         found: verdict on the estimate of a frame or of a drive that started there, with its covariance.
-        tolerances: `FRAME` or `DRIVE`: finest first.
+        standard: `FRAME` or `DRIVE`.
 
     Returns:
         A verdict on ``given``. Its ``camera_from_lidar`` is what was found, and ``moved`` leads there from ``given``.
@@ -66,14 +81,22 @@ def verify(given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]) ->
     def verdict(word: Word, reason: str) -> Verdict:
         return replace(found, word=word, reason=reason, moved=moved(given, estimate))
 
+    error = pose_error(given, estimate)
+    skipped, tried = len(found.skipped), found.used + len(found.skipped)
+    few = f"{skipped} of {tried} frames do not fit or cannot be read." if 2 * skipped >= tried else None
     if found.word != ACCEPTED:
         if found.word == REJECTED and found.causes:
             return verdict(REJECTED, found.reason)
+        apart = f"{error.rotation_deg:.1f}° and {error.translation_cm:.0f} cm"
+        if few is None and _is_far(error, found, standard):
+            reason = f"The calibration is off by some {apart}, or the input is wrong; how far exactly is not sure."
+            return verdict(REJECTED, f"{reason} {found.reason}")
+        if few is None and found.word == CANNOT_TELL:
+            reason = f"The calibration lies {apart} from what is found, which is not sure enough to hold it against."
+            return verdict(CANNOT_TELL, f"{reason} {found.reason}")
         return verdict(CANNOT_TELL, f"There is nothing to hold the calibration against. {found.reason}")
-    skipped, tried = len(found.skipped), found.used + len(found.skipped)
-    if 2 * skipped >= tried:
-        return verdict(CANNOT_TELL, f"{skipped} of {tried} frames do not fit or cannot be read.")
-    error = pose_error(given, estimate)
+    if few is not None:
+        return verdict(CANNOT_TELL, few)
     if found.covariance is None:
         off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
         return verdict(CANNOT_TELL, f"The calibration seems to be off by {off}, but nothing states how sure that is.")
@@ -81,11 +104,12 @@ def verify(given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]) ->
     off = _said(error, offset, found.covariance)
     still = np.zeros(6)
     told = next(
-        (one for one in tolerances if probability_within(still, found.covariance, one) >= PROBABLE), tolerances[-1]
+        (one for one in standard.tolerances if probability_within(still, found.covariance, one) >= PROBABLE),
+        standard.tolerances[-1],
     )
     if _is_beyond(error, offset, found.covariance, told):
         return verdict(REJECTED, f"The calibration is off by {off}; {told} are tolerated.")
-    for tolerance in tolerances:
+    for tolerance in standard.tolerances:
         share = probability_within(offset, found.covariance, tolerance)
         if share >= PROBABLE:
             return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: by {off}.")
@@ -137,6 +161,17 @@ def probability_within(offset: Vector6, covariance: Matrix6, tolerance: Toleranc
 def _draws() -> Floats:
     """``[6, SAMPLES]`` of the standard normal distribution: a fleet asks ten thousand times."""
     return np.ascontiguousarray(np.random.default_rng(0).standard_normal((SAMPLES, 6)).T)
+
+
+def _is_far(error: PoseError, found: Verdict, standard: Standard) -> bool:
+    """Whether a calibration is farther from what several frames agree on than they can be from the truth.
+
+    Frames that do not fit are skipped, so those of a drive that leaves the range searched agree, too.
+    """
+    farthest = standard.farthest
+    if farthest is None or found.used < FEWEST_JUDGED:
+        return False
+    return error.rotation_deg > farthest.rotation_deg or error.translation_cm > farthest.translation_cm
 
 
 def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> bool:

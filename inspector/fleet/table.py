@@ -170,8 +170,8 @@ def off(row: Row) -> float:
 
     Whichever is more counts, so that what moved far for want of frames does not stand before what is sure.
     """
-    turn = (row.moved_deg or 0.0) / math.hypot(DRIVE[-1].rotation_deg, 2 * (row.sigma_deg or 0.0))
-    shift = (row.moved_cm or 0.0) / math.hypot(DRIVE[-1].translation_cm, 2 * (row.sigma_cm or 0.0))
+    turn = (row.moved_deg or 0.0) / math.hypot(DRIVE.tolerances[-1].rotation_deg, 2 * (row.sigma_deg or 0.0))
+    shift = (row.moved_cm or 0.0) / math.hypot(DRIVE.tolerances[-1].translation_cm, 2 * (row.sigma_cm or 0.0))
     return max(turn, shift)
 
 

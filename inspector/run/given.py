@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 
 from calibnet.datasets.frame import Frames
@@ -11,7 +10,7 @@ from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.lag import lags
-from calibnet.judging.verify import Tolerance, named_cause, unfit, verify
+from calibnet.judging.verify import Standard, named_cause, unfit, verify
 from calibnet.methods.calibrator import Explainer
 from calibnet.verdict import ACCEPTED, Cause, Verdict
 from inspector.verdicts import causes_of
@@ -20,9 +19,7 @@ SUSPECTS = 3
 """Frames, spread over a drive, that are asked for the cause: each runs stages up to thirty times."""
 
 
-def judge_given(
-    method: object, frames: Frames, given: Extrinsic, found: Verdict, tolerances: Sequence[Tolerance]
-) -> Verdict:
+def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
 
     Args:
@@ -30,12 +27,14 @@ def judge_given(
         frames: where it was found.
         given: ``camera_from_lidar`` to verify, 4x4.
         found: verdict on what was found.
-        tolerances: how far off is good, see `calibnet.judging.verify.verify`.
+        standard: that it is held to, see `calibnet.judging.verify.verify`.
     """
-    verdict = verify(given, found, tolerances)
+    if getattr(method, "unjudged", ""):  # its results may be off by anything
+        standard = replace(standard, farthest=None)
+    verdict = verify(given, found, standard)
     if verdict.word == ACCEPTED or found.causes:
         return verdict
-    return verify(given, replace(found, causes=suspected(method, frames, given)), tolerances)
+    return verify(given, replace(found, causes=suspected(method, frames, given)), standard)
 
 
 def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, ...]:

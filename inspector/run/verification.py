@@ -112,12 +112,12 @@ def as_json(verdict: Verdict) -> dict[str, object]:
 
 def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
     if len(frames) == 1:
-        found, tolerances = session.cascade.calibrate(frames[0], given).verdict, FRAME
+        found, standard = session.cascade.calibrate(frames[0], given).verdict, FRAME
     else:
         with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:
             observer = drive_observer(progress, stop)
             assert isinstance(session.cascade, DriveCalibrator), "the cascade is what verifies"
-            found, tolerances = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
+            found, standard = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
         frames.check()
     assert found is not None, "the cascade judges what it finds"
-    return judge_given(session.cascade, frames, given, found, tolerances)
+    return judge_given(session.cascade, frames, given, found, standard)

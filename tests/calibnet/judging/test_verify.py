@@ -11,14 +11,14 @@ from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
-from calibnet.judging.verify import DRIVE, FRAME, Tolerance, named_cause, probability_within, unfit, verify
+from calibnet.judging.verify import DRIVE, FRAME, Standard, Tolerance, named_cause, probability_within, unfit, verify
 from calibnet.verdict import BadFrame, Cause, Verdict
 from tests.support.fakes import REFERENCE
 
 MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
 
 
-TIGHT, WIDE = (Tolerance(0.3, 8.0),), (Tolerance(1.0, 25.0),)
+TIGHT, WIDE = Standard((Tolerance(0.3, 8.0),)), Standard((Tolerance(1.0, 25.0),))
 
 
 def covariance(degrees: float, centimetres: float) -> Matrix6:
@@ -69,10 +69,10 @@ def test_the_word_follows_offset_and_certainty(given: np.ndarray, sure: tuple[fl
 
 def test_the_probability_is_that_of_the_normal_distribution() -> None:
     """Three axes of 4 cm: within 8 cm with the chi distribution's 73.9 %; the rotation is sure."""
-    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT[0])
+    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT.tolerances[0])
     assert inside == pytest.approx(0.7385, abs=0.005)
     offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
-    assert probability_within(offset, covariance(0.001, 0.01), TIGHT[0]) == pytest.approx(0.5, abs=0.01)
+    assert probability_within(offset, covariance(0.001, 0.01), TIGHT.tolerances[0]) == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
@@ -84,6 +84,40 @@ def test_what_is_not_accepted_itself_is_no_measure() -> None:
     assert (caused.word, caused.reason, caused.causes) == ("rejected", doubted.reason, (MIRRORED,))
     unsure = verify(off(), replace(doubted, word="cannot tell", causes=(MIRRORED,)), TIGHT)
     assert (unsure.word, unsure.causes) == ("cannot tell", (MIRRORED,))
+
+
+def unsure(used: int = 5) -> Verdict:
+    return replace(found(0.5, 15.0), word="cannot tell", reason="They agree on too little.", used=used)
+
+
+@pytest.mark.parametrize(
+    ("given", "of_drive", "word"),
+    [
+        (off(yaw=3.4), unsure(), "rejected"),
+        (off(z=0.5), unsure(), "rejected"),
+        (off(yaw=1.5, z=0.35), unsure(), "cannot tell"),  # results like it have been so far off, half as far again
+        (off(yaw=3.4), unsure(used=3), "cannot tell"),  # of three frames nothing is known
+        (off(yaw=3.4), replace(unsure(), word="rejected"), "rejected"),  # frames that fit agree, out of the range
+        (off(yaw=3.4), replace(unsure(), skipped=(BadFrame(0, ""),) * 5), "cannot tell"),
+    ],
+)
+def test_what_is_far_off_is_rejected_by_a_drive_that_is_not_sure_how_far(
+    given: np.ndarray, of_drive: Verdict, word: str
+) -> None:
+    verdict = verify(given, of_drive, DRIVE)
+    assert verdict.word == word and verdict.reason.endswith("They agree on too little.")
+    assert verify(given, of_drive, FRAME).word == "cannot tell", "a single frame may have gone anywhere"
+
+
+def test_near_says_how_near_though_it_is_not_sure() -> None:
+    reason = verify(off(yaw=0.2), unsure(), DRIVE).reason
+    assert reason.startswith("The calibration lies 0.2° and ") and "not sure enough to hold it against" in reason
+
+
+def test_far_off_says_how_far() -> None:
+    reason = verify(off(yaw=3.4), unsure(), DRIVE).reason
+    assert reason.startswith("The calibration is off by some 3.4° and ")
+    assert "or the input is wrong; how far exactly is not sure." in reason
 
 
 def test_without_covariance_nobody_can_tell() -> None:
