@@ -150,7 +150,7 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
         seconds = [_seconds(word) for word in words]
         if None in seconds:
             raise DatasetError(
-                f"{path}: {words[seconds.index(None)]!r} is no time; write seconds, or nanoseconds since 1970, or "
+                f"{path}: {words[seconds.index(None)][:40]!r} is no time; write seconds, or nanoseconds since 1970, or "
                 "2026-11-26 13:02:25.594."
             )
         if len(seconds) != len(files):

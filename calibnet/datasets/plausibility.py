@@ -36,6 +36,8 @@ STEEP = 0.9
 """Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
 FLAT = 0.4
 """A scene is this much lower than it is wide, whatever it is; else z is not up."""
+GRID, SEEN = 40, 0.5
+"""Places across a rectified picture, and the share of them that at least shows something of any real lens."""
 GREY_LEVELS = 24
 """A picture that shines no brighter than this has lost its upper bits."""
 WRAPPED, GREY = 0.01, 0.3
@@ -50,8 +52,8 @@ class Implausible:
     """Something that cannot be right, or hardly.
 
     Attributes:
-        name: ``focal-length``, ``principal-point``, ``picture-size``, ``units``, ``axes``, ``accumulated``
-            or ``bit-depth``.
+        name: ``focal-length``, ``principal-point``, ``picture-size``, ``distortion``, ``units``, ``axes``,
+            ``accumulated`` or ``bit-depth``.
         text: a sentence without its full stop: what is seen; what to do.
         certain: whether no sensor has it, so that the input is refused.
     """
@@ -85,12 +87,9 @@ def of_camera(camera: PinholeCamera) -> list[Implausible | None]:
 
 
 def of_lens(camera: CameraModel) -> list[Implausible | None]:
-    """All checks of a camera matrix that is of pictures before they are rectified, where its lens is none of OpenCV's.
-
-    That of OpenCV's is the rectified picture's as well.
-    """
+    """All checks of a lens, and of its camera matrix where that is not the rectified picture's as well."""
     if camera.model in ("plumb_bob", "rational_polynomial"):
-        return []
+        return [] if any(of_camera(camera.pinhole)) else [distortion(camera)]  # a wrong matrix would be put down to it
     return [pixel_shape(camera.pinhole), picture_size(camera.pinhole) or principal_point(camera.pinhole)]
 
 
@@ -117,6 +116,23 @@ def focal_length(camera: PinholeCamera) -> Implausible | None:
         guess = "it seems to be in millimetres, so divide it by the size of a pixel on the sensor"
     text = f"the focal length {focal:g} px of a picture {width} px wide would see {view:.0f} degrees; {guess}"
     return Implausible("focal-length", text, certain=True)
+
+
+def distortion(camera: CameraModel) -> Implausible | None:
+    """Of OpenCV's lenses, whose rectified picture has the size and the matrix of the picture itself."""
+    width, height = camera.pinhole.width, camera.pinhole.height
+    u, v = np.meshgrid(np.linspace(0, width - 1, GRID), np.linspace(0, height - 1, GRID))
+    pixels = np.column_stack([u.ravel(), v.ravel(), np.ones(u.size)])
+    with np.errstate(over="ignore", invalid="ignore"):
+        seen = camera.see(pixels @ np.linalg.inv(camera.matrix).T)
+        inside = ((seen.pixels >= 0) & (seen.pixels < (width, height))).all(axis=1) & seen.valid
+    if inside.mean() >= SEEN:
+        return None
+    text = (
+        f"with these distortion coefficients only {inside.mean():.0%} of the rectified picture would show anything; "
+        "give those of this camera, in the order of the lens model"
+    )
+    return Implausible("distortion", text, certain=True)
 
 
 def pixel_shape(camera: PinholeCamera) -> Implausible | None:

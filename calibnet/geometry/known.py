@@ -217,6 +217,6 @@ def parse_angle(text: str) -> float:
 
 def _parse(text: str, units: dict[str, float], wanted: str) -> float:
     match = re.fullmatch(r"\s*(\d*\.?\d+(?:e-?\d+)?)\s*([a-z°]+)\s*", text.lower())
-    if match is None or match[2] not in units or not float(match[1]) > 0:
+    if match is None or match[2] not in units or not 0 < float(match[1]) < np.inf:
         raise ConfigError(f"{text!r} is not {wanted}.")
     return float(match[1]) * units[match[2]]

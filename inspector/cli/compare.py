@@ -42,10 +42,11 @@ def compare(
     if len(called) != len(recordings):
         raise click.UsageError(f"--names has {len(called)} names for {len(recordings)} recordings.")
 
-    from inspector.compare.comparison import Comparison
+    from inspector.compare.comparison import Comparison, check_names
     from inspector.compare.recording import record_comparison
     from inspector.record.flushing import RecordingLostError
 
+    check_names(called)
     outputs = viewing.outputs(f"compare-{'-'.join(called)}")
     comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
     try:

@@ -121,7 +121,7 @@ class Comparison:
             ConfigError: a name cannot be used.
             RecordingError: the runs are of different data or, without ``common_frames``, of different frames.
         """
-        _check_names(names)
+        check_names(names)
         for run in runs[1:]:
             _check_same_data(runs[0], run)
         wanted = _indices(runs[0])
@@ -146,7 +146,8 @@ def of_kind(error: PoseError, kind: str) -> float:
     return error.rotation_deg if kind == "rotation" else error.translation_cm
 
 
-def _check_names(names: Sequence[str]) -> None:
+def check_names(names: Sequence[str]) -> None:
+    """Raise `ConfigError` where runs cannot be told apart by their names."""
     for position, name in enumerate(names):
         if not name or name in RESERVED:
             raise ConfigError(f"A run cannot be called {name!r} in a comparison; give it another with --names.")

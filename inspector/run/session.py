@@ -171,6 +171,7 @@ class Session:
                 return not stop.requested
 
             remark = recording.close(advance)
+            progress.update(task, total=progress.tasks[0].completed)  # fewer than there were: chunks are fewer
         if remark:
             self.console.print(remark, style="yellow", markup=False, soft_wrap=True)
 

@@ -10,6 +10,7 @@ from calibnet.datasets.images import read_image
 from calibnet.datasets.plausibility import (
     Implausible,
     bit_depth,
+    distortion,
     focal_length,
     of_camera,
     of_extrinsic,
@@ -18,7 +19,7 @@ from calibnet.datasets.plausibility import (
 )
 from calibnet.datasets.synthetic import SyntheticSequence
 from calibnet.errors import DatasetError, ImplausibleError
-from calibnet.geometry import PinholeCamera, invert, rotation_from_euler_xyz, transform
+from calibnet.geometry import CameraModel, PinholeCamera, invert, rotation_from_euler_xyz, transform
 
 AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 EXTRINSIC = transform(AXES, [0.1, -0.2, -0.3])
@@ -186,3 +187,22 @@ def test_the_first_suspect_is_named():
     remarks = [Implausible("axes", "the camera looks up"), Implausible("units", "it is far")]
     assert suspicion(remarks, "check it") == "the camera looks up, or it is far"
     assert suspicion([], "check it") == "check it"
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "known"),
+    [
+        ((0.0, 0.0, 0.0, 0.0, 0.0), True),
+        ((-0.37, 0.2, 0.001, -0.0005, -0.07), True),  # KITTI's unrectified
+        ((0.3, 0.0, 0.0, 0.0, 0.0), True),
+        ((-2.0, 0.0, 0.0, 0.0, 0.0), False),
+        ((5.0,) * 14, False),
+        ((1e200,) * 5, False),
+    ],
+)
+def test_a_lens_that_leaves_nothing_of_the_picture_is_none(coefficients: tuple[float, ...], known: bool) -> None:
+    model = "plumb_bob" if len(coefficients) == 5 else "rational_polynomial"
+    matrix = np.array([[700.0, 0.0, 640.0], [0.0, 700.0, 360.0], [0.0, 0.0, 1.0]])
+    found = distortion(CameraModel(1280, 720, matrix, model, np.array(coefficients)))
+    assert (found is None) == known
+    assert known or names([found]) == [("distortion", True)]
