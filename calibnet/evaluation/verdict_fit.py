@@ -16,6 +16,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Floats
 from calibnet.judging.covariance import Spread
 from calibnet.judging.doubt import Doubt
+from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """Of the last stage, and of the first one."""
@@ -36,6 +37,8 @@ LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""
 FEWEST, FEWEST_DRIVES = 10, 6
 """Good and bad results, each, of frames and of drives, below which nothing can be fitted."""
+NEAR = 1.25
+"""Times a limit, or by which it is divided: errors in between are near the limit. No witness tells 24 from 26 cm."""
 CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
 """Shares of accepted and wrong runs at which the operating curve is told."""
 
@@ -53,7 +56,8 @@ class FitFigures:
         wrong_rejected: share of the wrong runs that are rejected.
         spread: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected;
             of drives, of accepted ones.
-        curve: acceptance of good plain runs at given shares of false accepts.
+        curve: acceptance of good plain runs at given shares of false accepts; beside it, the same where runs that end
+            near a limit (`NEAR`) are set aside.
     """
 
     runs: int
@@ -77,7 +81,7 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Sprea
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    doubt, figures, kept = fit_doubt(runs, names=OF_FRAMES)
+    doubt, figures, kept = fit_doubt(runs, FRAME_LIMITS, names=OF_FRAMES)
     spread = fit_spread(kept, ranges)
     return doubt, spread, replace(figures, spread=mean_square(kept, ranges, spread))
 
@@ -88,7 +92,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Doubt, float, FitFigures]:
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    doubt, figures, kept = fit_doubt(runs, FEWEST_DRIVES, OF_DRIVES)
+    doubt, figures, kept = fit_doubt(runs, DRIVE_LIMITS, FEWEST_DRIVES, OF_DRIVES)
     accepted = [run for run in kept if doubt_of(run, doubt) < doubt.accepted_below]  # few others would widen them all
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
     widening = rounded(max(float(np.mean(squares)), 1.0)) if squares else 1.0
@@ -102,12 +106,13 @@ def doubt_of(run: VerdictRun, doubt: Doubt) -> float:
 
 
 def fit_doubt(
-    runs: Sequence[VerdictRun], fewest: int = FEWEST, names: Sequence[str] = ()
+    runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST, names: Sequence[str] = ()
 ) -> tuple[Doubt, FitFigures, list[VerdictRun]]:
     """Fit doubt to runs, and say how it does on sequences that are left out.
 
     Args:
         runs: of a known truth.
+        limits: degrees and centimetres that they are held to.
         fewest: that have to end right, and wrong.
         names: of the witnesses to fit; all by default.
 
@@ -150,17 +155,37 @@ def fit_doubt(
         acceptance_of_good=_acceptance(accepted & good & plain, runs),
         wrong_rejected=told_wrong / max(len(wrong), 1),
         spread=float("nan"),
-        curve=[
-            {
-                "false_accepts": share,
-                "acceptance_of_good": _acceptance(
-                    (odds < threshold(odds, ~good, share * len(runs))) & good & plain, runs
-                ),
-            }
-            for share in CURVE
-        ],
+        curve=_curve(asked, runs, odds, limits),
     )
     return doubt, figures, kept
+
+
+def _curve(
+    asked: Sequence[VerdictRun], runs: Sequence[VerdictRun], odds: Floats, limits: tuple[float, float]
+) -> list[dict[str, float]]:
+    """The operating curve of all runs, and without those near a limit."""
+
+    def accepted(share: float, kept: Sequence[bool], of: Sequence[VerdictRun]) -> float:
+        chosen, good = odds[kept], np.array([run.good for run in asked], bool)[kept]
+        plain = np.array([run.plain for run in asked], bool)[kept]
+        return _acceptance((chosen < threshold(chosen, ~good, share * len(of))) & good & plain, of)
+
+    clear = [not is_near(run, limits) for run in asked]
+    of_clear = [run for run in runs if not is_near(run, limits)]
+    return [
+        {
+            "false_accepts": share,
+            "acceptance_of_good": accepted(share, [True] * len(asked), runs),
+            "acceptance_of_clear": accepted(share, clear, of_clear),
+        }
+        for share in CURVE
+    ]
+
+
+def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:
+    """Whether a run ends near a limit, on either side."""
+    severity = max(run.rotation_deg / limits[0], run.translation_cm / limits[1])
+    return 1 / NEAR < severity < NEAR
 
 
 def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:

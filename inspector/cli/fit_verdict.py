@@ -156,6 +156,7 @@ def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
     yield f"  accepted though wrong: {figures.false_accept_rate:.1%} of all runs"
     yield f"  accepted: {figures.acceptance_of_good:.0%} of the good runs without a fault"
     yield f"  rejected: {figures.wrong_rejected:.0%} of the wrong runs"
-    points = (f"{point['acceptance_of_good']:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
-    yield f"  accepted of the good at other shares of false accepts: {', '.join(points)}"
+    for name, kept in (("acceptance_of_good", ""), ("acceptance_of_clear", ", runs near a limit set aside")):
+        points = (f"{point[name]:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
+        yield f"  accepted of the good at other shares of false accepts{kept}: {', '.join(points)}"
     yield f"  squared error by the stated covariance, a degree of freedom: {figures.spread:.2f}"

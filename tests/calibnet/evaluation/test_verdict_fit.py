@@ -13,6 +13,7 @@ from calibnet.evaluation.verdict_fit import (
     fit_drives,
     fit_frames,
     fit_spread,
+    is_near,
     left_out,
     mean_square,
     regression,
@@ -57,6 +58,20 @@ def test_the_witness_that_tells_is_found_and_the_others_are_not_believed() -> No
     shares = [point["acceptance_of_good"] for point in figures.curve]
     assert shares == sorted(shares) and shares[0] < shares[-1] and figures.curve[3]["false_accepts"] == 0.01
     assert shares[3] == figures.acceptance_of_good
+
+
+def test_runs_near_a_limit_are_set_aside_in_a_curve_of_their_own() -> None:
+    """Half of the wrong ones are off by a tenth of the limit, and are those that look best."""
+    made = [
+        replace(run, translation_cm=27.5, rotation_deg=0.3, witnesses={**(run.witnesses or {}), "match_error": 1.0})
+        if not run.good and run.number % 2
+        else run
+        for run in runs(800, Spread())
+    ]
+    _, _, figures = fit_frames(made, BOTH)
+    at_one = figures.curve[3]
+    assert 4 * at_one["acceptance_of_good"] < at_one["acceptance_of_clear"]
+    assert is_near(replace(made[0], rotation_deg=0.3), (0.25, 99.0)) and not is_near(made[0], (9.0, 99.0))
 
 
 def test_what_witnesses_do_not_tell_is_not_accepted() -> None:
