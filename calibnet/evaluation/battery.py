@@ -11,22 +11,33 @@ import numpy as np
 from calibnet.cascade import Cascade
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
+from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.audit import other_drive
-from calibnet.evaluation.corruptions import Corruption, corruptions
+from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
+from calibnet.evaluation.drives import shares_mount
 from calibnet.evaluation.faults import unaltered
+from calibnet.evaluation.faulty import Faulty, farthest
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.causes import Search
+from calibnet.judging.drive import FEWEST_JUDGED
+from calibnet.judging.lag import lags
 from calibnet.methods.calibrator import Calibrator
 from calibnet.trace import CascadeTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, FRAME_LIMITS, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Verdict
 
 PLAIN = Corruption("none", "", None, unaltered, middle=False)
 """Input as it should be."""
+ONE_MOUNT = Corruption("one-mount", "", None, unaltered, middle=False)
+"""A drive as it should be."""
+DRIVE_FRAMES = 12
+"""Of a drive that is put on two mounts, at most."""
 
-Judge = Callable[[Frame, Extrinsic, CascadeTrace | None], Verdict]
-"""Gives the verdict on a frame, the guess it was calibrated from, and the trace; None where it could not be run."""
+Judge = Callable[[Frame, Extrinsic, CascadeTrace | None, Search | None], Verdict]
+"""Gives the verdict on a frame, the guess it was calibrated from, the trace, which is None where it could not be run,
+and the lags that its scan may have."""
 
 
 @dataclass(frozen=True)
@@ -38,16 +49,19 @@ class BatteryRun:
         error: of the extrinsic that was judged.
         word: of the verdict.
         causes: names of the causes that it gives.
+        limits: degrees and centimetres within which the extrinsic is right.
     """
 
     corruption: Corruption
     error: PoseError
     word: str
     causes: tuple[str, ...] = ()
+    limits: tuple[float, float] = FRAME_LIMITS
 
-    def is_right(self, limits: tuple[float, float] = FRAME_LIMITS) -> bool:
-        """Whether the extrinsic is within limits of degrees and centimetres."""
-        return self.error.rotation_deg <= limits[0] and self.error.translation_cm <= limits[1]
+    @property
+    def is_right(self) -> bool:
+        """Whether the extrinsic is within the limits."""
+        return self.error.rotation_deg <= self.limits[0] and self.error.translation_cm <= self.limits[1]
 
 
 @dataclass(frozen=True)
@@ -79,11 +93,9 @@ class Battery:
 
     Attributes:
         runs: every single one.
-        limits: degrees and centimetres within which an extrinsic is right.
     """
 
     runs: tuple[BatteryRun, ...]
-    limits: tuple[float, float] = FRAME_LIMITS
 
     @property
     def rows(self) -> tuple[BatteryRow, ...]:
@@ -93,9 +105,10 @@ class Battery:
             groups.setdefault((run.corruption.name, run.corruption.strength), []).append(run)
         return tuple(self._row(name, strength, runs) for (name, strength), runs in groups.items())
 
-    def _row(self, name: str, strength: str, runs: Sequence[BatteryRun]) -> BatteryRow:
+    @staticmethod
+    def _row(name: str, strength: str, runs: Sequence[BatteryRun]) -> BatteryRow:
         accepted = [run for run in runs if run.word == ACCEPTED]
-        right = sum(run.is_right(self.limits) for run in accepted)
+        right = sum(run.is_right for run in accepted)
         unsure = sum(run.word == CANNOT_TELL for run in runs)
         return BatteryRow(
             name,
@@ -111,13 +124,13 @@ class Battery:
     @property
     def false_accept_rate(self) -> float:
         """Share of all runs that are accepted and wrong; not a number without runs."""
-        wrong = [run.word == ACCEPTED and not run.is_right(self.limits) for run in self.runs]
+        wrong = [run.word == ACCEPTED and not run.is_right for run in self.runs]
         return float(np.mean(wrong)) if wrong else float("nan")
 
     @property
     def acceptance_of_good(self) -> float:
         """Share that is accepted of the runs without fault that end right; not a number without such runs."""
-        good = [run for run in self.runs if run.corruption.name == PLAIN.name and run.is_right(self.limits)]
+        good = [run for run in self.runs if run.corruption.name == PLAIN.name and run.is_right]
         return float(np.mean([run.word == ACCEPTED for run in good])) if good else float("nan")
 
     def as_dict(self) -> dict[str, Any]:
@@ -158,7 +171,7 @@ def run_battery(
     runs = []
     for sequence in sequences:
         for position in range(len(sequence)):
-            frame = sequence[position]
+            frame, late = sequence[position], lags(sequence, position)
             for corruption in [PLAIN, *faults(sequence, position)]:
                 altered = corruption.put(frame)
                 farther = MiscalibrationRange(
@@ -166,7 +179,7 @@ def run_battery(
                 )
                 for repeat in range(repeats):
                     guess = draw_miscalibration(farther, seed, frame.index, repeat) @ frame.camera_from_lidar
-                    verdict = judged(cascade, judge, altered, guess)
+                    verdict = judged(cascade, judge, altered, guess, late)
                     error = pose_error(verdict.camera_from_lidar, altered.camera_from_lidar)
                     names = tuple(cause.name for cause in verdict.causes)
                     runs.append(BatteryRun(corruption, error, verdict.word, names))
@@ -175,13 +188,13 @@ def run_battery(
     return Battery(tuple(runs))
 
 
-def judged(cascade: Calibrator, judge: Judge, frame: Frame, guess: Extrinsic) -> Verdict:
+def judged(cascade: Calibrator, judge: Judge, frame: Frame, guess: Extrinsic, late: Search | None = None) -> Verdict:
     """Calibrate one frame from a guess, and judge that."""
     try:
         trace: CascadeTrace | None = cascade.calibrate(frame, guess)
     except CalibrationError:
         trace = None
-    return judge(frame, guess, trace)
+    return judge(frame, guess, trace, late)
 
 
 def measure_battery(
@@ -193,7 +206,7 @@ def measure_battery(
     beside: Callable[[], Iterable[FrameSequence]] = lambda: (),
     observer: Callable[[BatteryRun], None] | None = None,
 ) -> Battery:
-    """Put every fault into every frame, and see whether the cascade knows, and says why.
+    """Put every fault into every frame, and two mounts into every drive; see whether the cascade knows, and says why.
 
     Args:
         cascade: what calibrates and judges; causes are looked for where it does not accept.
@@ -209,8 +222,41 @@ def measure_battery(
     def faults(sequence: FrameSequence, position: int) -> Iterable[Corruption]:
         return corruptions(sequence, position, donors[id(sequence)])
 
-    def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None) -> Verdict:
+    def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None, late: Search | None) -> Verdict:
         verdict = None if trace is None else trace.verdict
-        return verdict if verdict is not None and verdict.word == ACCEPTED else cascade.explain(frame, guess)
+        return verdict if verdict is not None and verdict.word == ACCEPTED else cascade.explain(frame, guess, late)
 
-    return run_battery(cascade, judge, sequences, faults, range_, repeats, seed, observer)
+    of_frames = run_battery(cascade, judge, sequences, faults, range_, repeats, seed, observer).runs
+    return Battery((*of_frames, *two_mount_runs(cascade, sequences, range_, repeats, seed, observer)))
+
+
+def two_mount_runs(
+    cascade: Cascade,
+    sequences: Iterable[FrameSequence],
+    range_: MiscalibrationRange,
+    repeats: int = 1,
+    seed: int = 0,
+    observer: Callable[[BatteryRun], None] | None = None,
+) -> list[BatteryRun]:
+    """Solve every drive as it is, and with the LiDAR moved in its second half: then no one extrinsic is right.
+
+    The arguments are those of `measure_battery`. The error is that against the mount that is farther off.
+    """
+    runs = []
+    for sequence in sequences:
+        if len(sequence) < FEWEST_JUDGED or not shares_mount(sequence):
+            continue
+        for fault in (None, *two_mounts(second=True)):
+            drive = Faulty(sequence, spread(len(sequence), DRIVE_FRAMES), fault, [])
+            for repeat in range(repeats):
+                guess = draw_miscalibration(range_, seed, 0, repeat) @ sequence[0].camera_from_lidar
+                try:
+                    verdict = cascade.calibrate_drive(drive, guess).verdict
+                except CalibrationError as failed:
+                    verdict = Verdict(REJECTED, str(failed), guess)
+                assert verdict is not None, "the cascade judges what it finds"
+                error = farthest(verdict.camera_from_lidar, drive)
+                runs.append(BatteryRun(fault or ONE_MOUNT, error, verdict.word, (), DRIVE_LIMITS))
+                if observer is not None:
+                    observer(runs[-1])
+    return runs

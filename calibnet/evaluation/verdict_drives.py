@@ -5,21 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict
-from functools import lru_cache
 
 import numpy as np
 
 from calibnet.cascade import Cascade
-from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
 from calibnet.datasets.selection import spread
-from calibnet.errors import CalibnetError, DatasetError
+from calibnet.errors import CalibnetError
 from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
 from calibnet.evaluation.drives import shares_mount
+from calibnet.evaluation.faulty import Faulty, farthest, readable
 from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking, within
 from calibnet.evaluation.virtual import Virtual
-from calibnet.geometry import invert, pose_error, sample_miscalibration
+from calibnet.geometry import invert, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.judging.drive_witnesses import drive_witnesses
@@ -31,37 +30,6 @@ ENOUGH = 8
 """Frames from which on a sequence is drawn as often as any: half as many, half as often."""
 VIRTUAL_SHARE = 0.5
 """Of the drives: those that `calibnet.evaluation.virtual` shows through another lens, turned, half of them thinned."""
-
-
-class Faulty:
-    """A drive with a fault in its frames; what the fault needs that a frame lacks makes the frame unreadable."""
-
-    def __init__(
-        self, sequence: FrameSequence, positions: list[int], fault: Corruption | None, donors: list[Frame]
-    ) -> None:
-        self.sequence, self.positions, self.fault, self.donors = sequence, positions, fault, donors
-        self.read = lru_cache(len(positions))(self._read)
-
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    def __getitem__(self, number: int) -> Frame:
-        """The frame of this number, with the fault."""
-        return self.read(number)
-
-    def _read(self, number: int) -> Frame:
-        position = self.positions[number]
-        frame = self.sequence[position]
-        if self.fault is None:
-            return frame
-        for fault in self._faults(number):
-            if (fault.name, fault.strength) == (self.fault.name, self.fault.strength):
-                return fault.put(frame)
-        raise DatasetError(f"Frame {position} of {self.sequence.name} cannot have the fault {self.fault.name}.")
-
-    def _faults(self, number: int) -> Iterable[Corruption]:
-        yield from corruptions(self.sequence, self.positions[number], self.donors)
-        yield from two_mounts(second=2 * number >= len(self.positions))
 
 
 class DriveStream:
@@ -129,9 +97,7 @@ def measured(
     """
     estimate = cascade.calibrate_drive(drive, guess)
     there = estimate.camera_from_lidar
-    truths = {frame.camera_from_lidar.tobytes(): frame.camera_from_lidar for frame in readable(drive)}
-    errors = [pose_error(there, truth) for truth in truths.values()]
-    error = max(errors, key=lambda error: error.translation_cm / DRIVE_LIMITS[1] + error.rotation_deg / DRIVE_LIMITS[0])
+    error = farthest(there, drive)
     found = drive_witnesses(estimate, guess, cascade.stages[0].range)
     asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
     return VerdictRun(
@@ -144,16 +110,7 @@ def measured(
         error.translation_cm,
         within(error, DRIVE_LIMITS),
         asdict(found) if asked and found is not None else None,
-        pose_vector(there @ invert(next(iter(truths.values())))).tolist(),
+        pose_vector(there @ invert(next(readable(drive)).camera_from_lidar)).tolist(),
         np.linalg.inv(estimate.covariance).tolist(),
         float("nan"),
     )
-
-
-def readable(drive: Faulty) -> Iterable[Frame]:
-    """The frames that can be read."""
-    for number in range(len(drive)):
-        try:
-            yield drive[number]
-        except DatasetError:
-            continue

@@ -16,8 +16,9 @@ LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 FEWEST_JUDGED = 4
 """Frames that a drive needs to be accepted: of two or three, which mostly show one place, as many end beyond the limits
 as within, and nothing tells which (docs/decisions.md, "Drives")."""
-HALVES_CM = 15.0
-"""Between the halves of a drive, turns counted as `calibnet.judging.drive_witnesses` does, from which on it is told."""
+HALVES_CM, ALIGNED_CM = 15.0, 7.0
+"""Between the halves of a drive, and between what its networks and its edges say, from which on it is told; turns
+counted as `calibnet.judging.drive_witnesses` does."""
 
 
 def judge_drive(
@@ -68,9 +69,12 @@ def _word(
         return ACCEPTED, f"{used} frames agree."
     if math.isnan(wrong):
         return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
-    halves = math.exp(witnesses.halves)
-    disagreeing = f"; its halves are {halves:.0f} cm apart" if halves > HALVES_CM else ""
+    halves, aligned = math.exp(witnesses.halves), math.exp(witnesses.aligned)
+    why = [f"its halves are {halves:.0f} cm apart"] if halves > HALVES_CM else []
+    if aligned > ALIGNED_CM:
+        why.append(f"edges lie {aligned:.0f} cm from what the networks say, and either may be right")
     return CANNOT_TELL, (  # not rejected: many of those that are off are off by little more
         f"{used} frames agree, but not as those of drives that end right do (that it is more than "
-        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off is {wrong:.0%} likely){disagreeing}."
+        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off is {wrong:.0%} likely)"
+        f"{''.join(f'; {one}' for one in why)}."
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from calibnet.verdict import ACCEPTED
+from calibnet.verdict import ACCEPTED, DRIVE_LIMITS, FRAME_LIMITS
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,11 +62,11 @@ def print_battery(battery: Battery, console: Console) -> None:
         counts = (row.runs, row.accepted_right, row.accepted_wrong, row.rejected, row.cannot_tell, row.cause_right)
         table.add_row(f"{row.corruption} {row.strength}".strip(), *map(str, counts))
     console.print(table)
-    rotation, translation = battery.limits
+    (degrees, cm), (of_drive, cm_of_drive) = FRAME_LIMITS, DRIVE_LIMITS
     console.print(
-        f"Accepted though more than {rotation:g}° or {translation:g} cm off: {battery.false_accept_rate:.1%} of "
-        f"{len(battery.runs)} runs. Accepted of the runs without fault that end within that: "
-        f"{battery.acceptance_of_good:.0%}."
+        f"Accepted though more than {degrees:g}° or {cm:g} cm off (drives, the rows of one and of two mounts: "
+        f"{of_drive:g}° or {cm_of_drive:g} cm): {battery.false_accept_rate:.1%} of {len(battery.runs)} runs. "
+        f"Accepted of the frames without fault that end within that: {battery.acceptance_of_good:.0%}."
     )
 
 

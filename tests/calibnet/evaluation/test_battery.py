@@ -2,20 +2,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from calibnet.datasets.frame import Frame
+from calibnet.datasets.frame import Frame, Frames, Sequence
 from calibnet.errors import CalibrationError
-from calibnet.evaluation.battery import PLAIN, Battery, BatteryRun, run_battery
+from calibnet.evaluation.battery import PLAIN, Battery, BatteryRun, run_battery, two_mount_runs
 from calibnet.evaluation.corruptions import Corruption
 from calibnet.evaluation.faults import grey, unaltered
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, range_of, transform
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.causes import Search
+from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict
 from tests.support.drive import CAMERA, REFERENCE, Drive
+from tests.support.scene import Scenes
 
 MIRRORED = Corruption("mirrored", "", "mirrored", unaltered)
 
@@ -42,7 +46,8 @@ def test_rows_count_what_was_said_by_fault_and_strength() -> None:
     assert (mirrored.runs, mirrored.accepted_wrong, mirrored.rejected, mirrored.cause_right) == (3, 1, 2, 1)
     assert battery.false_accept_rate == pytest.approx(2 / 6)
     assert battery.acceptance_of_good == pytest.approx(1 / 2)
-    assert Battery(runs, limits=(0.3, 8.0)).acceptance_of_good == pytest.approx(1.0)
+    drive = BatteryRun(PLAIN, off(0.2, 24.9), CANNOT_TELL, (), (0.3, 8.0))
+    assert not drive.is_right and runs[1].is_right
     assert battery.as_dict()["rows"][0] == vars(plain)
 
 
@@ -67,7 +72,7 @@ class HalfWay:
 def test_every_frame_is_judged_with_every_fault_from_the_guess_that_does_not_know_of_it() -> None:
     guesses: list[Extrinsic] = []
 
-    def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None) -> Verdict:
+    def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None, late: Search | None) -> Verdict:
         guesses.append(guess)
         if trace is None:
             return Verdict(REJECTED, "", guess, causes=(Cause("other-picture", "", ""),))
@@ -97,3 +102,18 @@ def test_every_frame_is_judged_with_every_fault_from_the_guess_that_does_not_kno
     assert pose_error(far_guess, REFERENCE).translation_cm == pytest.approx(
         3 * pose_error(plain, REFERENCE).translation_cm, rel=0.2
     )
+
+
+def test_two_mounts_are_a_row_of_drives_and_held_to_the_mount_that_is_farther_off() -> None:
+    class FirstMount:
+        """Accepts the extrinsic of a drive's first frame."""
+
+        def calibrate_drive(self, frames: Frames, initial: Extrinsic) -> SimpleNamespace:
+            return SimpleNamespace(verdict=Verdict(ACCEPTED, "", frames[0].camera_from_lidar))
+
+    drives: list[Sequence] = [Scenes(6), Scenes(FEWEST_JUDGED - 1)]  # the second is too short
+    runs = two_mount_runs(FirstMount(), drives, MiscalibrationRange(5, 0.5))  # type: ignore[arg-type]
+    rows = {(row.corruption, row.strength): row for row in Battery(tuple(runs)).rows}
+    assert rows["one-mount", ""].accepted_right == 1
+    for strength in ("0.5 deg, 0 cm", "1 deg, 10 cm", "3 deg, 30 cm"):
+        assert rows["two-mounts", strength].accepted_wrong == 1

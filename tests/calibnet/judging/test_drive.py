@@ -63,6 +63,13 @@ def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -
     np.testing.assert_array_equal(verdict.covariance, drive.covariance)
 
 
+def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
+    doubted = estimate(error=2.5)
+    networks = replace(doubted, camera_from_lidar=miscalibration([0, 0, 0], [0, 0.09, 0]) @ doubted.camera_from_lidar)
+    verdict = judge_drive(replace(doubted, networks=networks), REFERENCE, RANGES[2], DOUBT)
+    assert verdict.reason.endswith("; edges lie 9 cm from what the networks say, and either may be right.")
+
+
 def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
     few = replace(estimate(), frames=3, looks=estimate().looks[:3])
     verdict = judge_drive(few, REFERENCE, RANGES[2], DOUBT)
