@@ -31,8 +31,10 @@ OF_FRAMES = ("match_error", "misfit", "lens", "alike")
 """Witnesses of a frame that are fitted: on sequences left out, all nine accept fewer of the good ones, and so does the
 stated deviation in the place of, or beside, the one for matches that err alike. How far a run went counts apart, in the
 ranges it is held to."""
-OF_DRIVES = ("match_error", "stated", "scatter", "halves", "aligned")
-"""Witnesses of a drive that are fitted: there are few drives, and on those left out all nine do worse than these."""
+OF_DRIVES = ("match_error", "aligned")
+"""Witnesses of a drive that are fitted: there are few drives, and on those left out more of them do no better. What
+tells most is how far the alignment of edges goes from what the networks say: where they disagree, either may be
+wrong."""
 LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""
 FEWEST, FEWEST_DRIVES = 10, 6

@@ -36,7 +36,7 @@ MOST_WORKERS = 8
     "--drive-data",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
-    help="Drives besides those of --data. Repeatable. Good ones are needed: of six frames and more, on a known mount.",
+    help="Drives besides those of --data. Repeatable. Good ones are needed: eight frames and more on a known mount.",
 )
 @click.option(
     "--synthetic",
