@@ -18,7 +18,7 @@ from inspector.record.observation import Grid, Layout, Observation, StageLayout
 from inspector.record.pictures.legends import log_map_legends, log_names
 from inspector.record.pictures.maps import certainty_image, flow_image, reach_px, subcell_match
 from inspector.record.pictures.matches import StartingPoints, chosen_match, match_of
-from inspector.record.pictures.search_window import SearchWindow
+from inspector.record.pictures.search_window import CELL_FRAME, SearchWindow
 from inspector.record.pictures.slices import slice_marks, slices_picture
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import (
@@ -78,7 +78,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
         log_names(rec, LEGEND_SLICES, marks | true)
     if Part.VOLUMES in layout.contents.parts:
         log_map_legends(rec)
-        log_names(rec, LEGEND_WINDOW, {"now": colors.INITIAL, "won": colors.FOUND} | true)
+        log_names(rec, LEGEND_WINDOW, {"its cell": CELL_FRAME, "now": colors.INITIAL, "won": colors.FOUND} | true)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
@@ -126,8 +126,8 @@ def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     if layout.has_reference:
         views.append(map_view(f"{scale}: true displacement", path(TRUE_MATCH), number, grid, cell))
     views += [
-        map_view(f"{scale}: how surely (peak probability)", path(PEAK_PROBABILITY), number, grid, cell),
-        image_view(f"{scale}: window of the pink cell", path(WINDOW)),
+        map_view(f"{scale}: peak probability", path(PEAK_PROBABILITY), number, grid, cell),
+        image_view(f"{scale}: search window", path(WINDOW)),
     ]
     if alone:
         return rrb.Grid(*views, grid_columns=2)

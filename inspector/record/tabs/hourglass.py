@@ -77,7 +77,7 @@ def _stage_pages(stage: StageLayout, layout: Layout) -> View:
 
 def _probability_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     scale = scale_name(grid)
-    names = {DECIDED_BEFORE: "decided, before the hourglass", DECIDED_AFTER: "decided, after it"}
+    names = {DECIDED_BEFORE: "decided, before", DECIDED_AFTER: "decided, after"}
     if layout.has_reference:
         names |= {TRUTH_BEFORE: "share on the truth, before", TRUTH_AFTER: "share on the truth, after"}
     views = [

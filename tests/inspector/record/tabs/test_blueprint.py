@@ -54,7 +54,7 @@ def test_every_stage_and_scale_has_its_views() -> None:
     views = names(make_blueprint(layout()))
     for stage in ("stage 3 (±5°/0.5 m)", "stage 5 (±1°/0.1 m)"):
         assert f"After {stage}" in views
-    won = ["displacement that won", "true displacement", "how surely", "matching scores"]
+    won = ["displacement that won", "true displacement", "peak probability", "matching scores"]
     for part in (*won, "decided, before", "share on the truth, after", "channels before"):
         assert sum(part in name for name in views) == 4, part
 
