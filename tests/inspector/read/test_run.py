@@ -199,7 +199,7 @@ def test_the_weights_training_record_and_the_versions_come_along(record: Callabl
     from calibnet import __version__
     from calibnet.geometry import RANGES
     from calibnet.weights import read_record, weights_path
-    from inspector.cli.run import describe_provenance
+    from inspector.cli.preparing import describe_provenance
 
     provenance = describe_provenance("compact", [3], None)
     record(tmp_path / "x.rrd", length=1, detail="overview", strides=(32,), provenance=provenance)
