@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 import torch
 
 from calibnet.cascade.stage import Stage, View
@@ -13,11 +15,14 @@ from calibnet.runtime.clock import Clock
 
 
 class ImageViews:
-    """A frame's image as stages see it; those that share image size and image branch have one view."""
+    """A frame's image as stages see it; those that share image size and image branch have one view.
+
+    Its points are laid out one coordinate after the other, as every projection reads them.
+    """
 
     def __init__(self, frame: Frame, clock: Clock) -> None:
         """Of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
-        self.frame, self.clock = frame, clock
+        self.frame, self.clock = replace(frame, points=np.asfortranarray(frame.points)), clock
         self._views: dict[tuple[int, ...], View] = {}
 
     def of(self, stage: Stage, branch: int) -> View:
@@ -27,7 +32,8 @@ class ImageViews:
         key = branch, *(size for camera in cameras for size in (camera.width, camera.height))
         if key not in self._views:
             self.clock.skip()  # stages ran since the last view, and time themselves
-            self._views[key] = stage.view(self.frame, self.clock)
+            of_this_size = (view for known, view in self._views.items() if known[1:] == key[1:])
+            self._views[key] = stage.view(self.frame, self.clock, next(of_this_size, None))
         return self._views[key]
 
 

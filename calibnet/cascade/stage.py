@@ -82,18 +82,32 @@ class Stage:
         return frame.camera.fitted(size * config.input_height, size * config.input_width, config.scales[-1])
 
     @torch.inference_mode()
-    def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
-        """The frame's image as this stage sees it; ``clock`` hears ``"resize"`` and ``"image_features"``."""
+    def view(
+        self, frame: Frame, clock: Callable[[str], None] = lambda part: None, of_this_size: View | None = None
+    ) -> View:
+        """The frame's image as this stage sees it.
+
+        Args:
+            frame: the whole of it, faces included.
+            clock: hears ``"resize"`` and ``"image_features"``.
+            of_this_size: a view of the frame that another stage has of the same size: then nothing is resized again.
+        """
         if frame.faces:
-            faces = tuple(self.view(frame.through(face), clock) for face in frame.faces)
+            known = of_this_size.faces if of_this_size else [None] * len(frame.faces)
+            seen = zip(frame.faces, known, strict=True)
+            faces = tuple(self.view(frame.through(face), clock, one) for face, one in seen)
             return View(*faces[0][:2], faces)
         with autocast(self.device):
-            image = torch.from_numpy(resize_image(frame.image, self.camera(frame)))
-            image = image.permute(2, 0, 1)[None].to(self.device)
+            image = of_this_size.image if of_this_size else self._resized(frame)
             clock("resize")
             view = View(image, self.network.features.image(image))
             clock("image_features")
         return view
+
+    def _resized(self, frame: Frame) -> Tensor:
+        """The image ``[1, 3, H, W]`` at this stage's size, on its device."""
+        image = torch.from_numpy(resize_image(frame.image, self.camera(frame)))
+        return image.permute(2, 0, 1)[None].to(self.device)
 
     def correct(
         self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, held: Held | None = None

@@ -45,7 +45,8 @@ class Projection:
     def sorted(self) -> Projection:
         """The same points, far to near."""
         order = self.far_to_near()
-        return Projection(self.pixels[order], self.depth[order], self.index[order], self.points[order])
+        pixels, points = (rows.T.take(order, axis=1).T for rows in (self.pixels, self.points))  # as they lie in memory
+        return Projection(pixels, self.depth[order], self.index[order], points)
 
 
 def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera) -> Projection:

@@ -20,26 +20,13 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
-from calibnet.network.convolution import ACTIVATIONS, Conv3d
+from calibnet.network.convolution import Conv3d, Pointwise
 from calibnet.network.cost_volume import TEMPERATURE
 
 
 def convolve(convolution: Callable[[Tensor], Tensor], rows: Tensor) -> Tensor:
     """Apply to ``[N, ..., C]`` a convolution that takes ``[N, C, ...]``; the channels stay last in memory."""
     return convolution(rows.movedim(-1, 1)).movedim(1, -1)
-
-
-class Pointwise(Conv3d):
-    """A 1x1x1 convolution and its activation."""
-
-    def __init__(self, inputs: int, outputs: int, activation: str | None = None) -> None:
-        super().__init__(inputs, outputs, 1, activation=activation)
-
-    def forward(self, volume: Tensor) -> Tensor:
-        """``[B, Dy, Dx, h, w, C] -> [B, Dy, Dx, h, w, C']``."""
-        if self.packed is None:  # a matrix product is faster than a convolution that is not packed
-            return ACTIVATIONS[self.activation](F.linear(volume, self.weight.flatten(1), self.bias))
-        return convolve(self.packed, volume.flatten(1, 2)).unflatten(1, volume.shape[1:3])
 
 
 class WindowConv(nn.Module):
@@ -126,16 +113,15 @@ class Fusion(NamedTuple):
         """The sum: ``[B, Dy, Dx, h, w, C]``."""
         return self.own if self.coarser is None else self.own + double(refine_window(self.coarser))
 
-    def read(self, head: nn.Module) -> Tensor:
+    def read(self, head: Pointwise) -> Tensor:
         """What a 1x1x1 convolution makes of the sum: ``[B, Dy, Dx, h, w, C']``.
 
         It is linear and so is the interpolation. So each part is read before it is interpolated, and the sum, which at
         the finest scale is by far the largest volume, is never made.
         """
-        assert isinstance(head, nn.Conv3d)
-        weight = head.weight.flatten(1)
-        coarser = None if self.coarser is None else F.linear(self.coarser, weight)
-        return Fusion(F.linear(self.own, weight, head.bias), coarser).volume()
+        assert head.bias is not None
+        coarser = None if self.coarser is None else head(self.coarser) - head.bias  # which is to be added once
+        return Fusion(head(self.own), coarser).volume()
 
 
 class Hourglass(nn.Module):
@@ -180,7 +166,7 @@ class Aggregation(nn.Module):
         # each a sequence of one: so its weights are named in the files
         self.enter = nn.ModuleList(nn.Sequential(Pointwise(inputs, width, "relu")) for width in channels)
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
-        self.score = nn.ModuleList(nn.Conv3d(width, 1, 1) for width in channels)
+        self.score = nn.ModuleList(Pointwise(width, 1) for width in channels)
 
     def forward(
         self, volumes: list[Tensor], scores: list[Tensor], keep_activations: bool = False

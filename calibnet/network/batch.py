@@ -95,19 +95,17 @@ def lidar_input(
     points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera, scales: tuple[int, ...]
 ) -> LidarInput:
     """Project a scan ``[N, 4]`` and find the nearest point of each pixel and of each cell."""
-    projection = project(points, camera_from_lidar, camera)
-    far_to_near = projection.far_to_near()
+    seen = project(points, camera_from_lidar, camera).sorted()  # far to near
 
     def nearest(stride: int, *of_points: NDArray[np.float32]) -> NDArray[np.float32]:
-        size, cells = cells_of_points(projection, camera, stride)
-        cells = cells[far_to_near]
+        size, cells = cells_of_points(seen, camera, stride)
         grid = np.zeros((len(of_points), *size), np.float32)
         for channel, values in zip(grid, of_points, strict=True):
-            channel.reshape(-1)[cells] = values[far_to_near]  # the last assignment wins: the nearest
+            channel.reshape(-1)[cells] = values  # the last assignment wins: the nearest
         return grid
 
-    image = nearest(1, projection.depth, points[projection.index, 3])
-    return LidarInput(image, [nearest(scale, *projection.points.T) for scale in scales])
+    image = nearest(1, seen.depth, points[seen.index, 3])
+    return LidarInput(image, [nearest(scale, *seen.points.T) for scale in scales])
 
 
 def make_batch(

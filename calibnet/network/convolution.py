@@ -7,6 +7,7 @@ pass: the same numbers in a tenth to a half less time a layer (in bf16; a twenti
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Callable
 from functools import lru_cache, partial
@@ -80,6 +81,46 @@ class Conv2d(_Convolution, nn.Conv2d):
 
 class Conv3d(_Convolution, nn.Conv3d):
     """3-D convolution, then an activation of `ACTIVATIONS`."""
+
+
+class Pointwise(Conv3d):
+    """A 1x1x1 convolution over channels that come last, then an activation: ``[..., C] -> [..., C']``."""
+
+    CELLS = 4
+    """Cells that are taken as one where weights are packed."""
+
+    def __init__(self, inputs: int, outputs: int, activation: str | None = None) -> None:
+        super().__init__(inputs, outputs, 1, activation=activation)
+
+    def forward(self, volume: Tensor) -> Tensor:
+        """``[..., C] -> [..., C']``."""
+        if self.packed is not None:
+            return self.packed(volume)
+        return ACTIVATIONS[self.activation](F.linear(volume, self.weight.flatten(1), self.bias))
+
+    def pack(self, precision: torch.dtype) -> None:
+        """As other convolutions, but several cells in a row as one that has all their channels.
+
+        Few channels leave most of the processor's wide products idle; of more, by weights that are zero between cells,
+        it makes the same numbers in half the time.
+        """
+
+        def joined(cells: int) -> Callable[[Tensor], Tensor]:
+            layer = Conv2d(cells * self.in_channels, cells * self.out_channels, 1, activation=self.activation)
+            layer.weight.data = torch.block_diag(*[self.weight.detach().flatten(1)] * cells)[:, :, None, None]
+            layer.bias = None if self.bias is None else nn.Parameter(self.bias.detach().repeat(cells))
+            layer.pack(precision)
+            assert layer.packed is not None
+            return layer.packed
+
+        layers = {cells: joined(cells) for cells in range(1, self.CELLS + 1) if self.CELLS % cells == 0}
+
+        def convolve(volume: Tensor) -> Tensor:
+            cells = math.gcd(volume.numel() // self.in_channels, self.CELLS)
+            rows = volume.reshape(1, 1, -1, cells * self.in_channels).permute(0, 3, 1, 2)
+            return layers[cells](rows).permute(0, 2, 3, 1).reshape(*volume.shape[:-1], self.out_channels)
+
+        self.packed = convolve
 
 
 def pack(network: nn.Module, precision: torch.dtype) -> None:

@@ -7,8 +7,6 @@ cells around it, and a volume is ``[B, Dy, Dx, h, w, C]``.
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
@@ -34,8 +32,8 @@ def surroundings(image: Tensor, height: int, radius: int) -> Tensor:
 def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """Group-wise correlation of every LiDAR cell with the window of image cells around it.
 
-    One batched matrix product of short runs of LiDAR cells with the image cells around them, and a
-    gather of the band around the diagonal; a loop of shifted products takes several times as long on a
+    One batched matrix product of short runs of LiDAR cells with the image cells around them, of which the
+    band around the diagonal is read; a loop of shifted products takes several times as long on a
     CPU, and the product of all pairs of cells many times the memory.
 
     Args:
@@ -48,32 +46,27 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
         ``[B, Dy, Dx, h, w, groups]`` with zeros where the window leaves the image.
     """
     batch, _, height, width = lidar.shape
-    window, runs = 2 * radius + 1, -(-width // RUN)
-    beyond = runs * RUN - width
-    rows = F.pad(surroundings(image, height, radius), [0, beyond]).unflatten(1, (groups, -1)).flatten(0, 1)
-    rows = rows.unfold(2, window, 1).unfold(3, RUN + 2 * radius, RUN)  # [B*G, C/G, h, runs, Dy, R + 2r]
-    cells = F.pad(lidar, [0, beyond]).unflatten(1, (groups, -1)).flatten(0, 1).unflatten(3, (runs, RUN))
-    products = cells.permute(0, 2, 3, 4, 1) @ rows.permute(0, 2, 3, 1, 4, 5).flatten(4)
-    index = band_index(RUN, radius, lidar.device).expand(*products.shape[:4], -1)
-    volume = products.gather(4, index).flatten(2, 3)[:, :, :width]  # [B*G, h, w, D]
-    return volume.unflatten(3, (window, window)).unflatten(0, (batch, groups)).permute(0, 4, 5, 2, 3, 1)
+    window, around, runs = 2 * radius + 1, RUN + 2 * radius, -(-width // RUN)
+    beyond = [0, runs * RUN - width]
 
+    def grouped(features: Tensor) -> Tensor:
+        return F.pad(features, beyond).unflatten(1, (groups, -1)).movedim(2, -1)  # [B, G, h, w, C/G]: as in memory
 
-@lru_cache(maxsize=32)
-def band_index(width: int, radius: int, device: torch.device) -> Tensor:
-    """``[w, D]``: where the window of cell ``x`` lies in ``Dy`` rows of ``w + 2r`` image cells laid end to end."""
-    with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
-        offset = torch.arange(2 * radius + 1, device=device)
-        start = offset[:, None] * (width + 2 * radius) + offset  # [Dy, Dx]
-        return torch.arange(width, device=device)[:, None] + start.flatten()
+    rows = grouped(surroundings(image, height, radius)).unfold(2, window, 1).unfold(3, around, RUN).movedim(4, -1)
+    cells = grouped(lidar).unflatten(3, (runs, RUN))
+    products = cells @ rows.flatten(4, 5).transpose(-1, -2)  # [B, G, h, runs, R, Dy * (R + 2r)]
+    b, g, y, run, x, _ = products.stride()
+    # the window of a run's next cell begins one image cell farther on
+    band = products.as_strided((batch, groups, window, window, height, runs, RUN), (b, g, around, 1, y, run, x + 1))
+    return band.flatten(5)[..., :width].movedim(1, -1)
 
 
 def pairs(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
-    """Every LiDAR cell and the cells of its window, both ``[B, Dy, Dx, h, w, C]``, of features ``[B, C, h, w]``."""
+    """Every LiDAR cell and the cells of its window, both ``[B, C, Dy, Dx, h, w]``, of features ``[B, C, h, w]``."""
     window = 2 * radius + 1
-    moved = surroundings(image, lidar.shape[2], radius).unfold(2, window, 1).unfold(3, window, 1)
-    moved = moved.permute(0, 4, 5, 2, 3, 1)
-    return lidar.permute(0, 2, 3, 1)[:, None, None].expand_as(moved), moved
+    moved = surroundings(image, lidar.shape[2], radius).contiguous().unfold(2, window, 1).unfold(3, window, 1)
+    moved = moved.permute(0, 1, 4, 5, 2, 3)
+    return lidar.contiguous()[:, :, None, None].expand_as(moved), moved
 
 
 def matching_score(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
@@ -102,4 +95,6 @@ class CostVolume(nn.Module):
         fixed, moved = pairs(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
         # a group's share of the cosine is about 1/G: scaled so that all channels start alike
         shares = groups * self.groups if self.groups > 1 else groups
-        return torch.cat([shares, fixed.to(groups.dtype), moved.to(groups.dtype)], dim=-1), score
+        # a channel after the other, then channels last: four times as fast as a few channels at a time
+        parts = [shares.movedim(-1, 1), fixed.to(groups.dtype), moved.to(groups.dtype)]
+        return torch.cat(parts, dim=1).movedim(1, -1).contiguous(), score

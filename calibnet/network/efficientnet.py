@@ -11,6 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
+import torch.nn.functional as F
 from safetensors.torch import load_file
 from torch import Tensor, nn
 
@@ -34,8 +35,8 @@ WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensor
 class SameConv(Conv2d):
     """Convolution of an even size with TensorFlow's padding, which is one wider at the far side where the stride is 2.
 
-    Padded alike at both sides by one more, it computes that too, behind one row and one column which are dropped:
-    cheaper than padding a wide input first.
+    Padded alike at both sides by one more, it computes that too, behind a margin of one row and one column which is
+    dropped: cheaper than padding a wide input first.
     """
 
     def __init__(
@@ -46,12 +47,40 @@ class SameConv(Conv2d):
 
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
+        return self.without_margin(self.with_margin(x))
+
+    def with_margin(self, x: Tensor) -> Tensor:
+        """``[B, C, H, W] -> [B, C', H/stride + 1, W/stride + 1]`` where there is one."""
         if self.training and self.groups > 1 and x.device.type == "cpu":
             with torch.autocast("cpu", enabled=False):  # oneDNN's gradients of these take three times as long in bf16
-                y = super().forward(x.float())
-        else:
-            y = super().forward(x)
-        return y if self.stride[0] == 1 else y[:, :, 1:, 1:]
+                return super().forward(x.float())
+        return super().forward(x)
+
+    def without_margin(self, y: Tensor) -> Tensor:
+        """What `with_margin` makes, or anything that treats its cells one by one, without the margin."""
+        return y[:, :, 1:, 1:] if self.stride[0] > 1 else y
+
+
+class Stem(SameConv):
+    """The first convolution, of stride 2.
+
+    What comes out is large and treated whole by the next. So the packed form has no margin: a first row and column of
+    zeros in the weights shifts them by what the margin does.
+    """
+
+    def pack(self, precision: torch.dtype) -> None:
+        """See `Conv2d.pack`."""
+        kernel, padding = self.kernel_size[0] + 1, self.padding[0] - 1
+        shifted = Conv2d(
+            self.in_channels, self.out_channels, kernel, self.stride, padding=padding, activation=self.activation
+        )
+        shifted.weight.data, shifted.bias = F.pad(self.weight.data, (1, 0, 1, 0)), self.bias
+        shifted.pack(precision)
+        self.packed = shifted.packed
+
+    def without_margin(self, y: Tensor) -> Tensor:
+        """See `SameConv.without_margin`."""
+        return y if self.packed else super().without_margin(y)
 
 
 class InvertedResidual(nn.Module):
@@ -68,7 +97,7 @@ class InvertedResidual(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """``[B, C, H, W] -> [B, C', H/stride, W/stride]``."""
         wide = x if self.expand is None else self.expand(x)
-        y = self.narrow(self.depthwise(wide))
+        y = self.depthwise.without_margin(self.narrow(self.depthwise.with_margin(wide)))  # cheaper to drop when narrow
         return x + y if self.skip else y
 
 
@@ -76,7 +105,7 @@ def efficientnet_levels() -> list[nn.Sequential]:
     """The encoder's levels from the image to 1/16, to be run one after the other; random until weights are loaded."""
     levels, channels = [], 32
     for position, groups in enumerate(LEVELS):
-        modules: list[nn.Module] = [] if position else [SameConv(3, channels, 3, 2), nn.ReLU6(inplace=True)]
+        modules: list[nn.Module] = [] if position else [Stem(3, channels, 3, 2, activation="relu6"), nn.Identity()]
         for number, width, kernel, stride, expansion in groups:
             for block in range(number):
                 modules.append(InvertedResidual(channels, width, kernel, 1 if block else stride, expansion))

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from calibnet.alignment import Evidence
 from calibnet.cascade import Cascade, SkippedStage, Stage
+from calibnet.cascade import stage as stage_module
 from calibnet.cascade.stage import View
 from calibnet.datasets.frame import Frame
 from calibnet.drive.convergence import Due
@@ -279,10 +280,12 @@ def test_a_stage_looks_again_until_the_next_one_can_take_over(frame: Frame, monk
 
 
 def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = count_image_features(monkeypatch)
+    calls, sizes = count_image_features(monkeypatch), []
+    resized = stage_module.resize_image
+    monkeypatch.setattr(stage_module, "resize_image", lambda *seen: sizes.append(seen) or resized(*seen))
     different = cascade(shared=False)
     trace = different.calibrate(frame, INITIAL)
-    assert len(calls) == 3
+    assert (len(calls), len(sizes)) == (3, 1), "but one picture, where they see it at one size"
     before = INITIAL
     for stage in different.stages:
         before = Cascade([stage]).calibrate(frame, before).arrived

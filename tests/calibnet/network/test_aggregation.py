@@ -114,7 +114,7 @@ def test_going_down_is_a_convolution_of_every_image_of_shared_displacements() ->
 
 
 def test_a_fused_volume_is_read_as_if_it_were_made() -> None:
-    fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), nn.Conv3d(3, 2, 1).double()
+    fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), Pointwise(3, 2).double()
     assert fusion.coarser is not None
     volume = fusion.own + refine_window(double(fusion.coarser))
     torch.testing.assert_close(fusion.volume(), volume)
@@ -125,8 +125,9 @@ def test_a_fused_volume_is_read_as_if_it_were_made() -> None:
 
 @pytest.mark.skipif(not HAS_ONEDNN, reason="this machine has no oneDNN for x86")
 @pytest.mark.parametrize("activation", [None, "relu"])
-def test_pointwise_convolution_says_the_same_packed(activation: str | None) -> None:
-    layer, volume = Pointwise(3, 4, activation).eval(), noise(2, 5, 5, 4, 6, 3).float()
+@pytest.mark.parametrize("size", [(4, 6), (1, 6), (3, 1)])  # four, two and one cell at once
+def test_pointwise_convolution_says_the_same_packed(activation: str | None, size: tuple[int, int]) -> None:
+    layer, volume = Pointwise(3, 4, activation).eval(), noise(1, 5, 5, *size, 3).float()
     with torch.no_grad():
         plain = layer(volume)
         expected = torch.einsum("...c,kc->...k", volume, layer.weight.flatten(1)) + layer.bias

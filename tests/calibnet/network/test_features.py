@@ -8,7 +8,8 @@ import torch.nn.functional as F
 
 from calibnet.errors import ConfigError
 from calibnet.network import efficientnet
-from calibnet.network.features import FeatureExtractor, lidar_channels
+from calibnet.network.convolution import HAS_ONEDNN, pack
+from calibnet.network.features import FeatureExtractor, image_channels, lidar_channels
 from calibnet.network.layers import group_count, norm2d
 from tests.support.tiny import TINY
 
@@ -40,6 +41,19 @@ def test_lidar_channels_bound_points_nearer_than_a_metre() -> None:
     lidar = torch.zeros(1, 2, 4, 4)
     lidar[0, 0, 1, 1] = 0.05
     assert lidar_channels(lidar)[0, 0, 1, 1] == 4.0
+
+
+def test_what_goes_into_a_network_is_made_in_the_precision_of_its_convolutions_and_is_the_same() -> None:
+    generator = torch.Generator().manual_seed(0)
+    lidar = torch.rand(1, 2, 24, 40, generator=generator) * torch.tensor([60.0, 1.0])[:, None, None]
+    lidar *= torch.rand(1, 1, 24, 40, generator=generator) < 0.1
+    image = torch.arange(256, dtype=torch.uint8).view(1, 1, 16, 16).expand(1, 3, 16, 16)
+    for made, given in ((lidar_channels, lidar), (image_channels, image)):
+        fine = made(given)
+        with torch.autocast("cpu", torch.bfloat16):
+            coarse = made(given)
+        assert (fine.dtype, coarse.dtype) == (torch.float32, torch.bfloat16)
+        assert coarse.equal(fine.bfloat16())
 
 
 @pytest.mark.parametrize("multi_scale", [True, False])
@@ -127,6 +141,16 @@ def test_strided_convolutions_pad_as_tensorflow_does() -> None:
         layer.bias.zero_()  # type: ignore[union-attr]
         rows = layer(torch.arange(4.0).view(1, 1, 1, 4).expand(1, 1, 4, 4))[0, 0]
     assert rows.tolist() == [[9.0, 15.0], [6.0, 10.0]]
+
+
+@pytest.mark.skipif(not HAS_ONEDNN, reason="this machine has no oneDNN for x86")
+def test_the_image_encoder_says_the_same_packed() -> None:
+    levels = torch.nn.Sequential(*efficientnet.efficientnet_levels()[:2]).eval()
+    image = torch.randn(1, 3, 32, 48, generator=torch.Generator().manual_seed(3))
+    with torch.no_grad():
+        plain = levels(image)
+        pack(levels, torch.float32)
+        torch.testing.assert_close(levels(image), plain, rtol=1e-4, atol=1e-5)
 
 
 def test_gradients_of_depthwise_convolutions_are_single_precision_under_autocast() -> None:

@@ -8,7 +8,6 @@ import torch
 from calibnet.geometry import RANGES
 from calibnet.network.aggregation import refinement
 from calibnet.network.config import load_preset
-from calibnet.network.cost_volume import band_index
 from calibnet.network.counting import count
 from calibnet.network.network import CalibrationNetwork
 from calibnet.network.target import Target
@@ -70,7 +69,6 @@ def test_a_sample_does_not_depend_on_its_batch() -> None:
 
 def test_training_may_follow_inference_at_the_same_size() -> None:
     """As in a run whose first batch has the size of the validation frames: nothing kept in between may spoil it."""
-    band_index.cache_clear()
     refinement.cache_clear()
     network = tiny_network()
     inputs = random_inputs(network.config, 64, 160)
