@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 from calibnet.cascade.image_views import ImageViews, image_branches
+from calibnet.cascade.loading import SkippedStage, load_stages
 from calibnet.cascade.prepared import PreparedFrames, prepared
-from calibnet.cascade.stage import Stage, load_stage
+from calibnet.cascade.stage import Stage
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.datasets.rig import RigCamera
 from calibnet.drive.rig import RigEstimate, solve_rig
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange, invert
+from calibnet.geometry import RANGES, invert
 from calibnet.geometry.known import Held, Known
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.judging.causes import Search, match_error_of, reach_of
@@ -30,15 +31,6 @@ from calibnet.runtime.precision import autocast
 from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
 from calibnet.verdict import ACCEPTED, Verdict
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
-
-
-@dataclass(frozen=True)
-class SkippedStage:
-    """A stage that will not run, and why."""
-
-    number: int
-    range: MiscalibrationRange
-    reason: str
 
 
 class Cascade:
@@ -101,11 +93,8 @@ class Cascade:
         if not set(numbers) <= set(range(1, len(RANGES) + 1)):
             raise ConfigError(f"Stages are numbered 1 to {len(RANGES)}; {', '.join(map(str, numbers))} is asked for.")
         manifest = load_manifest(preset, folder)
-        found = {number: load_stage(number, manifest, folder or PACKAGE) for number in numbers}
-        loaded = [stage for stage in found.values() if stage is not None]
-        skipped = [skipped_stage(number, preset) for number, stage in found.items() if stage is None]
-        before = [load_stage(number, manifest, folder or PACKAGE) for number in range(1, numbers[0] if wider else 1)]
-        kept = [stage for stage in before if stage is not None]
+        loaded, skipped = load_stages(numbers, preset, manifest, folder or PACKAGE)
+        kept, _ = load_stages(range(1, numbers[0] if wider else 1), preset, manifest, folder or PACKAGE)
         return cls(loaded, skipped, manifest.common, kept, load_coefficients(manifest, folder), known)
 
     @property
@@ -144,11 +133,8 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        clock, limit, upright = (
-            Clock(self.device),
-            self.stages[-1].match_error_limit_px,
-            Upright.of(initial, self.stages[0].range),
-        )
+        upright = Upright.of(initial, self.stages[0].range)
+        clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
         start, held = upright.extrinsic(initial), self._held(initial, upright)
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(prepared(frame, upright), clock)
@@ -310,13 +296,3 @@ class Cascade:
             return []
         covering = [position for position, stage in enumerate(self.wider) if stage.range.contains(moved, MARGIN)]
         return self.wider[max(covering, default=0) :]
-
-
-def skipped_stage(number: int, preset: str) -> SkippedStage:
-    """A stage of a preset that has no weights."""
-    range_ = RANGES[number - 1]
-    reason = (
-        f"Stage {number} ({range_.label}) of preset {preset} has no weights: "
-        f"train it with `calib-inspect train --preset {preset} --range {range_}`."
-    )
-    return SkippedStage(number, range_, reason)

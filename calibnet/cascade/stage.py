@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,27 +17,21 @@ from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
 from calibnet.datasets.plausibility import suspicion
-from calibnet.errors import CalibrationError, WeightsError
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, is_finest, orthonormal, scaled, transform
+from calibnet.errors import CalibrationError
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform
 from calibnet.geometry.known import Held, inverse
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.judging.covariance import Spread
 from calibnet.network.batch import Cut, lidar_input, make_batch
-from calibnet.network.convolution import pack
 from calibnet.network.displacement import DisplacementField, expected_error
 from calibnet.network.network import CalibrationNetwork, NetworkOutput
 from calibnet.runtime.clock import Clock
-from calibnet.runtime.precision import autocast, fastest
+from calibnet.runtime.precision import autocast
 from calibnet.trace import Matches, StageTrace
-from calibnet.weights import load_network
-from calibnet.weights.manifest import Manifest, StageSettings
+from calibnet.weights.manifest import StageSettings
 
 FEWEST_CELLS = 20
 """Cells with a LiDAR point below which a pose of six parameters would be a guess."""
-
-
-_kept: dict[tuple[object, ...], Stage] | None = None
-"""Stages that are loaded already, after `keep_weights`; None where every cascade loads its own."""
 
 
 class View(NamedTuple):
@@ -234,50 +226,3 @@ def matches_of(found: DisplacementField, cells: Tensor) -> Matches:
         return grid[0].float()[:, occupied].T.contiguous().cpu().numpy()
 
     return Matches(picked(cells), picked(found.displacement), picked(found.log_scale.exp()))
-
-
-def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
-    """The stage of a set of weights, ready to run; None where the set has none.
-
-    Args:
-        number: 1 (coarsest) to 5 (finest).
-        manifest: of the set.
-        folder: where its files lie.
-
-    Raises:
-        WeightsError: the file cannot be used, or holds another stage.
-    """
-    range_ = RANGES[number - 1]
-    path = folder / manifest.file(range_)
-    if not os.path.lexists(path):
-        return None
-    if _kept is None:
-        return _loaded(number, manifest, path)
-    key = (
-        number,
-        path.absolute(),
-        path.stat().st_mtime_ns,
-        repr(manifest.settings(range_)),
-        manifest.match_error_limit_px,
-    )
-    if key not in _kept:
-        _kept[key] = _loaded(number, manifest, path)
-    return _kept[key]
-
-
-def keep_weights() -> None:
-    """From now on load each stage once in this process; for workers that calibrate one drive after the other."""
-    global _kept
-    _kept = {} if _kept is None else _kept
-
-
-def _loaded(number: int, manifest: Manifest, path: Path) -> Stage:
-    range_ = RANGES[number - 1]
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network = load_network(path).to(device)
-    if network.range != range_:
-        raise WeightsError(f"{path} holds the weights of range {network.range}; give it its own name back.")
-    pack(network, fastest(device))
-    # the coarser stages' matches are coarse anyway, and the next stage looks again: only the finest one judges
-    limit = manifest.match_error_limit_px if is_finest(range_) else math.inf
-    return Stage(number, range_, network, manifest.settings(range_), limit)

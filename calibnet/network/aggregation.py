@@ -113,13 +113,13 @@ class Fusion(NamedTuple):
         """The sum: ``[B, Dy, Dx, h, w, C]``."""
         return self.own if self.coarser is None else self.own + double(refine_window(self.coarser))
 
-    def read(self, head: Pointwise) -> Tensor:
+    def read(self, head: nn.Module) -> Tensor:
         """What a 1x1x1 convolution makes of the sum: ``[B, Dy, Dx, h, w, C']``.
 
         It is linear and so is the interpolation. So each part is read before it is interpolated, and the sum, which at
         the finest scale is by far the largest volume, is never made.
         """
-        assert head.bias is not None
+        assert isinstance(head, Pointwise) and head.bias is not None
         coarser = None if self.coarser is None else head(self.coarser) - head.bias  # which is to be added once
         return Fusion(head(self.own), coarser).volume()
 

@@ -70,7 +70,7 @@ class Stem(SameConv):
 
     def pack(self, precision: torch.dtype) -> None:
         """See `Conv2d.pack`."""
-        kernel, padding = self.kernel_size[0] + 1, self.padding[0] - 1
+        kernel, padding = self.kernel_size[0] + 1, (self.kernel_size[0] - 1) // 2
         shifted = Conv2d(
             self.in_channels, self.out_channels, kernel, self.stride, padding=padding, activation=self.activation
         )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from safetensors.torch import save_file
 from torch import Tensor
 
-from calibnet.cascade.stage import load_stage
+from calibnet.cascade.loading import load_stage
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images import resize_image
 from calibnet.errors import ConfigError

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from calibnet.cascade.stage import Stage, load_stage
+from calibnet.cascade.loading import load_stage
+from calibnet.cascade.stage import Stage
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, invert, range_of, sample_miscalibration
 from calibnet.geometry.types import Transform

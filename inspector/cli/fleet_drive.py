@@ -128,7 +128,7 @@ def weights_digest(preset: str, folder: Path | None) -> str:
 
 def prepare_worker(threads: int = 0) -> None:
     """Let this process load weights once and, with a number, compute with so many threads."""
-    from calibnet.cascade.stage import keep_weights
+    from calibnet.cascade.loading import keep_weights
     from calibnet.runtime.threads import limit_threads
 
     keep_weights()
