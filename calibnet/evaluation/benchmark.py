@@ -18,6 +18,7 @@ import torch
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets import Frame
 from calibnet.datasets.images import resize_image
+from calibnet.evaluation import reference
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.network.batch import lidar_input, make_batch
 from calibnet.runtime.precision import autocast, has_fast_bf16
@@ -55,6 +56,7 @@ class Benchmark:
         cascade: milliseconds from frame to extrinsic, all stages, median.
         shared: medians of what is done once a frame: preparation, resizing and, where stages share it, image features.
         stages: one by one.
+        reference: milliseconds of one network of `calibnet.evaluation.reference`, timed in turn with ours, median.
         frames: number of runs that the medians are over.
         machine: CPU or GPU, threads and precision.
     """
@@ -62,6 +64,7 @@ class Benchmark:
     cascade: float
     shared: dict[str, float]
     stages: tuple[StageTime, ...]
+    reference: float
     frames: int
     machine: dict[str, Any]
 
@@ -74,10 +77,17 @@ class Benchmark:
                 total[part] = total.get(part, 0.0) + milliseconds
         return total
 
+    @property
+    def ratio(self) -> float:
+        """The whole cascade, projection and verdict included, by the five networks alone of the reference."""
+        return self.cascade / (reference.STAGES * self.reference)
+
     def as_dict(self) -> dict[str, Any]:
         """The form that JSON files hold."""
         return {
             "cascade_ms_per_frame": self.cascade,
+            "reference_ms_per_stage": self.reference,
+            "ratio": self.ratio,
             "parts_ms_per_frame": self.parts,
             "shared_ms_per_frame": self.shared,
             "stages": [
@@ -108,14 +118,18 @@ def benchmark(
     """
     range_ = cascade.stages[0].range
     totals: list[float] = []
+    references: list[float] = []
     traces = []
+    run_reference = reference.reference_run(cascade.device)
     for run in range(WARM_UP + repeats * len(frames)):
         frame = frames[run % len(frames)]
         initial = draw_miscalibration(range_, 0, run, 0) @ frame.camera_from_lidar
         started = time.perf_counter()
         trace = cascade.calibrate(frame, initial)
+        elapsed, compared = 1000 * (time.perf_counter() - started), run_reference()
         if run >= WARM_UP:
-            totals.append(1000 * (time.perf_counter() - started))
+            totals.append(elapsed)
+            references.append(compared)
             traces.append(trace)
         if observer is not None:
             observer()
@@ -127,7 +141,8 @@ def benchmark(
         batches = {size: batch_time(cascade, stage, frames, size) for size in BATCHES}
         stages.append(StageTime(stage.number, str(stage.range), whole, parts, batches))
     shared = {part: median(trace.milliseconds[part] for trace in traces) for part in traces[0].milliseconds}
-    return Benchmark(median(totals), shared, tuple(stages), len(totals), describe_machine(cascade.device))
+    machine = describe_machine(cascade.device)
+    return Benchmark(median(totals), shared, tuple(stages), median(references), len(totals), machine)
 
 
 def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -> float:
