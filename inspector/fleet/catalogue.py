@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rerun.chunk import RrdReader
+
 from calibnet.errors import ConfigError
 from calibnet.runtime.text import one_line
 from inspector import entities
@@ -22,27 +24,34 @@ from inspector.fleet.table import Row
 from inspector.programs import own_address
 
 DATASET = "fleet"
-RUN, OUTCOME = f"property:{entities.RUN}", f"property:{entities.OUTCOME}"
+KNOWN = "known"
+"""Name of a layer over each recording, and of its property: what the fleet's table knows of the drive."""
+RUN, OUTCOME, TOLD = (f"property:{name}" for name in (entities.RUN, entities.OUTCOME, KNOWN))
 SHOWN = {
     f"{RUN}:car": "car",
     f"{RUN}:drive": "drive",
-    f"{RUN}:date": "date",
+    f"{TOLD}:date": "date",
     f"{RUN}:camera": "camera",
-    f"{OUTCOME}:word": "verdict",
+    f"{TOLD}:word": "verdict",
     f"{OUTCOME}:cause": "cause",
-    f"{OUTCOME}:moved_deg": "moved [°]",
-    f"{OUTCOME}:moved_cm": "moved [cm]",
-    f"{OUTCOME}:sigma_deg": "sigma [°]",
-    f"{OUTCOME}:sigma_cm": "sigma [cm]",
+    f"{TOLD}:moved_deg": "moved [°]",
+    f"{TOLD}:moved_cm": "moved [cm]",
+    f"{TOLD}:sigma_deg": "sigma [°]",
+    f"{TOLD}:sigma_cm": "sigma [cm]",
+    f"{TOLD}:by_car_moved_deg": "by its car [°]",
+    f"{TOLD}:by_car_moved_cm": "by its car [cm]",
+    f"{OUTCOME}:word": "alone",
     f"{OUTCOME}:error_deg": "error [°]",
     f"{OUTCOME}:error_cm": "error [cm]",
     f"{OUTCOME}:frames_used": "frames",
     f"{OUTCOME}:frames_skipped": "skipped",
     "rerun_segment_id": "recording",
+    f"{TOLD}:by_car_reason": "why by its car",
     f"{OUTCOME}:reason": "why",
 }
 """Columns in their order, and what they are called; all others can be switched on in the viewer."""
-LINK = "rerun_segment_id"
+FIGURES = ("moved_deg", "moved_cm", "sigma_deg", "sigma_cm", "by_car_moved_deg", "by_car_moved_cm")
+"""Columns of the fleet's table that are shown with two decimals; the recordings' own have fifteen digits."""
 
 
 @dataclass(frozen=True)
@@ -72,17 +81,20 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     require_extra("datafusion")
     import rerun as rr
 
-    files = [folder / row.recording for row in rows if row.recording and (folder / row.recording).is_file()]
+    recorded = {folder / row.recording: row for row in rows if row.recording and (folder / row.recording).is_file()}
+    files = list(recorded)
     if not files:
         raise ConfigError(f"{folder} holds no recording of the drives in its table; run `calib-inspect fleet` again.")
     with ExitStack() as stack:
-        layouts = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
+        ours = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
         try:
-            server = stack.enter_context(rr.server.Server(host=own_address(), datasets={DATASET: list(files)}))
+            server = stack.enter_context(rr.server.Server(host=own_address(), datasets={DATASET: files}))
             dataset = server.client().get_dataset(DATASET)
+            layers = [_layer(ours / f"{number}.rrd", *one) for number, one in enumerate(recorded.items())]
+            dataset.register([layer.as_uri() for layer in layers], layer_name=KNOWN).wait()
             columns = {field.name for field in dataset.segment_table().schema()}
-            table_layout(columns).save(entities.APPLICATION_ID, layouts / "table.rbl")
-            dataset.register_blueprint((layouts / "table.rbl").as_uri(), segment_table=True)
+            table_layout(columns).save(entities.APPLICATION_ID, ours / "table.rbl")
+            dataset.register_blueprint((ours / "table.rbl").as_uri(), segment_table=True)
             layout = max(files, key=lambda file: file.stat().st_size)  # one that failed has no layout of a drive
             dataset.register_blueprint(layout.as_uri())
         except (RuntimeError, ValueError, LookupError, OSError) as error:
@@ -91,13 +103,28 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
         yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
 
 
+def _layer(layer: Path, recording: Path, row: Row) -> Path:
+    """A file that adds to a drive's recording what the table says of it, what its car says included."""
+    import rerun as rr
+
+    (of, *_) = RrdReader(recording).recordings()
+    stream = rr.RecordingStream(of.application_id, recording_id=of.recording_id, send_properties=False)
+    stream.save(layer)
+    known = {"word": row.word, "date": row.date.removesuffix("T00:00:00"), "by_car_reason": row.by_car_reason}
+    figures = {name: getattr(row, name) for name in FIGURES}
+    known |= {name: round(value, 2) for name, value in figures.items() if value is not None}
+    stream.send_property(KNOWN, rr.AnyValues(**known))
+    stream.disconnect()
+    return layer
+
+
 def table_layout(columns: set[str]) -> Any:
     """The layout of the table, with the columns that it has; those that failed and were rejected come last."""
     from rerun.blueprint.table import Column, SortBy, TableBlueprint, TableLayout
 
     shown = [Column(source, name=name) for source, name in SHOWN.items() if source in columns]
     hidden = [Column(source, visible=False) for source in sorted(columns - SHOWN.keys())]
-    word = f"{OUTCOME}:word"
+    word = f"{TOLD}:word"
     return TableBlueprint(
         table_layout=TableLayout(columns=[*shown, *hidden]),
         sort_by=SortBy(word, direction="descending") if word in columns else None,

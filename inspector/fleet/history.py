@@ -8,12 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import groupby, pairwise
 
-from calibnet.judging.mount import Finding, Mount, Stay, difference, excess_of, mount_over
+import numpy as np
+
+from calibnet.geometry.types import Floats
+from calibnet.judging.mount import FEWEST, Finding, Mount, Stay, difference, excess_of, mount_over
 from calibnet.judging.verify import DRIVE, verify
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict
 from inspector.fleet.table import APART, FAILED, ByCar, Row
+
+SCATTERED = 3.0
+"""Times that a drive's frames may agree less than those of its car's other drives."""
+WHY = "the mount may have moved during the drive, or scans and pictures not belong together."
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,7 @@ class History:
         wrong = [row for row in self.rows if row.verdict == REJECTED and row.cause]
         off = [row for row in self.rows if row.word == REJECTED and not row.cause]
         failed = [row for row in self.rows if row.verdict == FAILED]
-        apart = [self.told[at] for at in self.mount.apart]
+        apart = [row for row in self.judged if row.by_car == APART]
         if wrong:
             causes = ", ".join(dict.fromkeys(row.cause for row in wrong))
             parts.append(f"{_drives(len(wrong))} with wrong input ({causes}).")
@@ -92,16 +100,19 @@ class History:
             parts.append("No drive tells.")
         return " ".join(parts) or "Nothing moved."
 
-    def judged(self) -> Iterator[Row]:
+    @cached_property
+    def judged(self) -> tuple[Row, ...]:
         """Its drives, each with what all of them say of the calibration that it had."""
         suspect = 2 * sum(bool(row.cause) for row in self.rows) > len(self.rows)
         places = {row.folder: at for at, row in enumerate(self.told)}
-        for row in self.rows:
-            at = places.get(row.folder)
-            yield _with(row) if at is None else self._judged(row, at, suspect)
+        return tuple(
+            self._judged(row, places[row.folder], suspect) if row.folder in places else _with(row) for row in self.rows
+        )
 
     def _judged(self, row: Row, at: int, suspect: bool) -> Row:
         """A drive at a position of `told`; ``suspect`` where most drives of the car have wrong input."""
+        if ratio := self._scatter(row):
+            return _with(row, APART, f"Its frames agree {ratio:.0f} times less than those of the other drives: {WHY}")
         firm = [stay for stay in self.mount.stays if stay.is_firm]
         stay = self.mount.stay_of(at)
         if not firm:
@@ -117,6 +128,14 @@ class History:
         if suspect and found.word == ACCEPTED:
             found = replace(found, word=CANNOT_TELL, reason="Most drives of the car have wrong input.")
         return _with(row, found.word, f"{len(stay.members)} drives of the car agree. {found.reason}", found)
+
+    def _scatter(self, row: Row) -> float:
+        """How many times less its frames agree than those of the other drives do, 0 where that is nothing unusual."""
+        others = [_agreement(other) for other in self.told if other.folder != row.folder]
+        if len(others) < FEWEST:
+            return 0.0
+        ratio = float((_agreement(row) / np.median(others, axis=0)).max())
+        return ratio if ratio > SCATTERED else 0.0
 
     def _moves(self) -> Iterator[Move]:
         for before, after in pairwise(self.mount.stays):
@@ -149,7 +168,7 @@ def histories(rows: Iterable[Row]) -> list[History]:
 
 def judged_by_cars(rows: Sequence[Row]) -> list[Row]:
     """The rows as they stand, each with what the drives of its car say together of the calibration that it had."""
-    judged = {row.folder: row for history in histories(rows) for row in history.judged()}
+    judged = {row.folder: row for history in histories(rows) for row in history.judged}
     return [judged[row.folder] for row in rows]
 
 
@@ -179,6 +198,11 @@ def _with(row: Row, word: ByCar = "", reason: str = "", found: Verdict | None = 
         by_car_sigma_deg=None if found is None else found.sigma_rotation_deg,
         by_car_sigma_cm=None if found is None else found.sigma_translation_cm,
     )
+
+
+def _agreement(row: Row) -> Floats:
+    """Deviation ``[2]`` that a single one of its frames would have: degrees and centimetres."""
+    return np.sqrt(max(row.frames, 1)) * np.array([row.sigma_deg or 0.0, row.sigma_cm or 0.0])
 
 
 def _alone(row: Row) -> Stay:

@@ -64,7 +64,12 @@ def items_of(drive: Drive) -> list[Item]:
 
 
 def seen(items: Sequence[Item]) -> str:
-    """A digest of what the files look like from outside: quick, and another after every change."""
+    """A digest of what the files look like from outside: quick, and another after every change.
+
+    Empty where that cannot be told, as of a web server that names its files and nothing more.
+    """
+    if not all(item.mark for item in items):
+        return ""
     digest = hashlib.sha256()
     for item in items:
         digest.update(f"{item.path}\0{item.size}\0{item.mark}\n".encode(errors="surrogatepass"))

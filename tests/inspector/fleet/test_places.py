@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -26,6 +31,27 @@ def bucket(tmp_path: Path) -> str:
     return "memory://fleet/blue/monday"
 
 
+class Quiet(SimpleHTTPRequestHandler):
+    """Serves a folder, and says nothing of it."""
+
+    def log_message(self, *arguments: object) -> None:
+        """Not even that."""
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[str]:
+    """A web server with a drive."""
+    pytest.importorskip("aiohttp", reason="what fsspec opens web servers with is not installed")
+    write_folder(tmp_path / "site" / "blue" / "monday", 2)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path / "site")))
+    thread = Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/blue/monday"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
 def of_folder(path: object, **more: object) -> Drive:
     return Drive("car", "drive", "folder", str(path), **more)  # type: ignore[arg-type]
 
@@ -37,6 +63,22 @@ def test_a_copy_has_the_same_content_wherever_it_lies(bucket: str, tmp_path: Pat
         assert content(copy, there) == content(Path(here.path), here)
     assert not copy.exists()
     assert [item.path for item in items_of(there)] == [item.path for item in items_of(here)]
+
+
+def test_a_drive_on_a_web_server_is_told_by_its_content(
+    site: str, invoke: Invoke, cascade: JudgedCascade, tmp_path: Path
+) -> None:
+    there, call = of_folder(site), ("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")
+    with on_this_machine(there) as copy:
+        assert content(copy, there) == content(tmp_path / "site/blue/monday", of_folder(tmp_path / "site/blue/monday"))
+    assert seen(items_of(there)) == "", "it says nothing of times or sizes"
+    Path("DRIVES.csv").write_text(f"path,drive\n{site},monday\n")
+    for solved in (1, 1):
+        assert invoke(*call)[0] == 0
+        assert cascade.solved == solved, "the same is not done again"
+    shutil.copy(tmp_path / "site/blue/monday/clouds/0001.bin", tmp_path / "site/blue/monday/clouds/0000.bin")
+    assert invoke(*call)[0] == 0
+    assert cascade.solved == 2, "what changed is"
 
 
 def test_content_and_look_change_with_a_byte(tmp_path: Path) -> None:

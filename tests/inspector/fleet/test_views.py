@@ -110,7 +110,7 @@ def test_the_last_drive_alone_only_seems_to_have_moved() -> None:
     assert (move.before.drive, move.after.drive, move.certain) == ("d5", "d6", False)
     assert "seems to have moved between d5 and d6, by 2.00°" in history.sentence
     assert "too few drives yet" in history.sentence
-    assert [one.by_car for one in history.judged()] == ["accepted"] * 5 + ["apart"]
+    assert [one.by_car for one in history.judged] == ["accepted"] * 5 + ["apart"]
 
 
 def test_one_drive_in_the_middle_stands_apart() -> None:
@@ -118,10 +118,22 @@ def test_one_drive_in_the_middle_stands_apart() -> None:
     (history,) = histories(rows)
     assert history.moves == ()
     assert "d3 stands apart from the others." in history.sentence
-    judged = list(history.judged())
+    judged = list(history.judged)
     assert [one.word for one in judged].count("accepted") == 5
     assert judged[2].word == "apart"
     assert judged[2].by_car_reason == "It stands apart: 5 other drives find the mount 2.00° / 1 cm elsewhere."
+
+
+def test_a_drive_whose_frames_do_not_agree_stands_apart() -> None:
+    torn = replace(unsure("d3"), covariance=tuple((64 * COVARIANCE).ravel().tolist()), sigma_deg=0.72, sigma_cm=13.6)
+    rows = [unsure("d1"), unsure("d2"), torn, unsure("d4"), unsure("d5")]
+    judged = judged_by_cars(rows)
+    assert [one.by_car for one in judged] == ["accepted", "accepted", "apart", "accepted", "accepted"]
+    assert judged[2].by_car_reason.startswith(
+        "Its frames agree 4 times less than those of the other drives: the mount may have moved"
+    )
+    few = judged_by_cars([*rows[:2], replace(torn, frames=1), *(replace(one, frames=4) for one in rows[3:])])
+    assert few[2].by_car != "apart", "fewer frames leave more open by themselves"
 
 
 def test_a_car_whose_input_is_wrong_accepts_nothing() -> None:
@@ -206,7 +218,8 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
     for scan in (cars / "tuesday" / "clouds").iterdir():
         scan.write_bytes(scan.read_bytes()[:1001])
     invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0")
-    with serve(list(rows_of(Path("all")).values()), Path("all").absolute()) as catalogue:
+    rows = [replace(one, by_car="rejected" if one.drive == "monday" else "") for one in rows_of(Path("all")).values()]
+    with serve(rows, Path("all").absolute()) as catalogue:
         address, _, entry = catalogue.address.partition("/entry/")
         host = str(urlsplit(address).hostname)
         assert host.startswith("127.")
@@ -215,9 +228,11 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
         table = dataset.segment_table().to_pydict()
         names = [one[0] for one in table["property:run:drive"]]
         words = [one[0] for one in table["property:verdict:word"]]
+        known = [one[0] for one in table["property:known:word"]]
         assert len(dataset.blueprints()) == 2
         assert dataset.default_blueprint() is not None
     assert dict(zip(names, words, strict=True)) == {"monday": "accepted", "tuesday": "failed"}
+    assert dict(zip(names, known, strict=True)) == {"monday": "rejected", "tuesday": "failed"}, "as the table has it"
 
 
 def test_the_catalogue_in_a_browser_is_behind_the_guard_of_all_pages(monkeypatch: pytest.MonkeyPatch) -> None:
