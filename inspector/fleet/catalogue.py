@@ -110,7 +110,11 @@ def _layer(layer: Path, recording: Path, row: Row) -> Path:
     (of, *_) = RrdReader(recording).recordings()
     stream = rr.RecordingStream(of.application_id, recording_id=of.recording_id, send_properties=False)
     stream.save(layer)
-    known = {"word": row.word, "date": row.date.removesuffix("T00:00:00"), "by_car_reason": row.by_car_reason}
+    known: dict[str, Any] = {
+        "word": row.word,
+        "date": row.date.removesuffix("T00:00:00"),
+        "by_car_reason": row.by_car_reason,
+    }
     figures = {name: getattr(row, name) for name in FIGURES}
     known |= {name: round(value, 2) for name, value in figures.items() if value is not None}
     stream.send_property(KNOWN, rr.AnyValues(**known))

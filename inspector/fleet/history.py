@@ -6,6 +6,7 @@ they agree on is held against the calibration that each of them had, as `verify`
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -202,7 +203,7 @@ def _with(row: Row, word: ByCar = "", reason: str = "", found: Verdict | None = 
 
 def _agreement(row: Row) -> Floats:
     """Deviation ``[2]`` that a single one of its frames would have: degrees and centimetres."""
-    return np.sqrt(max(row.frames, 1)) * np.array([row.sigma_deg or 0.0, row.sigma_cm or 0.0])
+    return np.asarray([row.sigma_deg or 0.0, row.sigma_cm or 0.0], np.float64) * math.sqrt(max(row.frames, 1))
 
 
 def _alone(row: Row) -> Stay:

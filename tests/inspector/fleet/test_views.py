@@ -14,6 +14,7 @@ import pytest
 from calibnet.errors import DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.training.data import open_data
+from inspector.cli.fleet import news
 from inspector.fleet import viewing
 from inspector.fleet.drives import Drive
 from inspector.fleet.history import histories, judged_by_cars
@@ -102,6 +103,17 @@ def test_a_mount_that_moved_is_told_by_drives_that_cannot_tell() -> None:
     assert [one.word for one in judged] == ["accepted"] * 3 + ["rejected"] * 3
     assert judged[3].by_car_moved_deg == pytest.approx(2.0, abs=1e-6)
     assert [one.drive for one in worst_first(judged)][:3] == ["d4", "d5", "d6"]
+
+
+def test_the_command_ends_with_what_moved() -> None:
+    moved = [unsure(f"d{at}", REFERENCE if at < 4 else MOVED, car=f"c{car}") for car in range(12) for at in range(1, 7)]
+    still = [row(f"d{at}", car="still") for at in range(1, 4)]
+    together, first, *others, rest = news(judged_by_cars([*moved, *still]))
+    assert together == "72 of them by what all drives of the car say together."
+    assert first.startswith("c0: The mount moved between d3 and d4, by 2.00°")
+    assert len(others) == 9
+    assert rest == "2 more cars have a mount that moved."
+    assert list(news(judged_by_cars(still))) == []
 
 
 def test_the_last_drive_alone_only_seems_to_have_moved() -> None:
