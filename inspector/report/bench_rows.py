@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,8 +66,18 @@ class Row:
     @property
     def refused(self) -> str:
         """Runs that were refused, of how many."""
-        runs = self.figures.get("runs")
-        return NOTHING if runs is None else f"{self.figures['refused']} of {runs}"
+        return refused([self.figures])
+
+
+def refused(figures: Iterable[dict[str, Any]]) -> str:
+    """Runs that were refused, of how many; and how many there were to be, where the time was over before."""
+    measured = [one for one in figures if one.get("runs")]
+    if not measured:
+        return NOTHING
+    runs = sum(one["runs"] for one in measured)
+    planned = sum(one.get("of_runs", one["runs"]) for one in measured)
+    said = f"{sum(one['refused'] for one in measured)} of {runs}"
+    return said if planned == runs else f"{said} ({planned})"
 
 
 def rows(content: dict[str, Any]) -> Iterator[Row]:

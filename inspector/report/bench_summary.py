@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from inspector.report.bench_rows import KINDS, NOTHING, Row, costs, rows
+from inspector.report.bench_rows import KINDS, NOTHING, costs, refused, rows
 
 ERRORS = ("rigs trained on", "other rigs", "refused")
 PICTURES = ("grey picture", "other picture")
 COSTS = ("a frame", "parameters")
 NO_CORRECTION = "no correction"
 LEGEND = (
-    "Mean errors, of rotation and translation. A refused run counts with the error that it began with. Methods without "
-    "training have the same rigs in a column as the trained ones. Grey picture, other picture: errors when the picture "
-    "is made grey or is one of another drive. A method that then refuses, or errs as if uncorrected, looks at the "
-    "picture; one that corrects as before reads its answer off the scan."
+    "Mean errors, of rotation and translation. A refused run counts with the error that it began with; in brackets the "
+    "runs planned, where the time for them was over. Methods without training have the same rigs in a column as the "
+    "trained ones. Grey picture, other picture: errors when the picture is made grey or is one of another drive. A "
+    "method that then refuses, or errs as if uncorrected, looks at the picture; one that corrects as before reads its "
+    "answer off the scan."
 )
 
 
@@ -34,11 +35,9 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
         beside = [*_pictures(entry, range_), *told, _claim(entry)]
         own = [row for row in of_range if row.method == name]
         for of in dict.fromkeys(row.of for row in own):  # what stands beside the errors, once
-            measured = [row for row in own if row.of == of]
-            where = {row.rig for row in measured if row.known == "known"} if entry["samples_trained"] else known
-            body.append(
-                [name, of, *known_and_other([row.figures for row in measured], where), _refused(measured), *beside]
-            )
+            figures = [row.figures for row in own if row.of == of]
+            where = {row.rig for row in own if row.known == "known"} if entry["samples_trained"] else known
+            body.append([name, of, *known_and_other(figures, where), refused(figures), *beside])
             beside = [NOTHING] * len(beside)
     used = [k for k in range(len(heads)) if k < 2 or any(line[k] != NOTHING for line in body)]
     return [heads[k] for k in used], [[line[k] for k in used] for line in body]
@@ -69,11 +68,6 @@ def _mean(figures: list[dict[str, Any]]) -> str:
 def pair(degrees: float, centimetres: float) -> str:
     """Both errors of a cell."""
     return f"{degrees:.2f}° / {centimetres:.{0 if centimetres >= 10 else 1}f} cm"
-
-
-def _refused(measured: list[Row]) -> str:
-    runs = sum(row.figures.get("runs", 0) for row in measured)
-    return f"{sum(row.figures.get('refused', 0) for row in measured)} of {runs}" if runs else NOTHING
 
 
 def _altered(row: dict[str, Any] | None) -> str:

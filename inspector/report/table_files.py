@@ -43,6 +43,7 @@ class _Figures:
     """What was measured, or why it was not."""
 
     runs: Count = 0
+    of_runs: Count = 0
     refused: Count = 0
     rotation_deg: _Rotation | None = None
     translation_cm: _Translation | None = None

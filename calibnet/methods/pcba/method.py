@@ -31,6 +31,8 @@ LEAST_MOTION_M = 2.0
 FEWEST = 60
 """Landmarks on planes, below which nothing is adjusted."""
 MOST_LANDMARKS = 1200
+FARTHEST = 2.0
+"""Of the range, beyond which an answer is none: without any hold an adjustment ends metres away."""
 
 
 class Round(NamedTuple):
@@ -99,7 +101,8 @@ class PCBA:
         """Adjust the extrinsic of the first `MOST_FRAMES` of a drive.
 
         Raises:
-            CalibrationError: the drive does not move, or too little of its pictures can be followed.
+            CalibrationError: the drive does not move, too little of its pictures can be followed, or the adjustment
+                ends far out of the range.
         """
         drive = read_drive(frames, observer)
         metres, _ = path(drive.poses)
@@ -114,6 +117,13 @@ class PCBA:
         for schedule in (TURN, ALL):
             rounds += self._rounds(drive, planes, schedule, extrinsic, initial)
             extrinsic = rounds[-1][1].camera_from_lidar
+        change = extrinsic @ invert(initial)
+        if not self.range.contains(change, FARTHEST):
+            turned, shifted = moved(initial, extrinsic)
+            raise CalibrationError(
+                f"pcba ends {turned:.1f}° and {shifted:.0f} cm from the start, far out of the range "
+                f"{self.range.label}: the drive does not tell its extrinsic, or the start is too far off."
+            )
         return self._estimate(drive, planes, rounds, initial)
 
     def _rounds(

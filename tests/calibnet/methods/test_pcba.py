@@ -136,3 +136,5 @@ def test_a_synthetic_drive_is_solved_and_keeps_the_promises_of_a_method(monkeypa
     initial = miscalibration([0.3, -0.5, 0.9], [0.05, 0.05, -0.05]) @ frames[0].camera_from_lidar
     left = pose_error(method.calibrate_drive(frames, initial).camera_from_lidar, frames[0].camera_from_lidar)
     assert left.rotation_deg < 0.4 and left.translation_cm < 12
+    with pytest.raises(CalibrationError, match=r"far out of the range ±0\.2°/0\.01 m"):
+        PCBA(MiscalibrationRange(0.2, 0.01)).calibrate_drive(frames, initial)

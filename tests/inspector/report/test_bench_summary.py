@@ -27,7 +27,7 @@ CONTENT = {
             [
                 measured("A", 2, 1, 10, in_rig=True, refused=1),
                 measured("B", 6, 3, 2, in_rig=True),
-                measured("C", 4, 5, 55, in_rig=False),
+                measured("C", 4, 5, 55, in_rig=False, of_runs=9),
             ],
             10_000,
             audit={"range": "5/0.5", "grey": REFUSED, "swapped": HALF},
@@ -51,7 +51,7 @@ def test_means_are_over_runs_and_rigs_stand_where_trained_methods_know_them() ->
     assert (cells["trained"]["rigs trained on"], cells["trained"]["other rigs"]) == ("2.50° / 4.0 cm", "5.00° / 55 cm")
     assert cells["no correction"]["rigs trained on"] == "7.00° / 70 cm"
     assert (cells["untrained"]["rigs trained on"], cells["untrained"]["other rigs"]) == ("2.00° / 20 cm", "refused")
-    assert (cells["trained"]["refused"], cells["untrained"]["refused"]) == ("1 of 12", "4 of 6")
+    assert (cells["trained"]["refused"], cells["untrained"]["refused"]) == ("1 of 12 (17)", "4 of 6")
     assert (cells["trained"]["grey picture"], cells["trained"]["other picture"]) == ("refused", "50% refused")
     assert cells["untrained"]["grey picture"] == "–", "its audit is of another range"
     assert (cells["trained"]["parameters"], cells["untrained"]["parameters"]) == ("2.00 M", "–")
