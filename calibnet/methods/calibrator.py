@@ -51,8 +51,8 @@ class DriveCalibrator(Calibrator, Protocol):
         Args:
             frames: of one camera and LiDAR on one mount, at least one.
             initial: ``camera_from_lidar`` to start from, 4x4.
-            observer: called before each frame with the numbers of frames read and to be read; a frame may be read
-                more than once.
+            observer: called before each frame, and at the end if it likes, with the numbers of frames read and to be
+                read; a frame may be read more than once.
 
         Raises:
             CalibrationError: no frame could be calibrated.
