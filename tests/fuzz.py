@@ -2,9 +2,9 @@
 
     python -m tests.fuzz [--seconds 5] [--corpus FOLDER] [TARGET ...]
 
-Each target is run in a process of its own, on a corpus that begins with whole inputs and, with ``--corpus``, keeps what
-was found. An input may end in an error of ours only; anything else, a crash, or more than `HANG_S` is a finding, which
-is printed and kept as a file. `.ci/run` gives each target 5 seconds; an hour each is for the hand.
+Each target is run in a process of its own, on whole inputs and what earlier runs found (`KEPT`); with ``--corpus`` what
+it finds is kept. An input may end in an error of ours only; anything else, a crash, or more than `HANG_S` is a finding,
+which is printed and kept as a file. `.ci/run` gives each target 5 seconds; an hour each is for the hand.
 """
 
 from __future__ import annotations
@@ -257,6 +257,8 @@ TARGETS: dict[str, Target] = {
 }
 COUNTED = "stat::number_of_executed_units:"
 """What libFuzzer writes before the number of inputs."""
+KEPT = Path(__file__).parent / "corpus"
+"""Inputs that reached something new, a folder a target."""
 FOUND = Path(tempfile.gettempdir()) / "calib-inspect-findings"
 
 
@@ -307,7 +309,7 @@ def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True) ->
             guided = False
     if guided:
         return _guided(atheris, name, seconds, corpus)
-    target, draw, pool = TARGETS[name], random.Random(time.time_ns()), list(TARGETS[name].seeds)
+    target, draw, pool = TARGETS[name], random.Random(time.time_ns()), [*TARGETS[name].seeds, *kept(name)]
     if corpus is not None and corpus.is_dir():
         pool += [path.read_bytes() for path in corpus.iterdir()]
     count, end = 0, time.monotonic() + seconds
@@ -318,6 +320,11 @@ def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True) ->
         if draw.random() < 0.02 and len(pool) < 500:
             pool.append(data)
     return count
+
+
+def kept(name: str) -> list[bytes]:
+    """What earlier runs of a target found."""
+    return [path.read_bytes() for path in sorted((KEPT / name.replace(" ", "-")).glob("*"))]
 
 
 def _watched(name: str, data: bytes) -> None:
@@ -339,7 +346,7 @@ def _guided(atheris: Any, name: str, seconds: float, corpus: Path | None) -> int
     target, count = TARGETS[name], 0
     folder = corpus or Path(tempfile.mkdtemp(prefix="calib-inspect-corpus-"))
     folder.mkdir(parents=True, exist_ok=True)
-    for number, seed in enumerate(target.seeds):
+    for number, seed in enumerate([*target.seeds, *kept(name)]):
         (folder / f"seed-{number}").write_bytes(seed)
     for seed in target.seeds:  # imports what the target imports lazily
         try_one(name, seed)
