@@ -182,7 +182,7 @@ def test_a_rig_is_solved_with_all_its_cameras_and_told_about_bad_frames():
     estimate = Cascade(stages).calibrate_rig(cameras, REFERENCE, lambda *numbers: told.append(numbers))
     assert estimate.frames == 3
     assert len(estimate.skipped) == 1, "a camera none of whose frames can be used is left out"
-    assert told[-1][0] < told[-1][1] == 4 * 4 + 4
+    assert told[-2][0] < told[-1][0] == told[-1][1] == 4 * 4 + 4, "the end is told as well"
     assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
     assert estimate.verdict is not None and estimate.networks is not None
     assert inverse(estimate.covariance).shape == (6, 6)
