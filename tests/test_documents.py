@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 
 from calibnet.geometry import RANGES
 from calibnet.weights import read_record, weights_path
+from inspector.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 ARCHIVE = ROOT / "docs" / "archive"
@@ -63,6 +67,51 @@ def named_paths(text: str) -> Iterator[str]:
 def missing_paths(text: str) -> list[str]:
     """Those that are not there."""
     return [name for name in named_paths(text) if name not in MADE_BY_A_RUN and not (ROOT / name).exists()]
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    """The words of every `calib-inspect` in the shell blocks of a document; ``…`` and ``[OPTION]`` stand for more."""
+    for block in re.findall(r"^ *```sh$(.*?)^ *```$", text, flags=re.MULTILINE | re.DOTALL):
+        for line in block.replace("\\\n", " ").splitlines():
+            try:
+                words = shlex.split(line, comments=True)
+            except ValueError:  # of a language with quotes over several lines
+                continue
+            starts = [place for place, word in enumerate(words) if word.endswith("calib-inspect")]
+            for start, end in itertools.pairwise([*starts, len(words)]):
+                one = words[start + 1 : end]
+                stop = next(
+                    (place for place, word in enumerate(one) if word in ("&&", "|", ">", ";", "…", "...")), len(one)
+                )
+                if one[:stop] and "…" not in line:
+                    yield one[:stop]
+
+
+def parsed(words: list[str]) -> click.Command:
+    """The command that some words name, which takes all of them; raises what click says otherwise."""
+    group: click.Command = cli
+    while isinstance(group, click.Group):
+        command = group.get_command(click.Context(group), words[0])
+        if command is None:
+            raise click.UsageError(f"there is no command {words[0]!r}")
+        group, words = command, words[1:]
+    group.make_context("calib-inspect", list(words))
+    return group
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_commands_are_taken_as_printed(document: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    wrong = []
+    for words in commands(document.read_text(encoding="utf-8")):
+        try:
+            parsed(words)
+        except click.UsageError as error:
+            if "does not exist" not in error.format_message():  # a file of the reader's
+                wrong.append(f"{' '.join(words)}: {error.format_message()}")
+        except click.exceptions.Exit:
+            continue
+    assert not wrong
 
 
 def test_the_readme_is_read_in_five_minutes() -> None:

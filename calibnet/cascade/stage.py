@@ -167,7 +167,7 @@ class Stage:
             )
             raise CalibrationError(
                 f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
-                f"stage {self.number}; {why}."
+                f"stage {self.number}, of {len(frame.points)} points; {why}."
             )
         clock("projection")
         cut = Cut.of([lidar])

@@ -16,11 +16,12 @@ LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
 """Bytes of the header of LAS 1.2 and of 1.4, and of a point's position and intensity."""
 COMPRESSED = 128
 """Formats of points from here on are compressed: LAZ."""
-LONGEST_SECONDS, MEGABYTES_BESIDE = 8, 2048
-"""For unpacking a scan, and what the process needs besides its points."""
+LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 8, 60, 2048
+"""Of computing and, on a busy machine, of waiting for a scan to be unpacked; and what that needs besides its points."""
 UNPACK = """
 import io, resource, sys
-most = int(sys.argv[1])
+most, seconds = int(sys.argv[1]), int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
 import laspy
 resource.setrlimit(resource.RLIMIT_AS, (most, most))
 sys.stdout.buffer.write(laspy.read(io.BytesIO(sys.stdin.buffer.read())).points.array.tobytes())
@@ -84,11 +85,12 @@ def unpacked(data: bytes, most: int) -> bytes:
     Raises:
         CloudError: it is damaged.
     """
-    command = [sys.executable, "-c", UNPACK, str(most + MEGABYTES_BESIDE * MEGABYTE)]
+    limits = [str(most + MEGABYTES_BESIDE * MEGABYTE), str(LONGEST_SECONDS)]
     try:
-        done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=LONGEST_SECONDS)
+        command = [sys.executable, "-c", UNPACK, *limits]
+        done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=LONGEST_WAIT)
     except subprocess.TimeoutExpired:
-        raise CloudError(f"it cannot be unpacked within {LONGEST_SECONDS} seconds, so it seems to be damaged") from None
+        raise CloudError(f"it cannot be unpacked within {LONGEST_WAIT} seconds, so it seems to be damaged") from None
     if done.returncode:
         raise CloudError("it is truncated or damaged")
     return done.stdout

@@ -80,14 +80,18 @@ def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def next_lines(file: Path, rig: bool = False) -> list[str]:
     """What can be done with a recording, or with that of a rig."""
+    from inspector.export.registry import FORMATS
+
     quoted = shlex.quote(str(file))
-    page = f"A page of it: calib-inspect report {quoted} --out report/ --open"
-    if rig:
-        files = f"calib-inspect export {quoted} --format ros --output found/"
-        return [page, f"The result for other tools, a file a camera: {files}  (kitti, opencv, json, yaml)"]
+    others = ", ".join(name for name in FORMATS.names() if name != "ros")
+    what, where = (
+        ("The result for other tools, a file a camera", " --output found/")
+        if rig
+        else ("The result for other tools", "")
+    )
     return [
-        page,
-        f"The result for other tools: calib-inspect export {quoted} --format ros  (kitti, opencv, json, yaml)",
+        f"A page of it: calib-inspect report {quoted} --out report/ --open",
+        f"{what}: calib-inspect export {quoted} --format ros{where}  (or {others})",
     ]
 
 

@@ -14,7 +14,7 @@ from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted, told_together
 from inspector.fleet.table import APART, FAILED, ORDER, TABLE, Row, off, worst_first
-from inspector.report.page import stylesheet
+from inspector.report.template import stylesheet
 
 PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300

@@ -8,7 +8,7 @@ from typing import Any
 from inspector.report.bench_rows import about
 from inspector.report.bench_summary import LEGEND
 from inspector.report.bench_tables import TITLE, long_tables, short_tables
-from inspector.report.page import stylesheet
+from inspector.report.template import stylesheet
 
 _PAGE = """<!doctype html>
 <html lang="en">

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
-from importlib import resources
-from string import Template
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
 from inspector.read.run import RecordedRun
 from inspector.record.contents import Coloring
-from inspector.report.charts import charts, series_styles
-from inspector.report.metrics import DISTANCE_M, Figures, State
-from inspector.report.pictures import depth_scale
+from inspector.report.charts import charts
+from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.tables import axes_table, stages_table
-from inspector.report.verdict import GRADES, ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
+from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
+from inspector.report.verdict import ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
 
 SETTING_NAMES = {
     "sequence": "data",
@@ -31,7 +29,6 @@ SETTING_NAMES = {
     "calib_inspect": "calib-inspect",
 }
 """What settings are called on the page, in its order; others follow under their own names."""
-SERVE_COMMAND = "calib-inspect report {recording} --out . --open"
 METHOD = (
     "Rotation: the angle of R_est · R_refᵀ in degrees. Translation: |t_est − t_ref| in centimetres, the LiDAR’s origin "
     "seen from the camera. Per axis, in the camera’s frame: roll about z (ahead), pitch about x (right), yaw about y "
@@ -83,31 +80,30 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
     run = figures.run
     name = str(run.settings.get("sequence", run.title))
     known = figures.has_reference
-    return _template("page.html").substitute(
-        title=escape(f"{name}: calibration report"),
-        style=stylesheet(figures.states),
-        headline=escape(headline(figures)),
-        warning=f'<p class="warning">{escape(run.warning)}</p>' if run.warning else "",
-        word=run.verdict.word.capitalize(),
-        grade=GRADES[run.verdict.word],
-        reasons=_items(verdict(run)),
-        findings=_items(findings(figures)),
-        about=escape(f"{run.title} · {count(len(run.frames))}"),
-        recording=escape(recording),
-        serve_command=escape(SERVE_COMMAND.format(recording=recording)),
+    warning = f'<p class="warning">{escape(run.warning)}</p>\n' if run.warning else ""
+    sections = template("run.html").substitute(
         ranking=escape(_ranking(figures)),
         examples="\n".join(_example(figures, example) for example in examples),
         coloring=COLORINGS[_coloring(run)],
-        scale=_scale(run),
+        scale=scale_of_depth() if _coloring(run) is Coloring.DEPTH else "",
         stages_title=f"{figures.measure} after every stage",
         stages_table=stages_table(figures),
         axes_table=axes_table(figures),
         charts=charts(figures),
         settings=_settings(figures),
         method=escape(METHOD.format(against=AGAINST_REFERENCE if known else AGAINST_MEDIAN)),
-        size=f"{recording_bytes / 1e6:.1f} MB",
-        script=_resource("page.js"),
     )
+    head = Head(
+        title=f"{name}: calibration report",
+        kind="Camera–LiDAR calibration report",
+        word=run.verdict.word,
+        reasons=_items(verdict(run)),
+        headline=headline(figures),
+        findings=f'{warning}<ul class="verdict">\n{_items(findings(figures))}\n</ul>',
+        about=f"{run.title} · {count(len(run.frames))}",
+        metrics="these figures, every frame's errors, verdict and corrected extrinsic.",
+    )
+    return report_page(head, sections, recording, recording_bytes, figures.states)
 
 
 def _items(found: Sequence[Finding]) -> str:
@@ -117,25 +113,6 @@ def _items(found: Sequence[Finding]) -> str:
 def _coloring(run: RecordedRun) -> Coloring:
     """What the recorded points' colours stand for; recordings from before there was a choice show depth."""
     return Coloring(run.settings.get("color", Coloring.DEPTH))
-
-
-def _scale(run: RecordedRun) -> str:
-    if _coloring(run) is not Coloring.DEPTH:
-        return ""
-    return f'<div class="depth"><span>Depth</span>{depth_scale()}</div>'
-
-
-def _resource(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-def stylesheet(states: Sequence[State] = ()) -> str:
-    """The looks of a page, with the colours of the curves of some states."""
-    return _template("page.css").substitute(series_styles(states))
-
-
-def _template(name: str) -> Template:
-    return Template(_resource(name))
 
 
 def _pair(error: PoseError) -> str:
@@ -163,17 +140,12 @@ def _example(figures: Figures, example: Example) -> str:
         result = f"changed by {_pair(change)}"
         result += "" if single else f", {_pair(after)} from the frames’ median"
     title = "" if single else f"<b>{example.name.capitalize()}:</b> "
-    *lefts, right = example.pictures
-    return f"""<figure>
-<figcaption><span>{title}frame {frame.index} ({escape(frame.source)}), {result}</span>
-{_choice(example, lefts)}</figcaption>
-<div class="compare">
-{_side("left", lefts[0], example.pictures[lefts[0]], frame.index)}
-{_side("right", right, example.pictures[right], frame.index)}
-<input type="range" min="0" max="100" value="50" step="any" aria-label="Boundary between {lefts[0]} and {right}">
-<div class="handle"></div>
-</div>
-</figure>"""
+    *lefts, right = (
+        Side(file, shown, f"Frame {frame.index} with the LiDAR points, {shown}")
+        for shown, file in example.pictures.items()
+    )
+    caption = f"<span>{title}frame {frame.index} ({escape(frame.source)}), {result}</span>\n"
+    return figure(caption + _choice(example, [side.name for side in lefts]), lefts[0], right)
 
 
 def _choice(example: Example, lefts: Sequence[str]) -> str:
@@ -187,13 +159,6 @@ def _choice(example: Example, lefts: Sequence[str]) -> str:
     )
     *_, result = example.pictures
     return f'<span class="choice">{result.capitalize()} against{"".join(radios)}</span>'
-
-
-def _side(css: str, name: str, file: str, frame: int) -> str:
-    return (
-        f'<div class="side {css}"><img src="{escape(file)}" alt="Frame {frame} with the LiDAR points, {name}">'
-        f'<span class="tag">{name}</span></div>'
-    )
 
 
 def _settings(figures: Figures) -> str:

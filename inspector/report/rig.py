@@ -5,19 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from html import escape
-from importlib import resources
 from pathlib import Path
-from string import Template
 
-from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.read.rig import RecordedRig
-from inspector.report.charts import series_styles
-from inspector.report.page import SERVE_COMMAND
-from inspector.report.pictures import depth_scale, draw_overlay
+from inspector.report.pictures import draw_overlay
+from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
 from inspector.report.verdict import GRADES
-from inspector.report.write import METRICS, PAGE, PICTURES, RECORDING, cannot_write, check_folder, copy_recording
+from inspector.report.write import PICTURES, RECORDING, write_files
 from inspector.run.rig_solved import COLUMNS, SolvedCamera
 from inspector.verdicts import explained
 
@@ -36,70 +32,45 @@ def write_rig_report(rig: RecordedRig, folder: Path) -> Path:
         ConfigError: the folder cannot be written, for instance because the disk is full.
         CalibnetError: a picture of the recording cannot be read.
     """
-    check_folder(folder)
-    claim = Claim(folder / PAGE, Kind.PAGE)
-    try:
-        figures = [
-            figure(rig, number, camera, folder)
-            for number, camera in enumerate(rig.solved.cameras)
-            if rig.moments[camera.name]
-        ]
-        metrics = json.dumps({"title": rig.title, **rig.solved.as_dict()}, indent=1, allow_nan=False)
-        write_whole(folder / METRICS, metrics.encode(), Kind.JSON)
-        copy_recording(rig.path, folder / RECORDING)
-        page = _page(rig, figures, (folder / RECORDING).stat().st_size)
-        write_whole(folder / PAGE, page.encode(errors="backslashreplace"), Kind.PAGE)
-    except OSError as error:
-        raise cannot_write(error, folder) from None
-    finally:
-        claim.release()
-    return folder / PAGE
+    metrics = json.dumps({"title": rig.title, **rig.solved.as_dict()}, indent=1, allow_nan=False)
+
+    def draw() -> list[str]:
+        shown = [(number, one) for number, one in enumerate(rig.solved.cameras) if rig.moments[one.name]]
+        return [_draw(rig, number, camera, folder) for number, camera in shown]
+
+    return write_files(folder, rig.path, draw, metrics, lambda figures, size: _page(rig, figures, size))
 
 
-def figure(rig: RecordedRig, number: int, camera: SolvedCamera, folder: Path) -> str:
+def _draw(rig: RecordedRig, number: int, camera: SolvedCamera, folder: Path) -> str:
     """Draw a frame of a camera before and after; returns the HTML that shows them."""
     pictures, size = rig.pictures(camera.name), (camera.camera.width, camera.camera.height)
     moments = rig.moments[camera.name]
     index = moments[len(moments) // 2]
-    image, sides = pictures.image(index), []
+    image, sides = pictures.image(index), list[Side]()
     shown = {"as given": entities.OVERLAY_MISCALIBRATED, camera.verdict.word: entities.OVERLAY_CORRECTED}
     for side, (name, entity) in zip(("left", "right"), shown.items(), strict=True):
         file = f"{PICTURES}/camera_{number}_{side}.jpg"
         write_whole(folder / file, draw_overlay(image, *pictures.overlay(entity, index), size), Kind.JPEG)
-        alt = f"{camera.name} with the LiDAR points, {name}"
-        sides.append(
-            f'<div class="side {side}"><img src="{escape(file)}" alt="{escape(alt)}">'
-            f'<span class="tag">{escape(name)}</span></div>'
-        )
-    return f"""<figure>
-<figcaption><span><b>{escape(camera.name)}</b>, frame {index}</span></figcaption>
-<div class="compare">
-{sides[0]}
-{sides[1]}
-<input type="range" min="0" max="100" value="50" step="any" aria-label="Boundary between as given and found">
-<div class="handle"></div>
-</div>
-</figure>"""
+        sides.append(Side(file, name, f"{camera.name} with the LiDAR points, {name}"))
+    return figure(f"<span><b>{escape(camera.name)}</b>, frame {index}</span>", *sides)
 
 
 def _page(rig: RecordedRig, figures: list[str], recording_bytes: int) -> str:
     solved = rig.solved
-    return _template("rig.html").substitute(
-        title=escape(f"{rig.title}: calibration report"),
-        style=_template("page.css").substitute(series_styles([])),
-        word=solved.word.capitalize(),
-        grade=GRADES[solved.word],
-        reasons="\n".join(_reasons(solved.cameras)),
-        headline=escape(f"{len(solved.cameras)} cameras, solved {solved.how}."),
-        about=escape(rig.title),
-        table=_table(solved.cameras),
-        figures="\n".join(figures),
-        scale=f'<div class="depth"><span>Depth</span>{depth_scale()}</div>',
-        recording=RECORDING,
-        serve_command=escape(SERVE_COMMAND.format(recording=RECORDING)),
-        size=f"{recording_bytes / 1e6:.1f} MB",
-        script=_resource("page.js"),
+    sections = template("rig.html").substitute(
+        table=_table(solved.cameras), figures="\n".join(figures), scale=scale_of_depth()
     )
+    head = Head(
+        title=f"{rig.title}: calibration report",
+        kind="Camera–LiDAR calibration report of a rig",
+        word=solved.word,
+        reasons="\n".join(_reasons(solved.cameras)),
+        headline=f"{len(solved.cameras)} cameras, solved {solved.how}.",
+        findings="",
+        about=rig.title,
+        metrics="verdict, extrinsic and covariance of every camera.",
+    )
+    return report_page(head, sections, RECORDING, recording_bytes)
 
 
 def _reasons(cameras: tuple[SolvedCamera, ...]) -> Iterator[str]:
@@ -118,11 +89,3 @@ def _table(cameras: tuple[SolvedCamera, ...]) -> str:
     head = "".join(f"<th>{escape(COLUMNS[column])}</th>" for column in kept)
     body = "\n".join(f"<tr>{''.join(f'<td>{escape(row[column])}</td>' for column in kept)}</tr>" for row in rows)
     return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
-
-
-def _resource(name: str) -> str:
-    return resources.files("inspector.report").joinpath(name).read_text(encoding="utf-8")
-
-
-def _template(name: str) -> Template:
-    return Template(_resource(name))

@@ -7,9 +7,9 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from calibnet.errors import ConfigError
 from calibnet.runtime.claim import Claim
@@ -23,6 +23,7 @@ from inspector.report.page import ALONE, AS_ONE, Example, make_page
 from inspector.report.pictures import draw_overlay
 
 PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
+Shown = TypeVar("Shown")
 VIEWER = "viewer"
 """Folder of the web viewer's files, where they are kept beside the page."""
 
@@ -55,15 +56,42 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
         ConfigError: the folder cannot be written, for instance because the disk is full.
         CalibnetError: a picture of the recording cannot be read.
     """
-    check_folder(folder)
     figures = Figures.of(run)
+
+    def draw() -> list[Example]:
+        return [_write_pictures(run, name, position, folder) for name, position in figures.examples().items()]
+
+    return write_files(
+        folder, run.path, draw, _json(figures.as_dict()), lambda shown, size: make_page(figures, shown, RECORDING, size)
+    )
+
+
+def write_files(
+    folder: Path, recording: Path, draw: Callable[[], Shown], metrics: str, page: Callable[[Shown, int], str]
+) -> Path:
+    """Write the files of a report; the page comes last, so that it never shows what is not there.
+
+    Args:
+        folder: created if it does not exist.
+        recording: copied into it.
+        draw: writes the pictures, and hands back what the page says of them.
+        metrics: of ``metrics.json``.
+        page: makes the page of what was drawn and of the recording's size in bytes.
+
+    Returns:
+        The page.
+
+    Raises:
+        ConfigError: the folder cannot be written, for instance because the disk is full.
+    """
+    check_folder(folder)
     claim = Claim(folder / PAGE, Kind.PAGE)
     try:
-        examples = [_write_pictures(run, name, position, folder) for name, position in figures.examples().items()]
-        write_whole(folder / METRICS, _json(figures.as_dict()).encode(), Kind.JSON)
-        copy_recording(run.path, folder / RECORDING)
-        page = make_page(figures, examples, RECORDING, (folder / RECORDING).stat().st_size)
-        write_whole(folder / PAGE, page.encode(errors="backslashreplace"), Kind.PAGE)
+        shown = draw()
+        write_whole(folder / METRICS, metrics.encode(), Kind.JSON)
+        copy_recording(recording, folder / RECORDING)
+        text = page(shown, (folder / RECORDING).stat().st_size)
+        write_whole(folder / PAGE, text.encode(errors="backslashreplace"), Kind.PAGE)
     except OSError as error:
         raise cannot_write(error, folder) from None
     finally:

@@ -1,0 +1,123 @@
+"""What the reports of a run and of a rig have in common: the frame of the page, and two pictures under a slider."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+from string import Template
+from typing import NamedTuple
+
+from calibnet.verdict import Word
+from inspector.report.charts import series_styles
+from inspector.report.metrics import State
+from inspector.report.pictures import depth_scale
+from inspector.report.verdict import GRADES
+
+SERVE_COMMAND = "calib-inspect report {recording} --out . --open"
+
+
+class Head(NamedTuple):
+    """The beginning of a report.
+
+    Attributes:
+        title: of the page.
+        kind: of report.
+        word: of the verdict.
+        reasons: of it, as HTML items.
+        headline: what was found, in a sentence.
+        findings: what else is to be known at once, as HTML.
+        about: what the report is of.
+        metrics: what ``metrics.json`` beside it holds.
+    """
+
+    title: str
+    kind: str
+    word: Word
+    reasons: str
+    headline: str
+    findings: str
+    about: str
+    metrics: str
+
+
+class Side(NamedTuple):
+    """A picture under the slider: its file, what it shows in a word, and what it shows for those who do not see it."""
+
+    file: str
+    name: str
+    alt: str
+
+
+def report_page(head: Head, sections: str, recording: str, recording_bytes: int, states: Sequence[State] = ()) -> str:
+    """The HTML of a report.
+
+    Args:
+        head: its beginning.
+        sections: what it says, as HTML; the last section is left open for the list of files.
+        recording: name of the recording beside the page.
+        recording_bytes: its size.
+        states: whose curves have colours.
+    """
+    return template("report.html").substitute(
+        title=escape(head.title),
+        style=stylesheet(states),
+        kind=escape(head.kind),
+        grade=GRADES[head.word],
+        word=head.word.capitalize(),
+        reasons=head.reasons,
+        headline=escape(head.headline),
+        findings=head.findings,
+        about=escape(head.about),
+        recording=escape(recording),
+        serve_command=escape(SERVE_COMMAND.format(recording=recording)),
+        sections=sections,
+        size=f"{recording_bytes / 1e6:.1f} MB",
+        metrics=escape(head.metrics),
+        script=_resource("page.js"),
+    )
+
+
+def figure(caption: str, left: Side, right: Side) -> str:
+    """Two pictures of which a slider shows more of the one or the other.
+
+    Args:
+        caption: as HTML.
+        left: what was before.
+        right: what came of it.
+    """
+    return f"""<figure>
+<figcaption>{caption}</figcaption>
+<div class="compare">
+{_side("left", left)}
+{_side("right", right)}
+<input type="range" min="0" max="100" value="50" step="any" aria-label="Boundary between {left.name} and {right.name}">
+<div class="handle"></div>
+</div>
+</figure>"""
+
+
+def scale_of_depth() -> str:
+    """What the points' colours stand for."""
+    return f'<div class="depth"><span>Depth</span>{depth_scale()}</div>'
+
+
+def stylesheet(states: Sequence[State] = ()) -> str:
+    """The looks of a page, with the colours of the curves of some states."""
+    return template("page.css").substitute(series_styles(states))
+
+
+def template(name: str) -> Template:
+    """A template of this package."""
+    return Template(_resource(name))
+
+
+def _side(css: str, side: Side) -> str:
+    return (
+        f'<div class="side {css}"><img src="{escape(side.file)}" alt="{escape(side.alt)}">'
+        f'<span class="tag">{escape(side.name)}</span></div>'
+    )
+
+
+def _resource(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
