@@ -28,7 +28,8 @@ def image_channels(image: Tensor) -> Tensor:
 def convolved_in(inputs: Tensor) -> torch.dtype:
     """The precision that convolutions of ``inputs`` compute in: what goes into them need not be finer."""
     kind = inputs.device.type
-    return torch.get_autocast_dtype(kind) if torch.is_autocast_enabled(kind) else torch.float32
+    mixed = kind != "meta" and torch.is_autocast_enabled(kind)  # what is only counted has no autocast
+    return torch.get_autocast_dtype(kind) if mixed else torch.float32
 
 
 def dilate(x: Tensor, radius: int, dim: int) -> Tensor:
