@@ -138,16 +138,18 @@ def _size_of_floats(data: bytes) -> tuple[int, int] | None:
     """Width and height of a TIFF whose pixels are floats; None of anything else."""
     if data[:4] not in (b"II*\0", b"MM\0*"):
         return None
-    try:
-        tags = TiffImagePlugin.ImageFileDirectory_v2(data[:8])
-        file = io.BytesIO(data)
-        file.seek(tags.next)
-        tags.load(file)
-        kinds = tags.get(SAMPLE_FORMAT, (1,))
-        is_float = set(kinds if isinstance(kinds, tuple) else (kinds,)) == {FLOATS}
-        return (int(tags[IMAGE_WIDTH]), int(tags[IMAGE_LENGTH])) if is_float else None
-    except Exception:  # it is damaged, which is told where it is decoded
-        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a damaged header, which is told where it is decoded
+        try:
+            tags = TiffImagePlugin.ImageFileDirectory_v2(data[:8])
+            file = io.BytesIO(data)
+            file.seek(tags.next)
+            tags.load(file)
+            kinds = tags.get(SAMPLE_FORMAT, (1,))
+            is_float = set(kinds if isinstance(kinds, tuple) else (kinds,)) == {FLOATS}
+            return (int(tags[IMAGE_WIDTH]), int(tags[IMAGE_LENGTH])) if is_float else None
+        except Exception:
+            return None
 
 
 def _floats(data: bytes) -> Levels:

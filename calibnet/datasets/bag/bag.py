@@ -89,13 +89,13 @@ class Bag:
         self.image = found_topic(self._bag, options.image, IMAGES, "image", "images")
         self.points = found_topic(self._bag, options.points, POINTS, "points", "point clouds")
         images, scans = self._bag.times(self.image), self._bag.times(self.points)
-        first_image = next(self._bag.messages(self.image, most=1)).content
-        first_scan = next(self._bag.messages(self.points, most=1)).content
+        first_image = self._bag.message(self.image).content
+        first_scan = self._bag.message(self.points).content
         guess = None if options.guess is None else read_calibration(options.guess, Wanted(frames=options.frames))
         info = info_of(self._bag, options.info, self.image)
         camera = None if guess is None else guess.camera
         if info is not None:
-            message = next(self._bag.messages(info, most=1)).content
+            message = self._bag.message(info).content
             camera = ros.read(camera_info_of(message), Path(f"{self._bag}, {info}")).camera
         if camera is None:
             raise DatasetError(

@@ -104,15 +104,16 @@ class BagRecording:
                 content = self._reader.deserialize(data, connection.msgtype)
                 yield Message(content, stamp_of(data, self._reader.is2) or recorded * 1e-9)
 
-    def message(self, topic: str, at: int) -> Message:
-        """The message of a topic that was recorded at a time.
+    def message(self, topic: str, at: int | None = None) -> Message:
+        """The message of a topic that was recorded at a time, or its first.
 
         Raises:
-            DatasetError: there is none, or it is damaged.
+            DatasetError: there is none, whatever its index promises, or it is damaged.
         """
         for message in self.messages(topic, at, 1):
             return message
-        raise DatasetError(f"Bag {self} holds no message of {topic} at {at}; it is damaged.")
+        when = "" if at is None else f" at {at}"
+        raise DatasetError(f"Bag {self} holds no message of {topic}{when} that can be read; it is damaged.")
 
     @contextmanager
     def failures(self) -> Iterator[None]:
