@@ -1,0 +1,26 @@
+"""A process that records again and again keeps nothing of the recordings that it closed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import psutil
+import rerun.blueprint as rrb
+from rerun.chunk import RrdReader
+
+from inspector.record.stream import Stream, release_closed
+
+
+def record(file: Path) -> None:
+    views = [rrb.TextDocumentView(origin=f"/{number}", name=str(number)) for number in range(5)]
+    Stream("calib-inspect", file.stem, "title", [file], rrb.Blueprint(rrb.Tabs(*views))).close()
+    release_closed()
+
+
+def test_closed_recordings_leave_no_threads_and_have_their_layout(tmp_path: Path) -> None:
+    record(tmp_path / "first.rrd")
+    threads = psutil.Process().num_threads()
+    for number in range(5):
+        record(tmp_path / f"{number}.rrd")
+    assert psutil.Process().num_threads() <= threads  # it was four more a recording
+    assert len(RrdReader(tmp_path / "4.rrd").blueprints()) == 1
