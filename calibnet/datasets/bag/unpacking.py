@@ -1,7 +1,10 @@
-"""Pieces of a bag unpacked up to a bound, so that a small file cannot take all memory."""
+"""Bags unpacked up to a bound, so that a small file can take neither all memory nor all of a disk."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
 from bz2 import BZ2Decompressor
 from collections.abc import Callable
 from typing import Any
@@ -9,10 +12,14 @@ from typing import Any
 LARGEST_BYTES = 512 << 20
 """Of an unpacked chunk or message; recorders begin a new chunk after a few megabytes."""
 STEP_BYTES = 16 << 20
+MOST_TIMES = 100
+"""What a whole packed file may grow by, beyond `LARGEST_BYTES`; pictures and scans shrink to a third or so."""
+RESERVE_BYTES = 1 << 30
+"""Of the disk for temporary files, which whole files are unpacked to."""
 
 
 def bound_unpacking() -> None:
-    """Let rosbags unpack no piece that is larger, of whatever bag it reads from now on."""
+    """Let rosbags unpack no piece and no file that is larger, of whatever bag it reads from now on."""
     from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
     from rosbags.rosbag1.reader import decompressors
     from rosbags.rosbag2 import reader
@@ -20,6 +27,7 @@ def bound_unpacking() -> None:
 
     zstd: Any = vars(reader)["zstd"]
     lz4, zstd.decompress = bounded(LZ4FrameDecompressor), bounded(zstd.ZstdDecompressor)
+    zstd.open = bounded_file(zstd.ZstdFile)
     decompressors.update(bz2=bounded(BZ2Decompressor), lz4=lz4)
     DECOMPRESSORS.update(lz4=lambda data, _: lz4(data), zstd=lambda data, _: zstd.decompress(data))
 
@@ -45,3 +53,34 @@ def bounded(make: Callable[[], Any]) -> Callable[[bytes], bytes]:
         return b"".join(pieces)
 
     return unpack
+
+
+def bounded_file(kind: Any) -> type[Any]:
+    """A kind of packed file that is read up to a bound: what may be meant, and what the disk has room for.
+
+    Args:
+        kind: of files, which are read or written through another one.
+    """
+
+    class BoundedFile(kind):  # type: ignore[misc]  # rosbags brings its zstd without types
+        """Counts what is read of it."""
+
+        def __init__(self, file: Any, mode: str = "rb", **options: Any) -> None:
+            super().__init__(file, mode, **options)
+            self._left = 0
+            if "r" in mode:
+                room = shutil.disk_usage(tempfile.gettempdir()).free - RESERVE_BYTES
+                self._most = max(LARGEST_BYTES, MOST_TIMES * os.fstat(file.fileno()).st_size)
+                self._is_full = room < self._most
+                self._left = self._most = max(0, min(room, self._most))
+
+        def read(self, size: int = -1) -> bytes:
+            """Up to so many bytes."""
+            data: bytes = super().read(size)
+            self._left -= len(data)
+            if self._left < 0:
+                where = f", all the room that {tempfile.gettempdir()} has for it" if self._is_full else ""
+                raise ValueError(f"it unpacks to more than {self._most >> 20} MB{where}")
+            return data
+
+    return BoundedFile
