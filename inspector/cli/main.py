@@ -9,6 +9,7 @@ import sys
 import warnings
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import Any
 
 import click
 
@@ -82,6 +83,11 @@ COMMANDS = {
 class LazyGroup(click.Group):
     """A group whose help needs no command's module."""
 
+    def main(self, *arguments: Any, **more: Any) -> Any:
+        """Run it, or tell a shell how a line goes on; click takes what shells say of the line for right."""
+        check_completion()
+        return super().main(*arguments, **more)
+
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of `COMMANDS`."""
         return list(COMMANDS)
@@ -105,10 +111,29 @@ def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None
         ctx.exit()
 
 
+def check_completion() -> None:
+    """See that what a shell asks for can be answered; what it says stands in the environment.
+
+    Raises:
+        ConfigError: no shell has said that.
+    """
+    asked = os.environ.get(COMPLETES)
+    if not asked:
+        return
+    if not re.fullmatch("(bash|zsh|fish)_(source|complete)", asked):
+        raise ConfigError(f"{COMPLETES}={asked[:40]!r} is no request of a shell; unset it, or see --help.")
+    if asked.endswith("_complete"):
+        word = ".*" if asked.startswith("fish") else r"\d{1,4}"  # fish gives the word itself, the others its place
+        if "COMP_WORDS" not in os.environ or not re.fullmatch(word, os.environ.get("COMP_CWORD", "\n")):
+            raise ConfigError("COMP_WORDS and COMP_CWORD are not what a shell sets; press Tab in one, or unset them.")
+
+
+COMPLETES = "_CALIB_INSPECT_COMPLETE"
+"""Variable in which a shell asks how a line goes on."""
 COMPLETION = (
     "\b\n"  # click keeps the lines of such a paragraph as they are
     "Completion in bash (zsh_source and fish_source for the others):\n"
-    '  eval "$(_CALIB_INSPECT_COMPLETE=bash_source calib-inspect)"'
+    f'  eval "$({COMPLETES}=bash_source calib-inspect)"'
 )
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -168,6 +169,36 @@ def test_shell_completion_knows_commands_options_and_values(
     monkeypatch.setenv("COMP_CWORD", str(len(words.split()) - 1))
     errors.run(cli, [])
     assert [line.partition(",")[2] for line in capsys.readouterr().out.splitlines()] == completions
+
+
+@pytest.mark.parametrize(
+    ("asked", "words", "place"),
+    [
+        ("bash_complete", "calib-inspect se", "abc"),
+        ("bash_complete", "calib-inspect se", "-1"),
+        ("zsh_complete", "calib-inspect se", "9" * 5000),
+        ("bash_complete", "calib-inspect se", None),
+        ("fish_complete", None, "se"),
+        ("ksh_complete", "calib-inspect se", "1"),
+        ("nonsense", None, None),
+    ],
+)
+def test_what_no_shell_says_of_a_line_is_a_sentence(
+    asked: str,
+    words: str | None,
+    place: str | None,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, value in (("_CALIB_INSPECT_COMPLETE", asked), ("COMP_WORDS", words), ("COMP_CWORD", place)):
+        if value is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, value)
+    assert errors.run(cli, []) == 3
+    seen = capsys.readouterr()
+    assert seen.out == ""
+    assert re.fullmatch(r"calib-inspect: .*(no request of a shell|not what a shell sets); .*\n", seen.err)
 
 
 @pytest.mark.parametrize("threads", ["abc", "-1", "0", "", "2;3", "9" * 50])
