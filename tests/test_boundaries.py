@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -82,6 +83,48 @@ def test_inspector_computes_no_calibration() -> None:
     computing = ("torch", "lightning_fabric", "calibnet.network", "calibnet.cascade", "calibnet.drive")
     computing += ("calibnet.alignment", "calibnet.drive.consensus", "calibnet.training")
     assert violations("inspector", computing, exempt=("inspector/cli",), types=False) == []
+
+
+ROOM = re.compile(r"^\| `(\w+)` \|.*\|([^|]*)\|$", re.MULTILINE)
+"""A row of the table of rooms in docs/architecture.md: the room, what it has, and the rooms that it may import."""
+FOUNDATION = ("errors", "runtime", "geometry")
+"""Rooms that every other one may import."""
+
+
+def permitted_imports() -> dict[str, set[str]]:
+    """The rooms that each room of ``calibnet`` may import, as docs/architecture.md has them, foundation aside."""
+    table = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    return {room: set(re.findall(r"`(\w+)`", others)) for room, others in ROOM.findall(table)}
+
+
+def actual_imports() -> dict[str, set[str]]:
+    """The rooms that each room of ``calibnet`` imports, anywhere and for types as well; foundation aside."""
+    found: dict[str, set[str]] = {}
+    for path in sorted((ROOT / "calibnet").rglob("*.py")):
+        package = path.relative_to(ROOT).parent.parts
+        room = package[1] if len(package) > 1 else path.stem
+        modules = (name.split(".") for name in imported_modules(path.read_text(encoding="utf-8"), ".".join(package)))
+        rooms = {name[1] for name in modules if name[0] == "calibnet" and len(name) > 1}
+        found.setdefault(room, set()).update(rooms)
+    names = found.keys() - {"__init__", *FOUNDATION}
+    return {room: imported & names - {room} for room, imported in found.items() if room in names}
+
+
+def test_rooms_import_what_the_table_of_the_architecture_says_and_nothing_else() -> None:
+    assert actual_imports() == permitted_imports()
+
+
+def test_the_table_of_rooms_goes_downward_only() -> None:
+    earlier = set[str]()
+    for room, imported in permitted_imports().items():
+        assert imported <= earlier, f"{room} imports rooms below it in the table: {sorted(imported - earlier)}"
+        earlier.add(room)
+
+
+def test_the_foundation_imports_nothing_above_it() -> None:
+    above = tuple(f"calibnet.{room}" for room in actual_imports())
+    assert [line for room in ("runtime", "geometry") for line in violations(f"calibnet/{room}", above)] == []
+    assert set(imported_modules((ROOT / "calibnet" / "errors.py").read_text(encoding="utf-8"))) & set(above) == set()
 
 
 def loaded_by(statement: str) -> set[str]:

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.conformance.requirement import require, require_definite, require_rigid
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.trace import CascadeTrace, DriveEstimate
 
 

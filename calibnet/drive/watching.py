@@ -9,13 +9,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.changes import SHORTEST, watch
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.trace import DriveEstimate, DriveLook
 from calibnet.verdict import BadFrame
 from calibnet.watch import Watched

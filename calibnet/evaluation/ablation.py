@@ -19,7 +19,7 @@ from calibnet.errors import CalibrationError, WeightsError
 from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import RANGES, MiscalibrationRange, pose_error
-from calibnet.methods.calibrator import MethodCard
+from calibnet.methods.card import MethodCard
 from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.network.config import load_preset
 from calibnet.network.convolution import pack

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator
 from calibnet.cascade import Cascade
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
@@ -24,7 +25,6 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import Search
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.judging.lag import lags
-from calibnet.methods.calibrator import Calibrator
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Verdict
 

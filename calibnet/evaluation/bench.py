@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.datasets import Frame, PickedFrames
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.datasets.selection import by_rig, spread
@@ -21,7 +22,7 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator, card_of, drives_only
+from calibnet.methods.card import card_of
 
 FRAMES, DRIVES = "frames", "drives"
 AUDITED = ("grey", "swapped")

@@ -6,10 +6,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from calibnet.calibrator import Calibrator
 from calibnet.cascade.cascade import Cascade
 from calibnet.evaluation.bench import Contestant
 from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
-from calibnet.methods.calibrator import Calibrator, MethodCard
+from calibnet.methods.card import MethodCard
 from calibnet.methods.registry import CASCADE, METHODS, accepts, open_method
 from calibnet.network.config import load_preset
 from calibnet.network.counting import total

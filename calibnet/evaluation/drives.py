@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.verdict import REJECTED
 
 FEWEST_FRAMES = 2

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
@@ -13,7 +14,6 @@ from calibnet.evaluation.drives import evaluate_drives
 from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import Evaluation, evaluate_frames
 from calibnet.geometry import MiscalibrationRange
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.methods.edge_alignment import EdgeAlignment
 from calibnet.verdict import REJECTED
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
-from calibnet.methods.calibrator import Calibrator
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS
 
 

@@ -1,4 +1,4 @@
-"""What calibrates: the interface that all methods have, and the methods by name.
+"""Other methods than the cascade, behind the interface `calibnet.calibrator`: one module or package each.
 
-The other systems of the paper's table move in here, one module each. `Cascade`, ours, lives in `calibnet.cascade`.
+`registry` knows them by name. The cascade, ours, is `calibnet.cascade`.
 """

@@ -10,9 +10,9 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
+from calibnet.calibrator import Calibrator
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.methods.calibrator import Calibrator
 from calibnet.runtime.plugins import Registry
 
 CASCADE = "cascade"

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator, MethodCard, card_of, drives_only
+from calibnet.methods.card import MethodCard, card_of
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import CANNOT_TELL, REJECTED, Verdict, moved
 

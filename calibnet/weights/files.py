@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
@@ -16,9 +16,9 @@ from calibnet.runtime.writing import Kind, write_whole
 from calibnet.weights.manifest import PACKAGE, load_manifest
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
     from torch import Tensor
 
-    from calibnet.methods.learned.network import MethodNetwork
     from calibnet.network.network import CalibrationNetwork
 
 LARGEST_BYTES = 1 << 30
@@ -33,9 +33,21 @@ def weights_path(preset: str, range_: MiscalibrationRange, folder: Path | None =
     return (folder or PACKAGE) / load_manifest(preset, folder).file(range_)
 
 
-def save_network(
-    path: Path, network: CalibrationNetwork | MethodNetwork, state: dict[str, Tensor], record: dict[str, Any]
-) -> None:
+class Saveable(Protocol):
+    """What a weights file says of its network, whose layers may be anything."""
+
+    @property
+    def config(self) -> DataclassInstance:
+        """What it is built from."""
+        ...
+
+    @property
+    def range(self) -> MiscalibrationRange:
+        """What it was trained for."""
+        ...
+
+
+def save_network(path: Path, network: Saveable, state: dict[str, Tensor], record: dict[str, Any]) -> None:
     """Write ``state`` (half precision) with the network's config and the training record; atomic."""
     import torch
     from safetensors.torch import save_file

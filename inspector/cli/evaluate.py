@@ -26,11 +26,11 @@ from inspector.cli.sources import open_parts
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
+    from calibnet.calibrator import Calibrator
     from calibnet.cascade import Cascade
     from calibnet.evaluation.battery import BatteryRun
     from calibnet.evaluation.measure import Step
     from calibnet.geometry import MiscalibrationRange
-    from calibnet.methods.calibrator import Calibrator
 
 
 @click.command()

@@ -28,8 +28,8 @@ from inspector.export.registry import FORMATS
 from inspector.run.options import DEFAULT_RANGE
 
 if TYPE_CHECKING:
+    from calibnet.calibrator import Calibrator
     from calibnet.datasets import Sequence
-    from calibnet.methods.calibrator import Calibrator
     from inspector.live.session import LiveSession
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (

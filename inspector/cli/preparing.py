@@ -17,8 +17,8 @@ from inspector.run.options import DEFAULT_RANGE, RunOptions
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from calibnet.calibrator import Calibrator
     from calibnet.cascade.cascade import Cascade
-    from calibnet.methods.calibrator import Calibrator
     from inspector.record.outputs import Outputs
     from inspector.record.recording import RunDescription
     from inspector.run.session import Session
@@ -57,7 +57,7 @@ def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
         ConfigError: the method is asked for what it cannot do.
         WeightsError: its weights are missing.
     """
-    from calibnet.methods.calibrator import DriveCalibrator, drives_only
+    from calibnet.calibrator import DriveCalibrator, drives_only
     from inspector.record.recording import RunDescription
 
     method = open_other(options)

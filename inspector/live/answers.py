@@ -14,12 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator, DriveCalibrator
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError, ConfigError, DatasetError
 from calibnet.geometry import pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator
 from calibnet.trace import CascadeTrace, DriveEstimate, StageTrace
 from inspector.live.bench import Bench, StagedCalibrator
 from inspector.live.stream import TryRecording

@@ -11,11 +11,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.frame import Frame, Frames, Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.geometry import MiscalibrationRange, sample_miscalibration
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import DriveCalibrator
 from inspector.live.pose import Pose
 from inspector.live.tries import Try
 from inspector.run.start import Start

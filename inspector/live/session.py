@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from calibnet.calibrator import Calibrator
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import Calibrator
 from inspector.live.accept import Target, doubts, verdict_on
 from inspector.live.answers import Answers
 from inspector.live.bench import Bench

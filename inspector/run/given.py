@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
+from calibnet.calibrator import Explainer
 from calibnet.datasets.frame import Frames
 from calibnet.datasets.selection import spread
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.lag import lags
 from calibnet.judging.verify import Standard, named_cause, unfit, verify
-from calibnet.methods.calibrator import Explainer
 from calibnet.verdict import ACCEPTED, Cause, Verdict
 from inspector.verdicts import causes_of
 
@@ -23,7 +23,7 @@ def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict
     """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
 
     Args:
-        method: that found it, asked for causes if it is one of `calibnet.methods.calibrator.Explainer`.
+        method: that found it, asked for causes if it is one of `calibnet.calibrator.Explainer`.
         frames: where it was found.
         given: ``camera_from_lidar`` to verify, 4x4.
         found: verdict on what was found.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
 from calibnet.errors import CalibrationError, DatasetError
@@ -17,7 +18,6 @@ from calibnet.geometry import CameraModel, invert, pose_error
 from calibnet.geometry.known import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.verdict import REJECTED, Verdict, moved
 from inspector.run.rig_solved import Residual, Solved, SolvedCamera
 

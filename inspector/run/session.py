@@ -12,13 +12,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
+from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
 from calibnet.datasets.frame import Frame, Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
-from calibnet.methods.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
 from calibnet.runtime.interruption import StopRequest
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import REJECTED, BadFrame

@@ -11,7 +11,7 @@ from calibnet.trace import CascadeTrace, DriveEstimate
 
 
 class SolvedDrive:
-    """A `calibnet.methods.calibrator.DriveCalibrator` that knows its answer."""
+    """A `calibnet.calibrator.DriveCalibrator` that knows its answer."""
 
     def __init__(self, estimate: DriveEstimate) -> None:
         """Answer with ``estimate``, which has traces."""

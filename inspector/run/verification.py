@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict import Verdict
 from inspector.run.given import judge_given, suspected

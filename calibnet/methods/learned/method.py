@@ -9,7 +9,7 @@ from typing import ClassVar
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import MethodCard
+from calibnet.methods.card import MethodCard
 from calibnet.methods.learned.counting import multiply_adds
 from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.learned.stage import MethodStage
@@ -56,7 +56,7 @@ class LearnedMethod:
         )
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """See `calibnet.methods.calibrator.Calibrator.calibrate`; with ``detail``, what the networks have to show."""
+        """See `calibnet.calibrator.Calibrator.calibrate`; with ``detail``, what the networks have to show."""
         clock = Clock(self.stages[0].device)
         view = self.stages[0].view(frame, clock)
         traces: list[StageTrace] = []

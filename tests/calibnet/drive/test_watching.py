@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.drive.watching import runs, watch_drive, watch_estimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.trace import CascadeTrace, DriveEstimate, DriveLook
 from calibnet.verdict import BadFrame
 from tests.support.drive import REFERENCE, Drive

@@ -11,7 +11,7 @@ from calibnet.evaluation.bench import Bench, Contestant, measure_bench
 from calibnet.evaluation.claims import CLAIMS
 from calibnet.geometry import MiscalibrationRange, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.methods.calibrator import MethodCard
+from calibnet.methods.card import MethodCard
 from calibnet.methods.registry import METHODS
 from calibnet.trace import CascadeTrace, StageTrace
 from tests.support.drive import CAMERA, REFERENCE, Drive

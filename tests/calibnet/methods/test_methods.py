@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from calibnet.calibrator import DriveCalibrator
 from calibnet.conformance import check_method
 from calibnet.geometry import RANGES
-from calibnet.methods.calibrator import DriveCalibrator
 from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.registry import METHODS, open_method
 from tests.calibnet.cascade.test_cascade import cascade

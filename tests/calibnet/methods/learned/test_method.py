@@ -9,7 +9,7 @@ import pytest
 
 from calibnet.errors import WeightsError
 from calibnet.geometry import RANGES, MiscalibrationRange
-from calibnet.methods.calibrator import card_of
+from calibnet.methods.card import card_of
 from calibnet.methods.learned.counting import multiply_adds
 from calibnet.methods.registry import open_method
 from tests.support.boxes import REFERENCE, boxes

@@ -1,13 +1,13 @@
-"""The interface of a method: `Calibrator` on one frame, `DriveCalibrator` on a drive, `Explainer` of what is wrong.
+"""What the cascade (`calibnet.cascade`) and every other method (`calibnet.methods`) can be asked to do.
 
-A method may say what it costs (`Described`), and that it needs the motion of a drive (`drives_only`).
+`Calibrator` corrects the extrinsic of one frame, `DriveCalibrator` also that of a whole drive, and `Explainer` also
+names what is wrong with a frame.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.geometry.types import Extrinsic
@@ -60,56 +60,8 @@ class DriveCalibrator(Calibrator, Protocol):
         ...
 
 
-_RENAMED = {"kitti-object/train": "KITTI object detection"}
-"""Rigs that records of packed trainings once named after their sequence."""
-
-
-@dataclass(frozen=True)
-class MethodCard:
-    """What a method costs and what it was trained on, for tables.
-
-    Attributes:
-        parameters: of its networks, of all stages that run; 0 without networks.
-        multiply_adds: of its networks for one frame, likewise.
-        samples_trained: that its networks have seen, all stages together.
-        trained_on: the rigs of these, as `Sequence.rig` begins, for instance ``("KITTI 2011_09_26",)``.
-    """
-
-    parameters: int = 0
-    multiply_adds: int = 0
-    samples_trained: int = 0
-    trained_on: tuple[str, ...] = ()
-
-    @classmethod
-    def trained(cls, parameters: int, multiply_adds: int, records: Iterable[Mapping[str, Any]]) -> MethodCard:
-        """Of networks that cost so much together, with the records of their trainings (`read_record`)."""
-        records = list(records)
-        rigs = (_RENAMED.get(rig, rig) for record in records for rig in record.get("rigs", ()))
-        samples = sum(int(record.get("samples", 0)) for record in records)
-        return cls(parameters, multiply_adds, samples, tuple(dict.fromkeys(rigs)))
-
-    def knows(self, rig: str) -> bool:
-        """Whether it was trained on a rig."""
-        return any(rig.startswith(one) for one in self.trained_on)
-
-
-@runtime_checkable
-class Described(Protocol):
-    """A method that says what it costs; one that does not is taken to have no networks."""
-
-    @property
-    def card(self) -> MethodCard:
-        """Its costs."""
-        ...
-
-
-def card_of(calibrator: object) -> MethodCard:
-    """What a method costs."""
-    return calibrator.card if isinstance(calibrator, Described) else MethodCard()
-
-
 def drives_only(calibrator: object) -> bool:
-    """Whether a method tells something of whole drives alone: it says so by an attribute ``drives_only``."""
+    """Whether a method calibrates whole drives only, not single frames: it says so by an attribute ``drives_only``."""
     return isinstance(calibrator, DriveCalibrator) and bool(getattr(calibrator, "drives_only", False))
 
 
