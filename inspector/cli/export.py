@@ -120,8 +120,8 @@ def export_rig(
     recording: Path, camera: str | None, form: str, force: bool, output: Path | None, frames: FrameNames
 ) -> int:
     """Write one camera of a rig, or all into a folder; each camera's frame has its name. Returns the exit code."""
+    from inspector.export.exported import exported_camera
     from inspector.read.rig import read_rig
-    from inspector.run.rig_solved import exported_camera
 
     rig = read_rig(recording)
     if camera is not None:

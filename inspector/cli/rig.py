@@ -86,6 +86,7 @@ def rig(
     from calibnet.cascade.cascade import Cascade
     from calibnet.geometry.known import Known
     from calibnet.runtime.interruption import StopRequest
+    from inspector.export.exported import exported_camera
     from inspector.export.registry import export_as
     from inspector.record.recording import RunDescription
     from inspector.record.rig import record_rig
@@ -129,9 +130,9 @@ def rig(
         for line in said:
             say(line, err=beside)
         write_json(json_file, solved.as_dict())
-        for camera, exported in solved.exported().items() if files else ():
-            write(files[camera], export_as("yaml", exported).encode(), Kind.EXPORT)
-            say(f"Saved {files[camera]}.", err=beside)
+        for camera in solved.not_rejected if files else ():
+            write(files[camera.name], export_as("yaml", exported_camera(camera)).encode(), Kind.EXPORT)
+            say(f"Saved {files[camera.name]}.", err=beside)
         if outputs.file is not None:
             for line in [*saved_lines(outputs, shown), *next_lines(outputs.file, rig=True)]:
                 say(line, err=beside)

@@ -51,8 +51,8 @@ def watch_sequence(
     if report is not None:
         raise click.UsageError("watch makes no report; keep its recording with --save FILE.rrd.")
     prepare_json(json_file)
+    from inspector.mount_changes import CANNOT_TELL, CHANGED, as_json, sentences, word
     from inspector.record.outputs import Outputs
-    from inspector.run.watching import CANNOT_TELL, CHANGED, as_json, sentences, word
 
     options = checked(
         opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}

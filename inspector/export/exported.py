@@ -12,6 +12,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, Verdict
 from inspector.read.run import RecordedRun
 from inspector.read.understood import RecordingError
+from inspector.rig_result import CameraResult
 from inspector.verdicts import explained
 
 
@@ -83,6 +84,11 @@ def exported_drive(run: RecordedRun) -> Exported:
         )
     origin = f"{run.title}, all frames solved together"
     return _judged(run.drive, run.frames[0].camera, origin, run.drive_verdict)
+
+
+def exported_camera(result: CameraResult) -> Exported:
+    """What was found of one camera of a rig, whether or not it is accepted."""
+    return _judged(result.verdict.camera_from_lidar, result.camera, f"rig, camera {result.name}", result.verdict)
 
 
 def exported_folder(folder: Path) -> Exported:

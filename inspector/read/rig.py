@@ -15,7 +15,7 @@ from inspector.read.file import RecordingFile
 from inspector.read.pictures import RecordedPictures
 from inspector.read.understood import RecordingError, camera_of, extrinsic_of, understood
 from inspector.read.verdict import read_verdict
-from inspector.run.rig_solved import Residual, Solved, SolvedCamera
+from inspector.rig_result import CameraResult, Residual, RigResult
 
 PROPERTIES = "__properties"
 
@@ -35,11 +35,11 @@ class RecordedRig:
     path: Path
     title: str
     settings: dict[str, Any]
-    solved: Solved
+    solved: RigResult
     moments: dict[str, tuple[int, ...]]
     _file: RecordingFile = field(repr=False)
 
-    def camera(self, name: str) -> SolvedCamera:
+    def camera(self, name: str) -> CameraResult:
         """One of the cameras.
 
         Raises:
@@ -78,18 +78,18 @@ def read_rig(path: Path) -> RecordedRig:
             raise ValueError("a rig without cameras")
         run = _static(file, f"{PROPERTIES}/{entities.RUN}")
         title = _static(file, PROPERTIES).get("RecordingInfo:name", [path.stem])[0]
-        solved = Solved(cameras, bool(said["rigid"]), str(said["tolerance"]))
+        solved = RigResult(cameras, bool(said["rigid"]), str(said["tolerance"]))
         settings = {name: value[0] for name, value in run.items()}
         moments = {camera.name: _moments(file, camera.name) for camera in cameras}
     return RecordedRig(path, str(title), settings, solved, moments, file)
 
 
-def _camera(name: str, said: dict[str, Any], path: Path) -> SolvedCamera:
+def _camera(name: str, said: dict[str, Any], path: Path) -> CameraResult:
     verdict = read_verdict(json.dumps(said["verdict"]), path)
     residual, reference = said["residual"], said["reference"]
     px = residual["match_error_px"]
     apart = [None if residual[key] is None else float(residual[key]) for key in ("rotation_deg", "translation_cm")]
-    return SolvedCamera(
+    return CameraResult(
         str(name),
         _lens(said["camera"], path),
         verdict,

@@ -21,6 +21,7 @@ from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
 from calibnet.watch import Watched
 from inspector import entities
+from inspector.mount_changes import sentences
 from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation
 from inspector.record.outcome import outcome_values
@@ -30,7 +31,6 @@ from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
 from inspector.record.tabs.watch import log_watch
-from inspector.run.watching import sentences
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import move_below
 from inspector.record.tabs.scene import BACKGROUND, POINT_SIZE, frustum
 from inspector.record.tabs.views import View, legend, overlay_view, with_legend
-from inspector.run.rig_solved import Solved, SolvedCamera
+from inspector.rig_result import CameraResult, RigResult
 
 MOMENTS = 40
 """Frames of each camera that are shown, from all over the drive."""
@@ -48,7 +48,7 @@ LEFT_SHARE = 0.64
 class Shown:
     """A camera of the rig, with its frames."""
 
-    solved: SolvedCamera
+    solved: CameraResult
     frames: Frames
 
     @property
@@ -60,7 +60,7 @@ class Shown:
 def record_rig(
     sinks: Sequence[Any],
     description: RunDescription,
-    solved: Solved,
+    solved: RigResult,
     frames: Mapping[str, Frames],
     observer: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
@@ -116,7 +116,7 @@ def _log_moment(rec: rr.RecordingStream, cameras: Sequence[Shown], position: int
     _log_cloud(Subtree(rec), seen)
 
 
-def _log_camera(rec: Subtree, solved: SolvedCamera, frame: Frame) -> None:
+def _log_camera(rec: Subtree, solved: CameraResult, frame: Frame) -> None:
     """The picture, and the points over it as they were given, as they were found and as they truly are."""
     verdict, start = solved.verdict, solved.initial
     rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))

@@ -14,7 +14,7 @@ from inspector.report.pictures import draw_overlay
 from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
 from inspector.report.verdict import GRADES
 from inspector.report.write import PICTURES, RECORDING, write_files
-from inspector.run.rig_solved import COLUMNS, SolvedCamera
+from inspector.rig_result import COLUMNS, CameraResult
 from inspector.verdicts import explained
 
 
@@ -41,7 +41,7 @@ def write_rig_report(rig: RecordedRig, folder: Path) -> Path:
     return write_files(folder, rig.path, draw, metrics, lambda figures, size: _page(rig, figures, size))
 
 
-def _draw(rig: RecordedRig, number: int, camera: SolvedCamera, folder: Path) -> str:
+def _draw(rig: RecordedRig, number: int, camera: CameraResult, folder: Path) -> str:
     """Draw a frame of a camera before and after; returns the HTML that shows them."""
     pictures, size = rig.pictures(camera.name), (camera.camera.width, camera.camera.height)
     moments = rig.moments[camera.name]
@@ -73,9 +73,9 @@ def _page(rig: RecordedRig, figures: list[str], recording_bytes: int) -> str:
     return report_page(head, sections, RECORDING, recording_bytes)
 
 
-def _reasons(cameras: tuple[SolvedCamera, ...]) -> Iterator[str]:
+def _reasons(cameras: tuple[CameraResult, ...]) -> Iterator[str]:
     """The reasons of the verdicts, each with the cameras that it is of."""
-    named: dict[str, list[SolvedCamera]] = {}
+    named: dict[str, list[CameraResult]] = {}
     for camera in cameras:
         named.setdefault(explained(camera.verdict), []).append(camera)
     for reason, of in named.items():
@@ -83,7 +83,7 @@ def _reasons(cameras: tuple[SolvedCamera, ...]) -> Iterator[str]:
         yield f'<li class="{GRADES[of[0].verdict.word]}">{escape(names + reason)}</li>'
 
 
-def _table(cameras: tuple[SolvedCamera, ...]) -> str:
+def _table(cameras: tuple[CameraResult, ...]) -> str:
     rows = [camera.row() for camera in cameras]
     kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
     head = "".join(f"<th>{escape(COLUMNS[column])}</th>" for column in kept)

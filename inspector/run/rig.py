@@ -19,7 +19,7 @@ from calibnet.geometry.known import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.verdict import REJECTED, Verdict, moved
-from inspector.run.rig_solved import Residual, Solved, SolvedCamera
+from inspector.rig_result import CameraResult, Residual, RigResult
 
 if TYPE_CHECKING:
     from calibnet.drive.rig import CameraEstimate, RigEstimate
@@ -103,7 +103,7 @@ def solve(
     miscalibration: Transform | None = None,
     observer: Callable[[str], Callable[[int, int], None]] | None = None,
     tolerance: Tolerance | None = None,
-) -> Solved:
+) -> RigResult:
     """Calibrate all cameras.
 
     Args:
@@ -143,12 +143,12 @@ def solve(
             assert verdict is not None, "the cascade judges what it finds"
             found[name] = verdict, residual
     solved = [
-        SolvedCamera(
+        CameraResult(
             name, camera_of(cameras[name]), verdict, camera_from_rig[name] @ start, residual, references.get(name)
         )
         for name, (verdict, residual) in found.items()
     ]
-    return Solved(tuple(solved), rigid, "" if tolerance is None else str(tolerance))
+    return RigResult(tuple(solved), rigid, "" if tolerance is None else str(tolerance))
 
 
 def camera_of(folder: Folder) -> CameraModel:

@@ -13,12 +13,12 @@ import rerun.blueprint as rrb
 
 from calibnet.watch import WINDOW, Watch
 from inspector import colors
+from inspector.mount_changes import AXES, in_units
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
-from inspector.run.watching import AXES, in_units
 
 NAME = "Did it move?"
 

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from calibnet.geometry import CameraModel, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
-from inspector.export.exported import Exported
 from inspector.verdicts import explained
 
 COLUMNS = ("camera", "verdict", "off the reference", "sure to (1σ)", "alone it says", "corrected by", "matches off")
@@ -36,7 +35,7 @@ class Residual(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedCamera:
+class CameraResult:
     """What was found of one camera.
 
     Attributes:
@@ -103,7 +102,7 @@ class SolvedCamera:
 
 
 @dataclass(frozen=True)
-class Solved:
+class RigResult:
     """What was found of all cameras of a rig.
 
     Attributes:
@@ -112,7 +111,7 @@ class Solved:
         tolerance: that each was allowed on the rig, as it was said; empty for none.
     """
 
-    cameras: tuple[SolvedCamera, ...]
+    cameras: tuple[CameraResult, ...]
     rigid: bool
     tolerance: str = ""
 
@@ -122,6 +121,11 @@ class Solved:
         if self.tolerance:
             return f"as one rig, each within {self.tolerance} of its place on it"
         return "as one rigid rig" if self.rigid else "each on its own"
+
+    @property
+    def not_rejected(self) -> Iterator[CameraResult]:
+        """The cameras whose results may be used."""
+        return (camera for camera in self.cameras if camera.verdict.word != REJECTED)
 
     @property
     def word(self) -> Word:
@@ -162,15 +166,3 @@ class Solved:
         """What a recording keeps, besides pictures; `inspector.read.rig` reads it."""
         cameras = {camera.name: camera.recorded() for camera in self.cameras}
         return {"rigid": self.rigid, "tolerance": self.tolerance, "cameras": cameras}
-
-    def exported(self) -> dict[str, Exported]:
-        """What is not rejected, by the camera's name."""
-        return {one.name: exported_camera(one) for one in self.cameras if one.verdict.word != REJECTED}
-
-
-def exported_camera(one: SolvedCamera) -> Exported:
-    """What was found of a camera, for other tools; it says so where that is not accepted."""
-    origin = f"rig, camera {one.name}"
-    if one.verdict.word != ACCEPTED:
-        origin = f"{origin}; {one.verdict.word}: {explained(one.verdict)}"
-    return Exported(one.verdict.camera_from_lidar, one.camera, origin, verdict=one.verdict)
