@@ -19,7 +19,7 @@ from calibnet.drive.rig import RigEstimate, solve_rig
 from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, invert
-from calibnet.geometry.known import Held, Known
+from calibnet.geometry.prior import PosePrior, Prior
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.judging.causes import Search, match_error_of, reach_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
@@ -40,29 +40,29 @@ class Cascade:
         self,
         stages: Sequence[Stage],
         skipped: Sequence[SkippedStage] = (),
-        common: Matrix6 | None = None,
+        common_error: Matrix6 | None = None,
         wider: Sequence[Stage] = (),
         coefficients: Coefficients | None = None,
-        known: Known | None = None,
+        prior: Prior | None = None,
     ) -> None:
         """Use ``Cascade.load`` unless the networks are already there.
 
         Args:
             stages: coarse to fine, all on one device.
             skipped: stages that were asked for and cannot run.
-            common: covariance of what the networks get wrong in all frames of a drive alike; that of
+            common_error: covariance of what the networks get wrong in all frames of a drive alike; that of
                 `calibnet.weights.manifest.Manifest` by default.
             wider: stages of wider ranges, coarse to fine, kept for calibrations that leave the first stage's range.
             coefficients: of the verdict, fitted to these networks; without them nothing is accepted.
-            known: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
+            prior: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
         """
         self.coefficients = coefficients or Coefficients()
         self.stages, self.skipped, self.wider = list(stages), list(skipped), list(wider)
         if not stages:
             reasons = " ".join(stage.reason for stage in skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())
-        self.common = Manifest("").common if common is None else common
-        self.known = known or Known()
+        self.common_error = Manifest("").common_error if common_error is None else common_error
+        self.prior = prior or Prior()
         self.device = stages[0].device
         self.image_branches = image_branches([stage.network for stage in (*stages, *wider)])
 
@@ -73,7 +73,7 @@ class Cascade:
         stages: tuple[int, ...] | None = None,
         folder: Path | None = None,
         wider: bool = False,
-        known: Known | None = None,
+        prior: Prior | None = None,
     ) -> Cascade:
         """Load the weights of a preset, and its manifest, which says how they are used.
 
@@ -82,7 +82,7 @@ class Cascade:
             stages: numbers 1 (coarsest) to 5 (finest); all by default.
             folder: where the weights lie; the package's own by default.
             wider: keep the stages before the first one as well, for calibrations that leave its range.
-            known: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
+            prior: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
 
         Raises:
             ConfigError: there is no such preset or stage.
@@ -95,7 +95,7 @@ class Cascade:
         manifest = load_manifest(preset, folder)
         loaded, skipped = load_stages(numbers, preset, manifest, folder or PACKAGE)
         kept, _ = load_stages(range(1, numbers[0] if wider else 1), preset, manifest, folder or PACKAGE)
-        return cls(loaded, skipped, manifest.common, kept, load_coefficients(manifest, folder), known)
+        return cls(loaded, skipped, manifest.common_error, kept, load_coefficients(manifest, folder), prior)
 
     @property
     def unjudged(self) -> str:
@@ -120,7 +120,7 @@ class Cascade:
         if not chosen:
             raise ConfigError(f"Stage {number} is not loaded; there are {', '.join(map(str, self.numbers))}.")
         coefficients = self.coefficients if number == self.numbers[-1] else None
-        return Cascade(chosen, self.skipped, self.common, (), coefficients, self.known)
+        return Cascade(chosen, self.skipped, self.common_error, (), coefficients, self.prior)
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct the extrinsic of one frame.
@@ -135,21 +135,21 @@ class Cascade:
         """
         upright = Upright.of(initial, self.stages[0].range)
         clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
-        start, held = upright.extrinsic(initial), self._held(initial, upright)
+        start, pose_prior = upright.extrinsic(initial), self._pose_prior(initial, upright)
         with torch.inference_mode(), autocast(self.device):
             views = ImageViews(prepared(frame, upright), clock)
             clock("preparation")
-            trace = CascadeTrace(start, self._run(self.stages, views, start, detail, held), clock.parts, limit)
+            trace = CascadeTrace(start, self._run(self.stages, views, start, detail, pose_prior), clock.parts, limit)
             if wider := self._covering(trace.arrived @ invert(start)):
-                before = self._run(wider, views, start, held=held)
-                stages = self._run(self.stages, views, before[-1].after, detail, held)
+                before = self._run(wider, views, start, pose_prior=pose_prior)
+                stages = self._run(self.stages, views, before[-1].after, detail, pose_prior)
                 trace = CascadeTrace(start, stages, clock.parts, limit, before)
             clock.skip()  # the stages time themselves
-            trace = replace(trace, again=self._again(views, trace, held))
-            verdict = judge(views.frame, start, trace, self.coefficients, known=self.known.words)
+            trace = replace(trace, again=self._again(views, trace, pose_prior))
+            verdict = judge(views.frame, start, trace, self.coefficients, prior=self.prior.words)
             clock("verdict")
-            if held is not None and verdict.covariance is not None:
-                narrowed = held.narrowed(verdict.covariance, verdict.camera_from_lidar)
+            if pose_prior is not None and verdict.covariance is not None:
+                narrowed = pose_prior.narrowed(verdict.covariance, verdict.camera_from_lidar)
                 verdict = replace(verdict, covariance=narrowed)
             trace = replace(trace, verdict=verdict)
         return upright.undo(trace, initial)
@@ -179,7 +179,7 @@ class Cascade:
                 self.coefficients,
                 match_error_of(self.stages[0]),
                 None if lags is None else (lags, reach_of(self.calibrate)),
-                self.known.words,
+                self.prior.words,
             )
         return upright.undo_verdict(verdict)
 
@@ -199,10 +199,10 @@ class Cascade:
         """
         upright = Upright.of(initial, self.stages[0].range)
         start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
-        held = self._held(initial, upright)
-        estimate = solve_drive(self.stages, frames, start, self.common, observer, held)
+        pose_prior = self._pose_prior(initial, upright)
+        estimate = solve_drive(self.stages, frames, start, self.common_error, observer, pose_prior)
         if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
-            estimate = solve_drive([*wider, *self.stages], frames, start, self.common, observer, held)
+            estimate = solve_drive([*wider, *self.stages], frames, start, self.common_error, observer, pose_prior)
         estimate = replace(estimate, covariance=self.coefficients.widening * estimate.covariance)
         doubt = self.coefficients.drive_doubt_of(self.stages[-1].range)
         verdict = judge_drive(estimate, start, self.stages[0].range, doubt)
@@ -239,11 +239,11 @@ class Cascade:
             RigCamera(one.name, PreparedFrames(one.frames, turn), turn.extrinsic(one.camera_from_rig))
             for one, turn in zip(cameras, upright, strict=True)
         ]
-        held = self.known.about(initial) if self.known else None
-        estimate = solve_rig(self.stages, turned, initial, self.common, observer, held, tolerance)
+        pose_prior = self.prior.about(initial) if self.prior else None
+        estimate = solve_rig(self.stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
         if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
             stages = [*wider, *self.stages]
-            estimate = solve_rig(stages, turned, initial, self.common, observer, held, tolerance)
+            estimate = solve_rig(stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
         widening = self.coefficients.widening
         found = tuple(
             turn.undo_camera(replace(one, covariance=widening * one.covariance))
@@ -259,17 +259,17 @@ class Cascade:
         views: ImageViews,
         initial: Extrinsic,
         detail: bool = False,
-        held: Held | None = None,
+        pose_prior: PosePrior | None = None,
     ) -> tuple[StageTrace, ...]:
         """Some stages, each from where the one before arrived."""
         branches = dict(zip((*self.stages, *self.wider), self.image_branches, strict=True))
         traces: list[StageTrace] = []
         for stage in stages:
             before = traces[-1].after if traces else initial
-            traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail, held))
+            traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail, pose_prior))
         return tuple(traces)
 
-    def _again(self, views: ImageViews, trace: CascadeTrace, held: Held | None) -> StageTrace | None:
+    def _again(self, views: ImageViews, trace: CascadeTrace, pose_prior: PosePrior | None) -> StageTrace | None:
         """One more look of the last stage, from where a run arrived: it tells most about the result.
 
         None where the rest speaks against it already.
@@ -279,13 +279,13 @@ class Cascade:
             return None
         last, branch = self.stages[-1], self.image_branches[len(self.stages) - 1]
         try:
-            return last.look(views.frame, views.of(last, branch), trace.arrived, held=held)
+            return last.look(views.frame, views.of(last, branch), trace.arrived, pose_prior=pose_prior)
         except CalibrationError:  # too few points are left in the picture: the run itself was fine
             return None
 
-    def _held(self, initial: Extrinsic, upright: Upright) -> Held | None:
+    def _pose_prior(self, initial: Extrinsic, upright: Upright) -> PosePrior | None:
         """What is known of an extrinsic, as the upright camera has it; None for nothing."""
-        return self.known.about(initial).turned(upright.rotation) if self.known else None
+        return self.prior.about(initial).turned(upright.rotation) if self.prior else None
 
     def _covering(self, moved: Transform) -> list[Stage]:
         """The wider stages with which to start again after moving so far; none where the first stage's range covers it.

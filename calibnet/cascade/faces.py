@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibnet.geometry import transform
-from calibnet.geometry.known import inverse
+from calibnet.geometry.prior import inverse
 from calibnet.geometry.se3 import pose_from_vector, pose_vector
 from calibnet.geometry.types import Rotation
 from calibnet.judging.covariance import Spread

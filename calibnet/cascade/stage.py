@@ -19,7 +19,7 @@ from calibnet.datasets.images import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform
-from calibnet.geometry.known import Held, inverse
+from calibnet.geometry.prior import PosePrior, inverse
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.judging.covariance import Spread
 from calibnet.network.batch import Cut, lidar_input, make_batch
@@ -102,7 +102,7 @@ class Stage:
         return image.permute(2, 0, 1)[None].to(self.device)
 
     def correct(
-        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, held: Held | None = None
+        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, pose_prior: PosePrior | None = None
     ) -> StageTrace:
         """Look at a frame, and again from where that arrives, until the next stage can take over.
 
@@ -111,22 +111,22 @@ class Stage:
             view: its image, as `view` gives it.
             before: the extrinsic to correct.
             detail: keep the intermediate results of the first look.
-            held: what is known of the extrinsic beforehand.
+            pose_prior: what is known of the extrinsic beforehand.
 
         Raises:
             CalibrationError: see `look`.
         """
-        look = trace = self.look(frame, view, before, detail, held)
+        look = trace = self.look(frame, view, before, detail, pose_prior)
         for _ in range(self.settings.looks - 1):
             if self.is_settled(look.correction):
                 break
-            look = self.look(frame, view, look.after, held=held)
+            look = self.look(frame, view, look.after, pose_prior=pose_prior)
             trace = trace.followed_by(look)
         return trace
 
     @torch.inference_mode()
     def look(
-        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, held: Held | None = None
+        self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, pose_prior: PosePrior | None = None
     ) -> StageTrace:
         """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
 
@@ -139,7 +139,7 @@ class Stage:
             trace = self._look_at_faces(frame, view, before, detail)
         else:
             trace = self._look(frame, view, before, detail)
-        return trace if held is None else holding(trace, held)
+        return trace if pose_prior is None else with_prior(trace, pose_prior)
 
     def _look_at_faces(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         """One look through each face that shows enough of the scan, as one."""
@@ -206,7 +206,7 @@ class Stage:
         return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
 
 
-def holding(look: StageTrace, held: Held) -> StageTrace:
+def with_prior(look: StageTrace, pose_prior: PosePrior) -> StageTrace:
     """A look as what is known of the extrinsic leaves it; its information stays what the network states.
 
     The network is believed as far as its results are found to be right, which is less than it states.
@@ -214,7 +214,7 @@ def holding(look: StageTrace, held: Held) -> StageTrace:
     firm = None
     if look.information is not None:
         firm = inverse(Spread().covariance(look.information, look.range, look.range, look.match_error_px))
-    correction = held.corrected(look.correction, firm, look.before)
+    correction = pose_prior.corrected(look.correction, firm, look.before)
     return replace(look, correction=correction, after=correction @ look.before)
 
 

@@ -21,7 +21,7 @@ from calibnet.datasets.scans import SCAN_SUFFIXES
 from calibnet.datasets.selection import spread
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry.camera_model import CameraModel
-from calibnet.geometry.known import Known, parse_angle, parse_axes, parse_length
+from calibnet.geometry.prior import Prior, parse_angle, parse_axes, parse_length
 from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
 
@@ -78,7 +78,7 @@ class Folder(PairedSequence):
         self._development = development_of(paths, real, self.calibration.bayer)
         self._lens = Lens.of(real, extrinsic, looked_at(paths, real, self._development))
         self.cloud_columns = self.calibration.cloud_columns
-        self.known = known_of(self.calibration, calibration_path(root))
+        self.prior = prior_of(self.calibration, calibration_path(root))
         self._fixed = Calibration(self._lens.pinhole.matrix, extrinsic)
         files = _frames(pairing.pairs)
         name = root.resolve().name
@@ -172,15 +172,15 @@ def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
     return calibration_path(folder), found.camera, found.camera_from_lidar
 
 
-def known_of(calibration: CalibrationFile, path: Path) -> Known:
+def prior_of(calibration: CalibrationFile, path: Path) -> Prior:
     """What a calibration file says is known of its extrinsic.
 
     Raises:
         DatasetError: it says so wrongly.
     """
-    said = calibration.known
+    said = calibration.prior
     try:
-        return Known.of(
+        return Prior.of(
             parse_axes(said["fix"]) if "fix" in said else (),
             parse_length(said["prior_translation"]) if "prior_translation" in said else None,
             parse_angle(said["prior_rotation"]) if "prior_rotation" in said else None,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibnet.alignment import Evidence, align
-from calibnet.geometry.known import Held, inverse
+from calibnet.geometry.prior import PosePrior, inverse
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vector6
 from calibnet.trace import Estimate
@@ -34,19 +34,23 @@ class Consensus:
     """Frames' corrections of one common extrinsic, and what they agree on."""
 
     def __init__(
-        self, before: Extrinsic, prior: Matrix6, held: Held | None = None, common: Matrix6 | None = None
+        self,
+        before: Extrinsic,
+        range_information: Matrix6,
+        pose_prior: PosePrior | None = None,
+        common_error: Matrix6 | None = None,
     ) -> None:
         """Start with no frame.
 
         Args:
             before: ``camera_from_lidar`` that all corrections are relative to.
-            prior: information of the range the stage was trained for. Every frame's information
+            range_information: inverse covariance of the range the stage was trained for. Every frame's information
                 contains it; the estimate counts it once.
-            held: what is known of the extrinsic beforehand, counted once as well.
-            common: covariance of what the networks get wrong in all frames alike, against which that is weighed.
+            pose_prior: what is known of the extrinsic beforehand, counted once as well.
+            common_error: covariance of what the networks get wrong in all frames alike, against which that is weighed.
         """
-        self.before, self.prior, self.held = before, prior, held
-        self.common = np.zeros((6, 6)) if common is None else common
+        self.before, self.range_information, self.pose_prior = before, range_information, pose_prior
+        self.common_error = np.zeros((6, 6)) if common_error is None else common_error
         self._vectors: list[Vector6] = []
         self._informations: list[Matrix6] = []
 
@@ -56,7 +60,7 @@ class Consensus:
     def add(self, correction: Transform, information: Matrix6 | None) -> None:
         """Take in one frame: its correction, and its information; None where the network states none."""
         self._vectors.append(pose_vector(correction))
-        self._informations.append(FIRM * self.prior if information is None else information)
+        self._informations.append(FIRM * self.range_information if information is None else information)
 
     def estimate(self) -> Estimate:
         """What the frames so far agree on, and what is known beforehand.
@@ -65,8 +69,8 @@ class Consensus:
             ValueError: there are none.
         """
         mean, covariance = self.agreed()
-        if self.held is not None:
-            mean, covariance = self.held.fused(mean, inverse(covariance + self.common), self.before)
+        if self.pose_prior is not None:
+            mean, covariance = self.pose_prior.fused(mean, inverse(covariance + self.common_error), self.before)
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
     def free_estimate(self) -> Estimate:
@@ -91,7 +95,7 @@ class Consensus:
             covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))
         return mean, covariance
 
-    def aligned(self, evidence: Sequence[Evidence], common: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
+    def aligned(self, evidence: Sequence[Evidence], common_error: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
         """What the frames and the evidence of some of them agree on.
 
         The covariance counts what the networks get wrong in all frames alike, too, as far as the evidence leaves it
@@ -99,16 +103,16 @@ class Consensus:
 
         Args:
             evidence: of any of the frames, gathered under ``before``.
-            common: covariance of what the networks get wrong in all frames alike.
+            common_error: covariance of what the networks get wrong in all frames alike.
             starts: where the alignment starts, of which the best result is taken; at what the frames agree on by
                 default.
         """
         known = self.estimate()
         others = [pose_vector(one.camera_from_lidar @ invert(self.before)) for one in starts]
         likely, covariance = self.agreed()
-        covariance = covariance + common
-        if self.held is not None:
-            likely, covariance = self.held.fused(likely, inverse(covariance), self.before)
+        covariance = covariance + common_error
+        if self.pose_prior is not None:
+            likely, covariance = self.pose_prior.fused(likely, inverse(covariance), self.before)
         if known.rotation_deg > FARTHEST_ROTATION_DEG or known.translation_cm > 100 * FARTHEST_TRANSLATION_M:
             evidence = ()
         correction, covariance = align(evidence, likely, covariance, others)
@@ -117,5 +121,5 @@ class Consensus:
     def _solve(self, vectors: Floats, informations: Floats, weights: Floats) -> tuple[Matrix6, Vector6]:
         """Summed normal equations of vectors ``[N, 6]`` and informations ``[N, 6, 6]``: matrix and solution."""
         weighted = weights[:, None, None] * informations
-        normal = weighted.sum(0) - weights.sum() * self.prior + self.prior
+        normal = weighted.sum(0) - weights.sum() * self.range_information + self.range_information
         return normal, np.linalg.solve(normal, np.einsum("nij,nj->i", weighted, vectors))

@@ -27,7 +27,7 @@ from calibnet.drive.rig_pose import Said, joined
 from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, Looking, agree, said
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
-from calibnet.geometry.known import Held
+from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
@@ -72,9 +72,9 @@ def solve_rig(
     stages: Sequence[Looking],
     cameras: Sequence[RigCamera],
     initial: Extrinsic,
-    common: Matrix6,
+    common_error: Matrix6,
     observer: Callable[[int, int], None] | None = None,
-    held: Held | None = None,
+    pose_prior: PosePrior | None = None,
     tolerance: Matrix6 | None = None,
 ) -> RigEstimate:
     """Correct ``rig_from_lidar``, as `calibnet.drive.solve.solve_drive` does with one camera.
@@ -85,9 +85,9 @@ def solve_rig(
         stages: coarse to fine.
         cameras: of the rig; each frame is read in the last look, and some before.
         initial: ``rig_from_lidar`` to start from.
-        common: covariance of what the networks get wrong in all frames of one camera alike.
+        common_error: covariance of what the networks get wrong in all frames of one camera alike.
         observer: called before each frame is read and at the end, with how many are read so far, and in all.
-        held: what is known of the rig's pose beforehand.
+        pose_prior: what is known of the rig's pose beforehand.
         tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for a rigid rig.
 
     Raises:
@@ -138,7 +138,7 @@ def solve_rig(
             except (CalibrationError, DatasetError) as error:
                 failure = error
                 continue
-            found.append(Said.of(camera, consensus, common))
+            found.append(Said.of(camera, consensus, common_error))
         if failure is not None and not found:
             raise failure
         return found
@@ -147,13 +147,13 @@ def solve_rig(
     for stage in stages:
         for _ in range(LOOKS):
             told = look(stage, some, last=False)
-            rig = pose_from_vector(joined(told, rig, held, tolerance)[0]) @ rig
+            rig = pose_from_vector(joined(told, rig, pose_prior, tolerance)[0]) @ rig
             places |= {one.camera.name: one.placed(rig, tolerance) for one in told}
     told = look(stages[-1], everything, last=True)
-    mean, covariance = joined(told, rig, held, tolerance)
+    mean, covariance = joined(told, rig, pose_prior, tolerance)
     of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
     opened = None
-    if held is not None:
+    if pose_prior is not None:
         free, spread_of_free = joined(told, rig, None, tolerance)
         opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(looks))
     if aligns:

@@ -15,7 +15,7 @@ import numpy as np
 
 from calibnet.datasets.rig import RigCamera
 from calibnet.drive.consensus import Consensus
-from calibnet.geometry.known import Held, inverse
+from calibnet.geometry.prior import PosePrior, inverse
 from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
 
@@ -35,10 +35,10 @@ class Said:
     covariance: Matrix6 = field(repr=False)
 
     @classmethod
-    def of(cls, camera: RigCamera, consensus: Consensus, common: Matrix6) -> Said:
-        """What frames agree on; ``common`` is the covariance of what is wrong in all of them alike."""
+    def of(cls, camera: RigCamera, consensus: Consensus, common_error: Matrix6) -> Said:
+        """What frames agree on; ``common_error`` is the covariance of what is wrong in all of them alike."""
         mean, covariance = consensus.agreed()
-        return cls(camera, pose_from_vector(mean) @ consensus.before, covariance + common)
+        return cls(camera, pose_from_vector(mean) @ consensus.before, covariance + common_error)
 
     def off(self, rig: Extrinsic) -> Vector6:
         """How far the camera is from where it is expected on the rig ``rig_from_lidar``, in its own frame."""
@@ -65,14 +65,14 @@ class Said:
 
 
 def joined(
-    said: Sequence[Said], rig: Extrinsic, held: Held | None = None, tolerance: Matrix6 | None = None
+    said: Sequence[Said], rig: Extrinsic, pose_prior: PosePrior | None = None, tolerance: Matrix6 | None = None
 ) -> tuple[Vector6, Matrix6]:
     """The correction of a rig's pose that its cameras agree on, and its covariance.
 
     Args:
         said: by the frames of each camera.
         rig: ``rig_from_lidar`` that is corrected.
-        held: what is known of the rig's pose beforehand.
+        pose_prior: what is known of the rig's pose beforehand.
         tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for none at all.
     """
     information, moment = np.zeros((6, 6)), np.zeros(6)
@@ -84,4 +84,4 @@ def joined(
         of_rig = invert(camera_from_rig) @ one.camera_from_lidar @ invert(rig)
         information, moment = information + firm, moment + firm @ pose_vector(of_rig)
     mean = np.asarray(np.linalg.solve(information, moment), np.float64)
-    return (mean, inverse(information)) if held is None else held.fused(mean, information, rig)
+    return (mean, inverse(information)) if pose_prior is None else pose_prior.fused(mean, information, rig)

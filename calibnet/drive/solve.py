@@ -14,7 +14,7 @@ from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
-from calibnet.geometry.known import Held
+from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
 from calibnet.judging.witnesses import misfits
@@ -55,9 +55,9 @@ def solve_drive(
     stages: Sequence[Looking],
     frames: Frames,
     initial: Extrinsic,
-    common: Matrix6,
+    common_error: Matrix6,
     observer: Callable[[int, int], None] | None = None,
-    held: Held | None = None,
+    pose_prior: PosePrior | None = None,
 ) -> DriveEstimate:
     """Correct the extrinsic that all frames share.
 
@@ -70,9 +70,9 @@ def solve_drive(
         stages: coarse to fine.
         frames: of one camera and LiDAR on one mount; each is read in the last look, and some before.
         initial: ``camera_from_lidar`` to start from.
-        common: covariance of what the networks get wrong in all frames alike.
+        common_error: covariance of what the networks get wrong in all frames alike.
         observer: called before each frame is read and at the end, with how many are read so far, and in all.
-        held: what is known of the extrinsic beforehand.
+        pose_prior: what is known of the extrinsic beforehand.
 
     Raises:
         CalibrationError: no frame could be calibrated.
@@ -92,14 +92,18 @@ def solve_drive(
     extrinsic = initial
     for stage in stages:
         for _ in range(LOOKS):
-            extrinsic = agree(stage, read, some, extrinsic, held=held, common=common).estimate().camera_from_lidar
+            extrinsic = (
+                agree(stage, read, some, extrinsic, pose_prior=pose_prior, common_error=common_error)
+                .estimate()
+                .camera_from_lidar
+            )
 
     aligns = is_finest(stages[-1].range)
     evidence = list[Evidence]()
     to_align, convergence = Due(spread(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
 
     def estimate(consensus: Consensus, *starts: Estimate) -> Estimate:
-        return consensus.aligned(evidence, common, starts) if aligns else consensus.estimate()
+        return consensus.aligned(evidence, common_error, starts) if aligns else consensus.estimate()
 
     looks = list[DriveLook]()
 
@@ -110,7 +114,7 @@ def solve_drive(
         convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
 
     skipped = list[BadFrame]()
-    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped, held, common)
+    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped, pose_prior, common_error)
     of_networks = consensus.estimate()
     final = estimate(consensus, of_networks, *convergence.latest)
     convergence.end(final)
@@ -125,7 +129,7 @@ def solve_drive(
         networks=of_networks if aligns else None,
         looks=tuple(looks),
         looked_from=extrinsic,
-        free=None if held is None else consensus.free_estimate(),
+        free=None if pose_prior is None else consensus.free_estimate(),
     )
 
 
@@ -148,8 +152,8 @@ def agree(
     extrinsic: Extrinsic,
     taken_in: Callable[[int, Frame, StageTrace, Consensus], None] | None = None,
     skipped: list[BadFrame] | None = None,
-    held: Held | None = None,
-    common: Matrix6 | None = None,
+    pose_prior: PosePrior | None = None,
+    common_error: Matrix6 | None = None,
 ) -> Consensus:
     """What one look of a stage at each of some frames of a drive comes to.
 
@@ -161,15 +165,15 @@ def agree(
         taken_in: called after each frame that could be calibrated, with its position, its look and the
             consensus so far.
         skipped: takes in the frames that could not be read or calibrated.
-        held: what is known of the extrinsic beforehand.
-        common: what that is weighed against, see `Consensus`.
+        pose_prior: what is known of the extrinsic beforehand.
+        common_error: what that is weighed against, see `Consensus`.
 
     Raises:
         CalibrationError: none of the frames could be calibrated.
         DatasetError: none could be read.
     """
     failure: CalibnetError | None = None
-    consensus = Consensus(extrinsic, stage.range.information, held, common)
+    consensus = Consensus(extrinsic, stage.range.information, pose_prior, common_error)
     for position in positions:
         index = position
         try:

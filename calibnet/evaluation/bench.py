@@ -16,9 +16,9 @@ from calibnet.datasets import Sequence as FrameSequence
 from calibnet.datasets.selection import by_rig, spread
 from calibnet.errors import CalibnetError, CalibrationError, ConfigError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
-from calibnet.evaluation.claims import CLAIMS
 from calibnet.evaluation.drives import shares_mount
 from calibnet.evaluation.metrics import Metrics
+from calibnet.evaluation.published import PUBLISHED
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
@@ -31,7 +31,7 @@ TIMED = 3
 """Frames whose median time is a method's latency, after one that is not timed."""
 
 
-class Contestant(NamedTuple):
+class BenchMethod(NamedTuple):
     """A method of the table, by its name and by what opens it for a range."""
 
     name: str
@@ -80,7 +80,7 @@ Observer = Callable[[Step], None]
 
 
 def measure_bench(
-    bench: Bench, contestants: Sequence[Contestant], observer: Observer | None = None
+    bench: Bench, bench_methods: Sequence[BenchMethod], observer: Observer | None = None
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Measure methods one after the other.
 
@@ -91,8 +91,8 @@ def measure_bench(
     Raises:
         DatasetError: a frame cannot be read.
     """
-    for contestant in contestants:
-        yield contestant.name, _entry(bench, contestant, observer or (lambda step: None))
+    for bench_method in bench_methods:
+        yield bench_method.name, _entry(bench, bench_method, observer or (lambda step: None))
 
 
 def initial_rows(bench: Bench) -> Iterator[dict[str, Any]]:
@@ -108,13 +108,13 @@ def initial_rows(bench: Bench) -> Iterator[dict[str, Any]]:
                 yield {"range": str(range_), "rig": rig, "runs": len(errors), **Metrics.of(errors).as_dict()}
 
 
-def _entry(bench: Bench, contestant: Contestant, observer: Observer) -> dict[str, Any]:
+def _entry(bench: Bench, bench_method: BenchMethod, observer: Observer) -> dict[str, Any]:
     entry: dict[str, Any] = {"parameters": None, "multiply_adds": None, "latency_ms": None, "samples_trained": None}
     entry |= {"trained_on": [], "rows": [], "audit": {}}
-    entry["claims"] = [claim.as_dict() for claim in CLAIMS.get(contestant.name, ())]
+    entry["claims"] = [one.as_dict() for one in PUBLISHED.get(bench_method.name, ())]
     for position, range_ in enumerate(bench.ranges):
         try:
-            method = contestant.open(range_)
+            method = bench_method.open(range_)
         except CalibnetError as error:
             entry["rows"].append({"range": str(range_), "rig": "", "in_rig": None, "why": str(error)})
             continue
@@ -130,13 +130,13 @@ def _entry(bench: Bench, contestant: Contestant, observer: Observer) -> dict[str
             }
         for rig, sequences in bench.rigs.items():
             for of in kinds(method):
-                told = _telling(observer, f"{contestant.name}, {range_}, {of} of {rig}")
+                told = _telling(observer, f"{bench_method.name}, {range_}, {of} of {rig}")
                 row = measure_row(bench, method, range_, sequences, of, told)
                 entry["rows"].append({"range": str(range_), "rig": rig, "in_rig": card.knows(rig), "of": of, **row})
         if bench.audit and position == 0:
             entry["audit"] = {"range": str(range_)} | {
                 name: measure_row(
-                    bench, method, range_, altered, kinds(method)[0], _telling(observer, f"{contestant.name}, {name}")
+                    bench, method, range_, altered, kinds(method)[0], _telling(observer, f"{bench_method.name}, {name}")
                 )
                 for name, altered in _altered(bench).items()
             }

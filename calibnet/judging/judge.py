@@ -30,7 +30,7 @@ def judge(
     coefficients: Coefficients,
     match_error: Measure | None = None,
     lag: tuple[Search, Measure] | None = None,
-    known: str = "",
+    prior: str = "",
 ) -> Verdict:
     """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
 
@@ -43,7 +43,7 @@ def judge(
             measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by the lens that the matches ask for.
         lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
             far a run goes.
-        known: what was known of the extrinsic beforehand, as the user said it. The doubt is fitted to runs in which all
+        prior: what was known of the extrinsic beforehand, as the user said it. The doubt is fitted to runs in which all
             axes are open, which go wrong mostly in what may be known here: it accepts then, and never rejects.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
@@ -108,10 +108,10 @@ def judge(
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "What the network tells of its matches is not enough to judge them.", suspects)
     reason = f"Picture and scan fit, but not as well as in runs that end right (an error is {wrong:.0%} likely)."
-    if known:
+    if prior:
         reason = (
             "Picture and scan fit, but not as well as in runs that end right (if no axis were known, an error would be "
-            f"{wrong:.0%} likely; with {known} it is less so, how much cannot be told)."
+            f"{wrong:.0%} likely; with {prior} it is less so, how much cannot be told)."
         )
         return verdict(CANNOT_TELL, reason, why_lens())
     return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why_lens())

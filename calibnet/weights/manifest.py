@@ -105,7 +105,7 @@ class Manifest:
         return next((entry.file for entry in self.stages if entry.range == range_), file_name(self.preset, range_))
 
     @property
-    def common(self) -> Matrix6:
+    def common_error(self) -> Matrix6:
         """Covariance of what the networks get wrong in all frames of a drive alike."""
         sigma = [self.common_translation_m] * 3 + [float(np.radians(self.common_rotation_deg))] * 3
         return np.diag(np.square(sigma))

@@ -22,7 +22,7 @@ from inspector.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from calibnet.evaluation.bench import Bench, Contestant
+    from calibnet.evaluation.bench import Bench, BenchMethod
     from calibnet.evaluation.bench import Step as BenchStep
     from calibnet.geometry import MiscalibrationRange
 
@@ -122,9 +122,9 @@ def bench(
     else:
         if not data:
             raise click.UsageError("--data is needed, for instance --data kitti-raw:DIR:2011_09_26/0048.")
-        measured, contestants = set_up(data, ranges, frames, methods, dict(ours), preset, weights, masks)
+        measured, bench_methods = set_up(data, ranges, frames, methods, dict(ours), preset, weights, masks)
         measured = replace(measured, repeats=repeats, seed=seed, most=most, limit_s=limit, audit=audit)
-        content = run(measured, contestants, threads, json_file)
+        content = run(measured, bench_methods, threads, json_file)
     from inspector.cli.bench_tables import print_bench
 
     print_bench(content, console_beside(json_file))
@@ -144,12 +144,12 @@ def set_up(
     preset: str,
     weights: Path | None,
     masks: Path | None,
-) -> tuple[Bench, list[Contestant]]:
+) -> tuple[Bench, list[BenchMethod]]:
     """What is measured, and who."""
     from calibnet.datasets import PickedFrames, select_frames
     from calibnet.datasets.discovery import find_sequences
     from calibnet.evaluation.bench import Bench
-    from calibnet.evaluation.contestants import contestants
+    from calibnet.evaluation.bench_methods import bench_methods
     from calibnet.geometry import RANGES
     from calibnet.methods.registry import CASCADE, METHODS
     from calibnet.training.data import open_data
@@ -165,10 +165,10 @@ def set_up(
     dataset, _, rest = data[0].partition(":")
     root = Path(rest.partition(":")[0])
     measured = Bench(list(sequences), ranges or (RANGES[0], RANGES[2]), beside=lambda: find_sequences(dataset, root))
-    return measured, contestants(names, ours, {"weights": weights, "masks": masks}, preset)
+    return measured, bench_methods(names, ours, {"weights": weights, "masks": masks}, preset)
 
 
-def run(measured: Bench, contestants: list[Contestant], threads: int, json_file: str | None) -> dict[str, Any]:
+def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_file: str | None) -> dict[str, Any]:
     """Measure; after every method the JSON file is written, so that what was measured is not lost."""
     import cv2
     import torch
@@ -187,7 +187,7 @@ def run(measured: Bench, contestants: list[Contestant], threads: int, json_file:
         bars.show(Step(step.row, step.done, step.total, ""))
 
     with bars:
-        for name, entry in measure_bench(measured, contestants, show):
+        for name, entry in measure_bench(measured, bench_methods, show):
             content["methods"][name] = entry
             for row in entry["rows"]:
                 if "why" in row:

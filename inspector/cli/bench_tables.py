@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from calibnet.geometry import MiscalibrationRange
-from inspector.report.bench_rows import KINDS, NOTHING, about, claims, costs, rows
+from inspector.report.bench_rows import KINDS, NOTHING, about, costs, published_results, rows
 from inspector.report.bench_summary import ERRORS, LEGEND, PICTURES, summary
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_bench(content: dict[str, Any], console: Console) -> None:
-    """A line a method for each range, then one a rig; what they cost, and the claims of papers line by line."""
+    """A line a method for each range, then one a rig; what they cost, and what their papers report, line by line."""
     console.print(about(content), LEGEND, sep="\n")
     for range_ in content["ranges"]:
         for title, heads in (("mean errors", ERRORS), ("with pictures that are not the scan's", PICTURES)):
@@ -31,12 +31,14 @@ def print_bench(content: dict[str, Any], console: Console) -> None:
         if row.why:
             console.print(f"{row.method}, {row.label}: {row.why}", soft_wrap=True, style="yellow")
     console.print(_costs(content))
-    published = list(claims(content))
+    published = list(published_results(content))
     if published:
         console.print("Published elsewhere, on other frames:")
-    for name, claim in published:
-        errors = f"{claim['rotation_deg']:g}° / {claim['translation_cm']:g} cm"
-        console.print(f"{name}: {errors} from {claim['range']} on {claim['rig']} ({claim['source']}).", soft_wrap=True)
+    for name, result in published:
+        errors = f"{result['rotation_deg']:g}° / {result['translation_cm']:g} cm"
+        console.print(
+            f"{name}: {errors} from {result['range']} on {result['rig']} ({result['source']}).", soft_wrap=True
+        )
 
 
 def _rigs(content: dict[str, Any]) -> list[str]:

@@ -142,13 +142,13 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     method: Calibrator
     if options.method == CASCADE:
         numbers = options.stages or options.start.stages
-        method = cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.known)
+        method = cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.prior)
         announce(Console(stderr=True, highlight=False), options, cascade)
     else:
         method = open_other(options)
         say(UNJUDGED, err=True)
     bench = Bench(sequence, options.positions, options.start, options.seed)
-    session = partial(LiveSession, bench, method, target, options.range or DEFAULT_RANGE, known=options.known.words)
+    session = partial(LiveSession, bench, method, target, options.range or DEFAULT_RANGE, known=options.prior.words)
     if keeping.native:
         in_a_window(session, keeping.connect)
     else:

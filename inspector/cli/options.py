@@ -97,7 +97,7 @@ class MiscalibrationType(click.ParamType["Transform"]):
 
 
 class QuantityType(click.ParamType[Any]):
-    """A text that one of the parsers of `calibnet.geometry.known` reads."""
+    """A text that one of the parsers of `calibnet.geometry.prior` reads."""
 
     def __init__(self, name: str, parser: str) -> None:
         self.name, self.parser = name, parser
@@ -105,12 +105,12 @@ class QuantityType(click.ParamType[Any]):
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Parse the text; a value that is parsed already is kept."""
         from calibnet.errors import ConfigError
-        from calibnet.geometry import known
+        from calibnet.geometry import prior
 
         if not isinstance(value, str):
             return value
         try:
-            return getattr(known, self.parser)(value)
+            return getattr(prior, self.parser)(value)
         except ConfigError as error:
             self.fail(str(error), param, ctx)
 

@@ -40,7 +40,7 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
     numbers = options.stages or options.start.stages
     if verify and options.stages is None:  # how far off the calibration is, is what is asked
         numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
-    cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.known)
+    cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.prior)
     stages = [stage.number for stage in cascade.stages]
     console = make_console()
     announce(console, options, cascade)
@@ -126,7 +126,7 @@ def make_session(
 def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     """Say what is about to run, and which stages cannot."""
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
-    known = f", {options.known.words}" if options.known else ""
+    known = f", {options.prior.words}" if options.prior else ""
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
     console.print(what, markup=False, soft_wrap=True)
     if options.expectation:

@@ -19,7 +19,7 @@ from inspector.cli.run import recording_to
 from inspector.cli.viewing import next_lines, saved_lines, viewing_options
 
 if TYPE_CHECKING:
-    from calibnet.geometry.known import Tolerance
+    from calibnet.geometry.prior import Tolerance
     from inspector.cli.viewing import Viewing
 
 
@@ -84,7 +84,7 @@ def rig(
     Exits with 0 if everything is accepted, 1 if something is rejected, 4 if something cannot be told.
     """
     from calibnet.cascade.cascade import Cascade
-    from calibnet.geometry.known import Known
+    from calibnet.geometry.prior import Prior
     from calibnet.runtime.interruption import StopRequest
     from inspector.export.exported import exported_camera
     from inspector.export.registry import export_as
@@ -106,8 +106,8 @@ def rig(
     outputs.check()
     beside = json_file == "-"
     with recording_to(outputs):
-        known = Known.of(fix or (), prior_translation, prior_rotation)
-        cascade = Cascade.load(preset, stages, weights, False, known)
+        prior = Prior.of(fix or (), prior_translation, prior_rotation)
+        cascade = Cascade.load(preset, stages, weights, False, prior)
         for camera, folder in cameras.items():
             for note in folder.notes:
                 say(f"{camera}: {note}", err=True)
@@ -119,7 +119,7 @@ def rig(
                 "cameras": ", ".join(cameras),
                 "solved": solved.how,
                 "start": "as given" if miscalibration is None else np.array2string(miscalibration, precision=9),
-                "known": known.words,
+                "known": prior.words,
                 "stages": ", ".join(map(str, stages)),
                 "preset": preset,
             }
@@ -130,9 +130,9 @@ def rig(
         for line in said:
             say(line, err=beside)
         write_json(json_file, solved.as_dict())
-        for camera in solved.not_rejected if files else ():
-            write(files[camera.name], export_as("yaml", exported_camera(camera)).encode(), Kind.EXPORT)
-            say(f"Saved {files[camera.name]}.", err=beside)
+        for one in solved.not_rejected if files else ():
+            write(files[one.name], export_as("yaml", exported_camera(one)).encode(), Kind.EXPORT)
+            say(f"Saved {files[one.name]}.", err=beside)
         if outputs.file is not None:
             for line in [*saved_lines(outputs, shown), *next_lines(outputs.file, rig=True)]:
                 say(line, err=beside)

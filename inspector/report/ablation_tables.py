@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from calibnet.evaluation.claims import ABLATION_CLAIMS
+from calibnet.evaluation.published import PUBLISHED_ABLATION
 from calibnet.geometry import MiscalibrationRange
 from inspector.report.bench_summary import NO_CORRECTION, known_and_other
 from inspector.report.markdown import markdown_table
@@ -39,15 +39,15 @@ def tables(content: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[
 
 def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
     row = rows[0]
-    claim, took, samples = ABLATION_CLAIMS[row["name"]], row["latency_ms"], row.get("samples_trained")
+    published, took, samples = PUBLISHED_ABLATION[row["name"]], row["latency_ms"], row.get("samples_trained")
     return [
         "– (full)" if row["name"] == "full" else row["name"],
-        f"{row['parameters'] / 1e6:.2f} M ({claim.parameters_m:g})",
-        f"{row['multiply_adds'] / 1e9:.2f} G ({claim.flops_g:g})",
-        "" if took is None else f"{took:.0f} ms ({claim.latency_ms:g})",
+        f"{row['parameters'] / 1e6:.2f} M ({published.parameters_m:g})",
+        f"{row['multiply_adds'] / 1e9:.2f} G ({published.flops_g:g})",
+        "" if took is None else f"{took:.0f} ms ({published.latency_ms:g})",
         f"{samples:,}" if samples else "",
         *(["", ""] if "why" in row else known_and_other(rows, known)),
-        f"{claim.rotation_deg:g}° / {claim.translation_cm:g} cm",
+        f"{published.rotation_deg:g}° / {published.translation_cm:g} cm",
     ]
 
 

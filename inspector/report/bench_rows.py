@@ -112,11 +112,11 @@ def costs(entry: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def claims(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """What papers claim, by method."""
+def published_results(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What papers report of their own methods, by method."""
     for name, entry in content["methods"].items():
-        for claim in entry["claims"]:
-            yield name, claim
+        for result in entry["claims"]:
+            yield name, result
 
 
 def about(content: dict[str, Any]) -> str:

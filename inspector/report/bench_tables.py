@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from calibnet.geometry import MiscalibrationRange
-from inspector.report.bench_rows import AXES, KINDS, NOTHING, about, claims, costs, rows
+from inspector.report.bench_rows import AXES, KINDS, NOTHING, about, costs, published_results, rows
 from inspector.report.bench_summary import LEGEND, summary
 from inspector.report.markdown import markdown_table
 
@@ -15,7 +15,7 @@ TITLE = "All methods on the same frames"
 
 
 def short_tables(content: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """What answers most questions: a table a range, what methods cost, what papers claim; with their titles."""
+    """What answers most questions: a table a range, what methods cost, what papers report; with their titles."""
     for range_ in content["ranges"]:
         yield f"From {_label(range_)}", summary(content, range_)
     yield "What they cost, and what they were trained on", _costs(content)
@@ -75,7 +75,7 @@ def _costs(content: dict[str, Any]) -> Table:
 
 def _claims(content: dict[str, Any]) -> Table:
     body = []
-    for name, claim in claims(content):
-        errors = f"{claim['rotation_deg']:g}°", f"{claim['translation_cm']:g} cm"
-        body.append([name, claim["range"], *errors, claim["rig"], claim["source"]])
+    for name, result in published_results(content):
+        errors = f"{result['rotation_deg']:g}°", f"{result['translation_cm']:g} cm"
+        body.append([name, result["range"], *errors, result["rig"], result["source"]])
     return ["method", "range", "rotation", "translation", "measured on", "says who"], body

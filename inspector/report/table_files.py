@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from annotated_types import Interval, Len, Predicate
 
 from calibnet.errors import ConfigError
-from calibnet.evaluation.claims import ABLATION_CLAIMS, Claim
+from calibnet.evaluation.published import PUBLISHED_ABLATION, Published
 from calibnet.runtime.reading import parse_json, read_text
 from calibnet.runtime.schema import validated
 
@@ -79,7 +79,7 @@ class _Method(_Costs):
     trained_on: list[str]
     rows: list[_Row]
     audit: _Audit
-    claims: list[Claim]
+    claims: list[Published]
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class _Bench(_Table):
 @dataclass(frozen=True, kw_only=True)
 class _AblationRow(_Figures):
     preset: str
-    name: Annotated[str, Predicate(ABLATION_CLAIMS.__contains__)]
+    name: Annotated[str, Predicate(PUBLISHED_ABLATION.__contains__)]
     parameters: Count
     multiply_adds: Count
     latency_ms: Number | None

@@ -12,7 +12,7 @@ from calibnet.datasets.frame import Sequence
 from calibnet.datasets.selection import select_frames, spread
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.geometry.known import Known
+from calibnet.geometry.prior import Prior
 from calibnet.geometry.types import Transform
 from calibnet.methods.registry import CASCADE
 from inspector.record.contents import Coloring, Contents, Detail, Part
@@ -48,7 +48,7 @@ class RunOptions:
         drive: after the frames, also solve the drive's extrinsic from all of them; None for doing so with several
             frames on one mount.
         on_bad_frame: ``"skip"`` a frame that cannot be used, or ``"stop"`` there.
-        fix: axes of the start that are known exactly, names of `calibnet.geometry.known.AXES`; None as an empty one.
+        fix: axes of the start that are known exactly, names of `calibnet.geometry.prior.AXES`; None as an empty one.
         prior_translation: standard deviation, in metres, to which the camera's place is known beforehand.
         prior_rotation: likewise its rotation, in radians.
         stages: to run; None for those within the miscalibration.
@@ -179,7 +179,7 @@ class RunOptions:
         return Start(self.range or DEFAULT_RANGE, self.seed, self.per_frame, self.miscalibration, self.as_is)
 
     @property
-    def known(self) -> Known:
+    def prior(self) -> Prior:
         """What is known of the start: as asked for, else as the dataset says (`known` of a sequence).
 
         Raises:
@@ -187,8 +187,8 @@ class RunOptions:
         """
         asked = self.fix or None, self.prior_translation, self.prior_rotation
         if any(one is not None for one in asked):
-            return Known.of(asked[0] or (), *asked[1:])
-        return getattr(self.sequence, "known", None) or Known()
+            return Prior.of(asked[0] or (), *asked[1:])
+        return getattr(self.sequence, "prior", None) or Prior()
 
     @property
     def contents(self) -> Contents:
@@ -210,7 +210,7 @@ class RunOptions:
             "camera": "" if self.camera is None else str(self.camera),
             "start": str(self.start),
             "seed": self.seed,
-            **({"known": self.known.words} if self.known else {}),
+            **({"known": self.prior.words} if self.prior else {}),
             "stages": ",".join(map(str, stages)),
             **({"preset": self.preset} if self.method == CASCADE else {"method": self.method}),
             **({"masks": str(self.masks)} if self.masks is not None else {}),

@@ -15,7 +15,7 @@ from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import CameraModel, invert, pose_error
-from calibnet.geometry.known import Tolerance
+from calibnet.geometry.prior import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
 from calibnet.verdict import REJECTED, Verdict, moved

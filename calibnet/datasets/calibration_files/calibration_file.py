@@ -58,7 +58,7 @@ class CalibrationFile:
         rig_from_camera: 4x4, where the camera sits on a rig of several; None where it does not say.
         cloud_columns: names of the columns of ``.bin`` clouds; None where it does not say.
         bayer: pattern of a sensor whose pictures are not demosaiced, of `calibnet.datasets.development.BAYER`.
-        known: what is held fixed or known beforehand of the extrinsic, as the options of the same names say it.
+        prior: what is fixed or known beforehand of the extrinsic, as the options of the same names say it.
     """
 
     kind: str
@@ -66,5 +66,5 @@ class CalibrationFile:
     camera_from_lidar: Extrinsic | None = field(default=None, repr=False)
     rig_from_camera: Transform | None = field(default=None, repr=False)
     cloud_columns: tuple[str, ...] | None = None
-    known: dict[str, str] = field(default_factory=dict)
+    prior: dict[str, str] = field(default_factory=dict)
     bayer: str | None = None

@@ -72,9 +72,9 @@ def test_a_file_without_a_lidar_needs_a_guess(write_layout):
 
 def test_the_file_says_what_is_known(write_layout, write_calibration):
     layout = write_layout("folder")
-    assert not layout.open().known
+    assert not layout.open().prior
     layout.calibration.write_text(write_calibration(fix="[x, y, z]", prior_rotation="0.5deg"))
-    assert layout.open().known.words == "known to 0.5°; x, y, z fixed"
+    assert layout.open().prior.words == "known to 0.5°; x, y, z fixed"
     layout.calibration.write_text(write_calibration(prior_translation=2))
     with pytest.raises(DatasetError, match=r"calibration\.yaml: '2' is not a length with its unit"):
         layout.open()

@@ -14,7 +14,7 @@ from calibnet.datasets.rig import RigCamera
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.rig_pose import Said, joined
 from calibnet.geometry import RANGES, invert, miscalibration, pose_error, rotation_from_vector, transform
-from calibnet.geometry.known import Known, inverse
+from calibnet.geometry.prior import Prior, inverse
 from calibnet.geometry.se3 import adjoint, pose_from_vector, pose_vector
 from tests.support.scene import REFERENCE, make_frame
 from tests.support.tiny import tiny_network
@@ -86,7 +86,7 @@ def test_what_is_known_of_the_rig_counts():
     cameras = [RigCamera("side", [], SIDE)]
     truth = miscalibration([0.3, -0.4, 0.2], [0.03, -0.02, 0.01]) @ REFERENCE
     agreed = [saying(SIDE, REFERENCE, truth, np.full(6, 1e-3))]
-    mean, _ = joined(say(cameras, agreed, COMMON), REFERENCE, Known.of("xyz").about(REFERENCE))
+    mean, _ = joined(say(cameras, agreed, COMMON), REFERENCE, Prior.of("xyz").about(REFERENCE))
     assert_allclose(mean[:3], 0.0, atol=1e-6)
     assert np.abs(mean[3:]).max() > 1e-3
 

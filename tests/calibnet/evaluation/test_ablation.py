@@ -10,7 +10,7 @@ import torch
 from calibnet.errors import ConfigError, WeightsError
 from calibnet.evaluation import ablation
 from calibnet.evaluation.ablation import measure_ablation
-from calibnet.evaluation.claims import ABLATION_CLAIMS
+from calibnet.evaluation.published import PUBLISHED_ABLATION
 from calibnet.geometry import RANGES
 from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.network.network import CalibrationNetwork
@@ -36,7 +36,7 @@ def save_row(folder: Path, name: str, of: str | None = None, rigs: tuple[str, ..
 
 def test_rows_are_those_of_the_paper(tiny_preset: None) -> None:
     rows = list(measure_ablation(["tiny"], RANGES[2], None, [], timed=0))
-    assert [row["name"] for row in rows] == list(ABLATIONS) == list(ABLATION_CLAIMS)
+    assert [row["name"] for row in rows] == list(ABLATIONS) == list(PUBLISHED_ABLATION)
     full = rows[-1]
     assert full["parameters"] == sum(p.numel() for p in CalibrationNetwork(TINY, RANGES[2]).parameters())
     for row in rows[:4]:

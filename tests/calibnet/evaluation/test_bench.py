@@ -7,8 +7,8 @@ import pytest
 
 from calibnet.datasets import Frame
 from calibnet.errors import CalibrationError
-from calibnet.evaluation.bench import Bench, Contestant, measure_bench
-from calibnet.evaluation.claims import CLAIMS
+from calibnet.evaluation.bench import Bench, BenchMethod, measure_bench
+from calibnet.evaluation.published import PUBLISHED
 from calibnet.geometry import MiscalibrationRange, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.card import MethodCard
@@ -35,7 +35,7 @@ class Lazy:
 
 
 def entry(method: Lazy, bench: Bench) -> dict[str, object]:
-    ((_, found),) = measure_bench(bench, [Contestant("lazy", lambda _: method)])
+    ((_, found),) = measure_bench(bench, [BenchMethod("lazy", lambda _: method)])
     return found
 
 
@@ -73,4 +73,4 @@ def test_what_is_refused_throughout_has_no_figures() -> None:
 
 
 def test_claims_are_of_methods_that_there_are() -> None:
-    assert set(CLAIMS) <= {"cascade", "pcba", "regnet", "calibnet", "lccnet", "calibformer", *METHODS.names()}
+    assert set(PUBLISHED) <= {"cascade", "pcba", "regnet", "calibnet", "lccnet", "calibformer", *METHODS.names()}

@@ -49,11 +49,11 @@ def test_what_is_known_beforehand_is_never_rejected_by_doubt_alone() -> None:
     """It was fitted to runs whose axes are all open; what speaks against picture and scan does so as ever."""
     fixed = "x, y, z fixed"
     verdicts = [
-        judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), DOUBT, known=fixed) for error in (1.4, 2.0, 4.2)
+        judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), DOUBT, prior=fixed) for error in (1.4, 2.0, 4.2)
     ]
     assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, CANNOT_TELL]
     assert "81% likely; with x, y, z fixed it is less so" in verdicts[2].reason
-    lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), DOUBT, known=fixed)
+    lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), DOUBT, prior=fixed)
     assert lost.word == REJECTED
 
 

@@ -44,7 +44,7 @@ def test_what_it_says_is_what_acts(tmp_path: Path) -> None:
     (stage,) = cascade.stages
     assert (stage.number, stage.settings, stage.match_error_limit_px) == (5, entry.settings, 7.0)
     assert [skipped.number for skipped in cascade.skipped] == [4]
-    np.testing.assert_allclose(np.diag(cascade.common), [4e-4] * 3 + [np.radians(0.12) ** 2] * 3, rtol=1e-12)
+    np.testing.assert_allclose(np.diag(cascade.common_error), [4e-4] * 3 + [np.radians(0.12) ** 2] * 3, rtol=1e-12)
 
 
 def test_only_the_finest_stage_judges() -> None:

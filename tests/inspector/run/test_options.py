@@ -9,7 +9,7 @@ import pytest
 
 from calibnet.errors import DatasetError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.geometry.known import Known
+from calibnet.geometry.prior import Prior
 from inspector.record.contents import Coloring, Detail, Part
 from inspector.run.options import OptionsError, RunOptions
 from tests.support.drive import Drive
@@ -58,13 +58,13 @@ def test_what_is_asked_arrives() -> None:
 
 
 def test_what_is_known_is_asked_for_or_said_by_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not asked().known and "known" not in asked().identity([5])
+    assert not asked().prior and "known" not in asked().identity([5])
     options = asked(fix=("x", "y", "z"), prior_rotation=0.01)
-    assert options.known.words == "known to 0.573°; x, y, z fixed"
-    assert options.identity([5])["known"] == options.known.words
-    monkeypatch.setattr(SEQUENCE, "known", Known.of(["roll"]), raising=False)
-    assert asked().known.words == "roll fixed"
-    assert asked(prior_translation=0.02).known.words == "known to 2 cm", "what is asked for goes before"
+    assert options.prior.words == "known to 0.573°; x, y, z fixed"
+    assert options.identity([5])["known"] == options.prior.words
+    monkeypatch.setattr(SEQUENCE, "prior", Prior.of(["roll"]), raising=False)
+    assert asked().prior.words == "roll fixed"
+    assert asked(prior_translation=0.02).prior.words == "known to 2 cm", "what is asked for goes before"
 
 
 def test_the_identity_has_the_names_that_recordings_always_had() -> None:

@@ -1,7 +1,7 @@
-"""What is known of an extrinsic before anything is measured: axes that are fixed, and how good the start is.
+"""The user's prior on an extrinsic: axes that are fixed, and standard deviations of the initial guess.
 
-A car maker knows from drawings where a camera is, and wants its rotation; whoever turns a mount by hand knows the rest.
-It enters as information, as of one more measurement, so that the other axes are solved as they are best under it.
+A car maker knows from drawings where a camera is, and wants its rotation only. A prior is an inverse covariance that is
+added to that of the measurement, so that the axes it leaves open take the values that fit best under it.
 """
 
 from __future__ import annotations
@@ -17,23 +17,25 @@ from calibnet.geometry.se3 import euler_xyz, invert, pose_from_vector, pose_vect
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Rotation, Transform, Vector6
 
 AXES = ("roll", "pitch", "yaw", "x", "y", "z")
-"""As `calibnet.geometry.miscalibration` has them: about the camera's z, x and y axis, and along its x, y and z."""
+"""Rotations about the camera's z, x and y axis, and offsets along its x, y and z, as in
+`calibnet.geometry.miscalibration`."""
 PLACE = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
-"""Of each in a `Vector6`."""
+"""Index of each axis in a `Vector6`."""
 EXACT = 1e-5
-"""Standard deviation, in metres and radians, of what is fixed."""
+"""Standard deviation, in metres and radians, of an axis that is fixed."""
 ITERATIONS = 8
 STEP = 1e-6
-"""Of the numeric derivative."""
+"""Step of the numeric derivative, in metres and radians."""
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """What is known of extrinsics, relative to the one that a calibration starts from.
+class Prior:
+    """How well the initial extrinsic is known, axis by axis, whichever extrinsic that is.
 
     Attributes:
-        information: ``[6]``, inverse variances of offsets x, y, z in m and turns pitch, yaw, roll in rad.
-        words: how the user said it, for titles; empty for nothing.
+        information: ``[6]``, inverse variances of offsets x, y, z in m and rotations pitch, yaw, roll in rad; 0 where
+            nothing is known.
+        words: the same for people, for instance ``"known to 2 cm; roll fixed"``; empty where nothing is known.
     """
 
     information: Floats = field(default_factory=lambda: np.zeros(6), repr=False)
@@ -42,13 +44,13 @@ class Known:
     @classmethod
     def of(
         cls, fixed: Sequence[str] = (), translation_m: float | None = None, rotation_rad: float | None = None
-    ) -> Known:
-        """What is known.
+    ) -> Prior:
+        """The prior that fixes some axes and gives the others standard deviations.
 
         Args:
-            fixed: names of `AXES` that keep their value. Fixed x, y, z keep the camera's place as seen from the LiDAR.
-            translation_m: standard deviation of the camera's place, on each axis.
-            rotation_rad: standard deviation of the turn, about each axis.
+            fixed: names of `AXES` that keep their value. Fixed x, y, z keep the camera's position in the LiDAR frame.
+            translation_m: standard deviation of the camera's position, along each axis.
+            rotation_rad: standard deviation of its rotation, about each axis.
 
         Raises:
             ConfigError: an axis has another name, all are fixed, or a deviation is not above 0.
@@ -75,36 +77,36 @@ class Known:
         return cls(information, "; ".join(words))
 
     def __bool__(self) -> bool:
-        """Whether anything is."""
+        """Whether anything is known."""
         return bool(self.information.any())
 
-    def about(self, initial: Extrinsic) -> Held:
-        """It, of the extrinsic that a calibration starts from."""
-        return Held(initial, self.information)
+    def about(self, initial: Extrinsic) -> PosePrior:
+        """The same about one initial extrinsic, 4x4."""
+        return PosePrior(initial, self.information)
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """What is known of one extrinsic.
+class PosePrior:
+    """A `Prior` about one extrinsic.
 
     Attributes:
-        initial: ``camera_from_lidar`` that it is known of, 4x4.
-        information: as of `Known`.
-        real_from_camera: ``[3, 3]``, where the extrinsics are of a camera that is turned against the one whose axes are
-            meant; not turned by default.
+        initial: ``camera_from_lidar`` that the prior is centred on, 4x4.
+        information: see `Prior`.
+        real_from_camera: ``[3, 3]``, rotation to the camera whose axes the user means, where extrinsics are those of a
+            rotated camera (`calibnet.cascade.upright`); the identity by default.
     """
 
     initial: Extrinsic = field(repr=False)
     information: Floats
     real_from_camera: Rotation = field(default_factory=lambda: np.eye(3), repr=False)
 
-    def turned(self, camera_from_real: Rotation) -> Held:
-        """It, of extrinsics of a camera that is turned: ``camera_from_real @ camera_from_lidar``."""
+    def turned(self, camera_from_real: Rotation) -> PosePrior:
+        """The same prior on extrinsics of a rotated camera, ``camera_from_real @ camera_from_lidar``."""
         turn = transform(camera_from_real, np.zeros(3))
-        return Held(turn @ self.initial, self.information, self.real_from_camera @ camera_from_real.T)
+        return PosePrior(turn @ self.initial, self.information, self.real_from_camera @ camera_from_real.T)
 
     def fused(self, measured: Vector6, information: Matrix6, before: Extrinsic) -> tuple[Vector6, Matrix6]:
-        """The correction that a measurement and what is known agree on, and its covariance.
+        """The correction that is most likely by a measurement and the prior together, and its covariance.
 
         Args:
             measured: ``[6]``, correction ``(translation m, rotation vector rad)`` of ``before``.
@@ -126,22 +128,28 @@ class Held:
         return correction, inverse(normal)
 
     def corrected(self, correction: Transform, information: Matrix6 | None, before: Extrinsic) -> Transform:
-        """A correction of ``before``, 4x4, as `fused` leaves it; without information its free axes are left alone."""
+        """A measured correction of ``before``, 4x4, fused with the prior.
+
+        Args:
+            correction: 4x4, as measured.
+            information: ``[6, 6]`` of it; None for the identity, where the measurement states none.
+            before: ``camera_from_lidar`` that is corrected, 4x4.
+        """
         firm = np.eye(6) if information is None else information
         return pose_from_vector(self.fused(pose_vector(correction), firm, before)[0])
 
     def narrowed(self, covariance: Matrix6, after: Extrinsic) -> Matrix6:
-        """The covariance ``[6, 6]`` of ``after``, a perturbation in its camera frame, with what is known."""
+        """The covariance ``[6, 6]`` of a result ``after`` once the prior is counted, which makes it smaller."""
         return self.fused(np.zeros(6), inverse(covariance), after)[1]
 
     def _offset(self, correction: Vector6, moved: Transform) -> tuple[Vector6, Floats]:
-        """How far the corrected extrinsic lies from the one that is known, and the derivative ``[6, 6]``."""
+        """Offset ``[6]`` of the corrected extrinsic from `initial`, in the user's axes, and its derivative."""
         columns = [self._named(correction + step, moved) for step in STEP * np.eye(6)]
         offset = self._named(correction, moved)
         return offset, (np.array(columns) - offset).T / STEP
 
     def _named(self, correction: Vector6, moved: Transform) -> Vector6:
-        """Offsets x, y, z and turns pitch, yaw, roll of the corrected extrinsic, in the real camera's axes."""
+        """Offsets x, y, z and rotations pitch, yaw, roll of the corrected extrinsic, in the user's axes."""
         back = self.real_from_camera
         delta = pose_from_vector(correction) @ moved
         return np.concatenate([back @ delta[:3, 3], euler_xyz(back @ delta[:3, :3] @ back.T)])
@@ -149,7 +157,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How well a camera's place on its rig is known, one standard deviation an axis.
+    """How well a camera's pose on its rig is known: standard deviations, the same on every axis.
 
     Attributes:
         rotation_rad: about each axis.
@@ -169,10 +177,10 @@ class Tolerance:
 
 
 def parse_tolerance(text: str) -> Tolerance:
-    """An angle and a length with a stroke between them, for instance ``0.5deg/2cm``.
+    """Read an angle and a length with a slash between them, for instance ``0.5deg/2cm``.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: the text is not of this form.
     """
     angle, stroke, length = text.partition("/")
     if not stroke:
@@ -181,35 +189,35 @@ def parse_tolerance(text: str) -> Tolerance:
 
 
 def inverse(matrix: Matrix6) -> Matrix6:
-    """An information of a covariance, and the other way round."""
+    """The information matrix of a covariance ``[6, 6]``, or the covariance of an information matrix."""
     return np.asarray(np.linalg.inv(matrix), np.float64)
 
 
 def parse_axes(text: str) -> tuple[str, ...]:
-    """Names of `AXES` with commas between them; a list of YAML as text is one, too.
+    """Read names of `AXES` with commas between them, or a YAML list of them as text.
 
     Raises:
-        ConfigError: one is no such name, or all six are there.
+        ConfigError: a name is not one of these, or all six are there.
     """
     names = tuple(name for name in re.split(r"[\s,\[\]'\"]+", text.lower()) if name)
-    Known.of(names)
+    Prior.of(names)
     return names
 
 
 def parse_length(text: str) -> float:
-    """Metres of a length with its unit, for instance ``2cm``.
+    """Read a length with its unit, for instance ``2cm``, in metres.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: the text is not of this form.
     """
     return _parse(text, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}, "a length with its unit, for instance 2cm")
 
 
 def parse_angle(text: str) -> float:
-    """Radians of an angle with its unit, for instance ``0.5deg``.
+    """Read an angle with its unit, for instance ``0.5deg``, in radians.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: the text is not of this form.
     """
     units = {"deg": np.pi / 180, "°": np.pi / 180, "mrad": 1e-3, "rad": 1.0}
     return _parse(text, units, "an angle with its unit, for instance 0.5deg")

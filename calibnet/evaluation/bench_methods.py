@@ -1,4 +1,4 @@
-"""Who stands in the table of `calibnet.evaluation.bench`: the cascade, with any weights, and other methods."""
+"""The methods that stand in the table of `calibnet.evaluation.bench`: the cascade, with any weights, and the others."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from calibnet.calibrator import Calibrator
 from calibnet.cascade.cascade import Cascade
-from calibnet.evaluation.bench import Contestant
+from calibnet.evaluation.bench import BenchMethod
 from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
 from calibnet.methods.card import MethodCard
 from calibnet.methods.registry import CASCADE, METHODS, accepts, open_method
@@ -18,9 +18,9 @@ from calibnet.network.network import CalibrationNetwork
 from calibnet.weights import read_record, weights_path
 
 
-def contestants(
+def bench_methods(
     names: tuple[str, ...], ours: dict[str, Path], told: dict[str, Any], preset: str = "compact"
-) -> list[Contestant]:
+) -> list[BenchMethod]:
     """The rows of the table, by name.
 
     Args:
@@ -35,9 +35,9 @@ def contestants(
     chosen = (CASCADE, *METHODS.names()) if "all" in names else names
     cascade = partial(MeasuredCascade.within, preset)
     found = [
-        Contestant(name, partial(cascade, None) if name == CASCADE else partial(_open, name, told)) for name in chosen
+        BenchMethod(name, partial(cascade, None) if name == CASCADE else partial(_open, name, told)) for name in chosen
     ]
-    return found + [Contestant(label, partial(cascade, folder)) for label, folder in ours.items()]
+    return found + [BenchMethod(label, partial(cascade, folder)) for label, folder in ours.items()]
 
 
 def _open(name: str, told: dict[str, Any], range_: MiscalibrationRange) -> Calibrator:

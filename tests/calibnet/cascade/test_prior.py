@@ -8,7 +8,7 @@ import pytest
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets.frame import Frame
 from calibnet.geometry import RANGES, euler_xyz, invert, miscalibration
-from calibnet.geometry.known import AXES, Known
+from calibnet.geometry.prior import AXES, Prior
 from calibnet.geometry.types import Extrinsic
 from tests.support.scene import REFERENCE, make_frame
 from tests.support.tiny import tiny_network
@@ -21,10 +21,10 @@ def frame() -> Frame:
     return make_frame(3)
 
 
-def cascade(known: Known) -> Cascade:
+def cascade(prior: Prior) -> Cascade:
     """Random networks, which want to move everything."""
     stages = [Stage(number, RANGES[number - 1], tiny_network(seed=number, stage=number)) for number in (4, 5)]
-    return Cascade(stages, known=known)
+    return Cascade(stages, prior=prior)
 
 
 def moved(after: Extrinsic) -> dict[str, float]:
@@ -36,7 +36,7 @@ def moved(after: Extrinsic) -> dict[str, float]:
 
 @pytest.mark.parametrize("fixed", [("x", "y", "z"), ("roll", "pitch")])
 def test_fixed_axes_stay_in_every_stage_and_the_others_move(frame: Frame, fixed: tuple[str, ...]) -> None:
-    trace = cascade(Known.of(fixed)).calibrate(frame, INITIAL)
+    trace = cascade(Prior.of(fixed)).calibrate(frame, INITIAL)
     for stage in trace.stages:
         found = moved(stage.after)
         assert all(abs(found[axis]) < 0.01 for axis in fixed), found
@@ -46,7 +46,7 @@ def test_fixed_axes_stay_in_every_stage_and_the_others_move(frame: Frame, fixed:
 
 
 def test_fixed_axes_stay_in_a_drive_whose_edges_are_aligned(frame: Frame) -> None:
-    free, held = (cascade(known).calibrate_drive([frame, frame], INITIAL) for known in (Known(), Known.of("xyz")))
+    free, held = (cascade(prior).calibrate_drive([frame, frame], INITIAL) for prior in (Prior(), Prior.of("xyz")))
     assert max(abs(moved(free.camera_from_lidar)[axis]) for axis in "xyz") > 0.1
     for estimate in (held, held.networks):
         assert estimate is not None
@@ -60,7 +60,7 @@ def test_fixed_axes_stay_in_a_drive_whose_edges_are_aligned(frame: Frame) -> Non
 def test_what_is_known_well_is_moved_less(frame: Frame) -> None:
     found = [
         np.linalg.norm(
-            cascade(Known.of((), sigma)).calibrate_drive([frame, frame], INITIAL).camera_from_lidar - INITIAL
+            cascade(Prior.of((), sigma)).calibrate_drive([frame, frame], INITIAL).camera_from_lidar - INITIAL
         )
         for sigma in (0.001, 0.1)
     ]
@@ -68,7 +68,7 @@ def test_what_is_known_well_is_moved_less(frame: Frame) -> None:
 
 
 def test_the_covariance_of_a_frame_knows_what_is_fixed(frame: Frame) -> None:
-    verdict = cascade(Known.of("xyz")).calibrate(frame, INITIAL).verdict
+    verdict = cascade(Prior.of("xyz")).calibrate(frame, INITIAL).verdict
     assert verdict is not None
     if verdict.covariance is not None:
         assert np.sqrt(np.trace(verdict.covariance[:3, :3])) < 1e-4
