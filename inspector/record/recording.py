@@ -16,6 +16,7 @@ import rerun as rr
 
 from calibnet.datasets.frame import Frame
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.memory import hand_back
 from calibnet.runtime.text import one_line
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
@@ -31,6 +32,9 @@ from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
 from inspector.record.tabs.registry import wanted_tabs
 from inspector.record.tabs.watch import log_watch
+
+HANDED_BACK_EVERY = 16
+"""Frames after which free memory is handed back."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,8 @@ class Recording:
         for tab in self._tabs:
             tab.log(self._rec, observation, self._contents)
         self._stream.flush()
+        if len(self._seconds) % HANDED_BACK_EVERY == 0:
+            hand_back()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
         """Log which frames could not be used, and why; nothing else is there of them."""

@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 import rerun_bindings
 
 from calibnet.errors import CalibnetError, ConfigError
+from calibnet.runtime.memory import hand_back
 from inspector.record.flushing import RecordingLostError, flush
 from inspector.record.indexing import NotIndexedError, index
 
@@ -144,3 +145,4 @@ def release_closed() -> None:
     """Let go of the threads and the memory of streams that are closed; for processes that record again and again."""
     gc.collect()
     rerun_bindings.flush_and_cleanup_orphaned_recordings()
+    hand_back()
