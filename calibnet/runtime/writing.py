@@ -10,6 +10,7 @@ import contextlib
 import glob
 import hashlib
 import os
+import re
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
@@ -137,6 +138,9 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
         if partial is not None:
             with contextlib.suppress(OSError):
                 partial.unlink()
+        said = re.search(r"\(os error (\d+)\)", str(error))  # libraries in Rust have errors of their own for all
+        if said and isinstance(error, Exception):
+            raise OSError(int(said[1]), os.strerror(int(said[1])), str(path)) from None
         if isinstance(error, OSError):
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise

@@ -147,6 +147,7 @@ def environment_sentence(error: OSError | ImportError) -> str | None:
     remedy = {
         errno.ENOSPC: "free some space or write elsewhere",
         errno.EDQUOT: "free some space or write elsewhere",
+        errno.EFBIG: "let files be larger (ulimit -f) or write elsewhere",
         errno.EACCES: "check the permissions or use another path",
         errno.EPERM: "check the permissions or use another path",
         errno.EROFS: "choose a path that can be written",

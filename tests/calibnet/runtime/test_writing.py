@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 import stat
 from pathlib import Path
 
+import numpy as np
 import pytest
+from safetensors.numpy import save_file
 
 from calibnet.runtime.reading import protecting_inputs, read_file
 from calibnet.runtime.writing import (
@@ -43,6 +46,20 @@ def test_what_fails_half_way_leaves_what_was_there(tmp_path: Path, error: Except
         write_whole(file, write)
     assert file.read_text() == "before"
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_library_in_rust_that_finds_no_room_is_an_error_of_the_system(tmp_path: Path) -> None:
+    out = tmp_path / "out.safetensors"
+    out.write_bytes(b"before")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 16, hard))
+    try:
+        with pytest.raises(OSError, match=r"out\.safetensors") as caught:
+            write_whole(out, lambda partial: save_file({"a": np.zeros(1 << 16)}, partial))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert caught.value.errno == errno.EFBIG
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]
 
 
 def test_the_error_names_the_file_that_was_asked_for(tmp_path: Path) -> None:
