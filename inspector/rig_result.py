@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from calibnet.geometry import CameraModel, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
+from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
 COLUMNS = ("camera", "verdict", "off the reference", "sure to (1σ)", "alone it says", "corrected by", "matches off")
@@ -143,14 +144,14 @@ class RigResult:
         rows = [camera.row() for camera in self.cameras]
         kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
         yield from (f"# {self.word.capitalize()}", "", f"{len(rows)} cameras, solved {self.how}.", "")
-        yield "| " + " | ".join(COLUMNS[column] for column in kept) + " |"
-        yield "|" + "---|" * len(kept)
         names = [camera.name for camera in self.cameras]
         alike = next((place for place, letters in enumerate(zip(*names, strict=False)) if len(set(letters)) > 1), 0)
         words = max(names[0].rfind(mark, 0, alike) for mark in "-_. ") + 1  # that all names begin with
         for row in rows:
             row[0] = row[0][words:]
-            yield "| " + " | ".join(row[column] for column in kept) + " |"
+        yield from markdown_table(
+            [COLUMNS[column] for column in kept], [[row[column] for column in kept] for row in rows]
+        )
         yield ""
         for reason in dict.fromkeys(explained(camera.verdict) for camera in self.cameras):
             yield from (reason, "")

@@ -1,4 +1,7 @@
-"""Are stated covariances as large as the errors? By the squared error, and by how many lie within the 95 % region."""
+"""Whether stated covariances are as large as the errors.
+
+Told by the normalised estimation error squared (NEES), and by the share of errors within the 95 % region.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +26,10 @@ class Coverage:
 
     Attributes:
         runs: how many state one.
-        squared: mean squared error by the covariance, a degree of freedom: 1 where it is right about itself, more
-            where errors are larger than stated.
-        squared_error: standard error of that.
-        median: median of the same, relative to that of chi-square: what single gross errors do not move.
+        squared: mean squared error by the covariance (NEES) per degree of freedom: 1 where errors are as large as
+            stated, more where they are larger.
+        squared_error: standard error of that; not a number for a single run.
+        median: median of the same, relative to that of chi-square, which single gross errors do not move.
         within: share within the 95 % region.
         within_error: standard error of that.
     """
@@ -55,8 +58,11 @@ class Coverage:
         )
 
     def __str__(self) -> str:
+        if self.runs == 1:
+            where = "within" if self.within else "outside"
+            return f"squared error {self.squared:.2f} per degree of freedom, {where} the 95 % region, 1 run"
         return (
-            f"squared error {self.squared:.2f} ± {self.squared_error:.2f} a degree of freedom (in the median "
+            f"squared error {self.squared:.2f} ± {self.squared_error:.2f} per degree of freedom (median "
             f"{self.median:.2f}), {self.within:.0%} ± {self.within_error:.0%} within the 95 % region, {self.runs} runs"
         )
 
@@ -66,7 +72,7 @@ class Coverage:
 
 
 def squared_error(found: Extrinsic, truth: Extrinsic, covariance: Matrix6 | None) -> float:
-    """The squared error of an extrinsic by its covariance; not a number without one."""
+    """The squared error ``e^T C^-1 e`` of an extrinsic by its covariance ``[6, 6]``; not a number without one."""
     if covariance is None:
         return float("nan")
     offset = pose_vector(found @ invert(truth))

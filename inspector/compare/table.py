@@ -9,7 +9,8 @@ from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import PoseError, pose_error
 from calibnet.methods.registry import CASCADE
 from inspector.compare.comparison import ComparedRun, Comparison
-from inspector.record.tabs.table import NOTHING, markdown
+from inspector.markdown import markdown_table
+from inspector.record.tabs.table import NOTHING
 
 RECORD_KEYS = ("samples", "minutes", "commit", "interim")
 """What tells weights apart, of their training record."""
@@ -68,7 +69,7 @@ def _drives(comparison: Comparison) -> list[str]:
         sure = None if verdict is None or verdict.covariance is None else verdict
         row.append(NOTHING if sure is None else f"{sure.sigma_rotation_deg:.2f}° / {sure.sigma_translation_cm:.1f} cm")
         rows.append(row)
-    return ["### Whole drive as one", "", *markdown(["", "verdict", *off, *away, "sure to (1σ)"], rows)]
+    return ["### Whole drive as one", "", *markdown_table(["", "verdict", *off, *away, "sure to (1σ)"], rows)]
 
 
 def _word(run: ComparedRun) -> str:
@@ -94,7 +95,7 @@ def _errors(comparison: Comparison) -> list[str]:
     return [
         f"### Errors of each frame alone, over {count} frame{'' if count == 1 else 's'}",
         "",
-        *markdown(["", *(name for name, _, _ in COLUMNS)], rows),
+        *markdown_table(["", *(name for name, _, _ in COLUMNS)], rows),
         "",
         f"In brackets the difference to **{first.name}**. p95: 95 % of the frames are below.",
     ]
@@ -116,7 +117,7 @@ def _figures(metrics: Metrics | None, other: Metrics | None) -> list[str]:
 
 def _distances(comparison: Comparison) -> list[str]:
     rows = [[run.name, *_figures(run.distance(comparison.first), None)[:4]] for run in comparison.runs[1:]]
-    return markdown(["", *(name for name, _, _ in COLUMNS[:4])], rows)
+    return markdown_table(["", *(name for name, _, _ in COLUMNS[:4])], rows)
 
 
 def _settings(comparison: Comparison) -> list[str]:
@@ -127,7 +128,7 @@ def _settings(comparison: Comparison) -> list[str]:
         values = [str(settings.get(name, NOTHING)) for settings in described]
         if len(set(values)) > 1:
             rows.append([name, *values])
-    return markdown(["", *(run.name for run in comparison.runs)], rows) if rows else ["Nothing."]
+    return markdown_table(["", *(run.name for run in comparison.runs)], rows) if rows else ["Nothing."]
 
 
 def _described(run: ComparedRun) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from inspector.live.keys import END, Read
 from inspector.live.pose import Pose
 from inspector.live.session import LiveSession
 from inspector.live.window import WindowRecording
+from inspector.markdown import markdown_table
 
 AXES = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z"}
 """The keys that turn or move up and down, as in OpenCalib's manual tool."""
@@ -54,7 +55,7 @@ HELP = {
 
 def help_text() -> str:
     """What the keys do, as Markdown."""
-    return "\n".join(["| key | does |", "| --- | --- |", *(f"| {key} | {does} |" for key, does in HELP.items())])
+    return "\n".join(markdown_table(["key", "does"], HELP.items()))
 
 
 class Terminal:

@@ -13,11 +13,10 @@ from calibnet.geometry import CameraModel
 from inspector import entities
 from inspector.read.file import RecordingFile
 from inspector.read.pictures import RecordedPictures
+from inspector.read.tables import PROPERTIES, static_row
 from inspector.read.understood import RecordingError, camera_of, extrinsic_of, understood
 from inspector.read.verdict import read_verdict
 from inspector.rig_result import CameraResult, Residual, RigResult
-
-PROPERTIES = "__properties"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +116,8 @@ def _said(file: RecordingFile) -> str | None:
 
 
 def _static(file: RecordingFile, entity: str) -> dict[str, list[Any]]:
-    """The one row of static data of an entity, as lists by component."""
-    found: dict[str, list[Any]] = {}
-    for chunk in file.chunks(entity):
-        batch = chunk.to_record_batch()
-        names = [name for name in batch.schema.names if not name.startswith("rerun.")]
-        found |= {name: batch[name][0].as_py() for name in names if batch.num_rows}
-    return found
+    """The static data of an entity, as lists by component."""
+    return static_row(chunk.to_record_batch() for chunk in file.chunks(entity))
 
 
 def _moments(file: RecordingFile, name: str) -> tuple[int, ...]:

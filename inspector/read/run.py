@@ -20,7 +20,8 @@ from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector import entities
 from inspector.read.file import RecordingFile
 from inspector.read.pictures import OverlayPoints, RecordedPictures
-from inspector.read.understood import RecordingError, camera_of, extrinsic_of, understood
+from inspector.read.tables import PROPERTIES, matrices, rows, static_row
+from inspector.read.understood import RecordingError, camera_of, understood
 from inspector.read.verdict import former_verdict, read_verdict
 from inspector.record.contents import Coloring
 from inspector.verdicts import of_frames
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from pyarrow import RecordBatch
     from rerun.chunk import Chunk
 
-PROPERTIES = "__properties"
-"""Where Rerun keeps a recording's name and properties."""
 SAME_MOUNT = 1e-6  # references of one mount differ by less, in metres and in entries of the rotation
 PICTURES = (entities.IMAGE, entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_CORRECTED)
 
@@ -166,9 +165,9 @@ class RecordedRun:
 
     def scalars(self, path: str) -> list[float]:
         """A curve's values, of every frame that has one, in their order."""
-        rows = [row for chunk in self.chunks(path) for row in chunk.to_record_batch().to_pylist()]
-        known = sorted((row[entities.FRAME], row["Scalars:scalars"][0]) for row in rows if row.get("Scalars:scalars"))
-        return [float(value) for _, value in known]
+        batches = (chunk.to_record_batch() for chunk in self.chunks(path))
+        known = ((row[entities.FRAME], row.get("Scalars:scalars")) for row in rows(batches))
+        return [float(value[0]) for _, value in sorted((frame, value) for frame, value in known if value)]
 
     def chunks(self, *paths: str) -> Iterator[Chunk]:
         """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
@@ -188,8 +187,7 @@ def read_run(path: Path) -> RecordedRun:
 
 def _run(path: Path, file: RecordingFile) -> RecordedRun:
     tables = _read_tables(file)
-    properties = {name: _single(tables.get(f"{PROPERTIES}/{name}", [])) for name in (entities.RUN, entities.PROVENANCE)}
-    provenance = properties[entities.PROVENANCE]
+    options, provenance = (static_row(tables[f"{PROPERTIES}/{name}"]) for name in (entities.RUN, entities.PROVENANCE))
     if not provenance and not file.cut:
         raise RecordingError(
             f"{path} comes from an earlier calib-inspect, which kept no extrinsics as numbers; record it again."
@@ -202,13 +200,13 @@ def _run(path: Path, file: RecordingFile) -> RecordedRun:
     if not frames:
         raise RecordingError(f"{path} ends before its first frame is complete; copy it again or record it again.")
     versions = {name: value for name, (value,) in provenance.items()}
-    history = {} if file.cut else _matrices(tables[entities.EXTRINSIC_DRIVE])  # its last row is the result
+    history = {} if file.cut else matrices(tables[entities.EXTRINSIC_DRIVE])  # its last row is the result
     weights = parse_json(versions.pop("weights", "{}"))
-    settings = {name: value for name, (value,) in properties[entities.RUN].items()}
+    settings = {name: value for name, (value,) in options.items()}
     Coloring(settings.get("color", Coloring.DEPTH))
     return RecordedRun(
         path=path,
-        title=_single(tables[PROPERTIES]).get("RecordingInfo:name", [path.stem])[0],
+        title=static_row(tables[PROPERTIES]).get("RecordingInfo:name", [path.stem])[0],
         settings=settings,
         provenance=versions,
         weights={int(number): dict(record) for number, record in weights.items()},
@@ -218,7 +216,7 @@ def _run(path: Path, file: RecordingFile) -> RecordedRun:
         ),
         has_reference=bool(has_reference),
         frames=frames,
-        skipped=tuple(BadFrame(row[entities.FRAME], row["TextLog:text"][0]) for row in _rows(tables[entities.SKIPPED])),
+        skipped=tuple(BadFrame(row[entities.FRAME], row["TextLog:text"][0]) for row in rows(tables[entities.SKIPPED])),
         drive=history[max(history)] if history else None,
         drive_verdict=_verdict(tables[entities.VERDICT_DRIVE], path),
         given_verdict=_verdict(tables[entities.VERDICT_GIVEN], path),
@@ -237,19 +235,9 @@ def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
     return tables
 
 
-def _single(batches: list[RecordBatch]) -> dict[str, list[Any]]:
-    """The one row of static data as lists by component."""
-    return {
-        name: batch[name][0].as_py()
-        for batch in batches
-        for name in batch.schema.names
-        if not name.startswith("rerun.")
-    }
-
-
 def _verdict(batches: list[RecordBatch], path: Path) -> Verdict | None:
     """The one of static data."""
-    text = _single(batches).get(entities.VERDICT)
+    text = static_row(batches).get(entities.VERDICT)
     return read_verdict(text[0], path) if text else None
 
 
@@ -257,14 +245,14 @@ def _frames(
     tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool, path: Path
 ) -> tuple[RecordedFrame, ...]:
     """The frames of which everything is there."""
-    initial = _matrices(tables[entities.EXTRINSIC_INITIAL])
-    after = {number: _matrices(tables[entities.extrinsic_stage(number)]) for number in stages}
+    initial = matrices(tables[entities.EXTRINSIC_INITIAL])
+    after = {number: matrices(tables[entities.extrinsic_stage(number)]) for number in stages}
     # earlier recordings have the stages only: what the last one found was the result
-    corrected = after[max(stages)] | _matrices(tables[entities.EXTRINSIC_CORRECTED])
-    reference = _matrices(tables[entities.EXTRINSIC_REFERENCE])
-    pictures = [{row[entities.FRAME] for row in _rows(tables[entity])} for entity in PICTURES] if cut else []
-    verdicts = {row[entities.FRAME]: row[entities.VERDICT][0] for row in _rows(tables[entities.VERDICT_FRAME])}
-    cameras = {row[entities.FRAME]: row for row in _rows(tables[entities.CAMERA])}
+    corrected = after[max(stages)] | matrices(tables[entities.EXTRINSIC_CORRECTED])
+    reference = matrices(tables[entities.EXTRINSIC_REFERENCE])
+    pictures = [{row[entities.FRAME] for row in rows(tables[entity])} for entity in PICTURES] if cut else []
+    verdicts = {row[entities.FRAME]: row[entities.VERDICT][0] for row in rows(tables[entities.VERDICT_FRAME])}
+    cameras = {row[entities.FRAME]: row for row in rows(tables[entities.CAMERA])}
     needed = [initial, *after.values(), *([reference] if has_reference else []), *pictures]
     frames = []
     for index, row in sorted(cameras.items()):
@@ -287,17 +275,3 @@ def _frames(
             )
         )
     return tuple(frames)
-
-
-def _matrices(batches: list[RecordBatch]) -> dict[int, Extrinsic]:
-    """4x4 matrices by frame."""
-    return {row[entities.FRAME]: extrinsic_of(row[entities.MATRIX]) for row in _rows(batches)}
-
-
-def _rows(batches: list[RecordBatch]) -> Iterator[dict[str, Any]]:
-    """Rows as dictionaries; times in seconds."""
-    for batch in batches:
-        for row in batch.to_pylist():
-            if entities.TIME in row:
-                row[entities.TIME] = row[entities.TIME].total_seconds()
-            yield row

@@ -7,8 +7,8 @@ from typing import Any
 
 from calibnet.evaluation.published import PUBLISHED_ABLATION
 from calibnet.geometry import MiscalibrationRange
+from inspector.markdown import markdown_table
 from inspector.report.bench_summary import NO_CORRECTION, known_and_other
-from inspector.report.markdown import markdown_table
 
 COSTS = ("parameters", "multiply-adds", "a look", "samples")
 ERRORS = ("rigs trained on", "other rigs", "the paper")
@@ -68,7 +68,7 @@ def as_markdown(content: dict[str, Any]) -> str:
     """The tables for documents."""
     parts = [f"# {title(content)}"]
     for preset, heads, lines in tables(content):
-        parts += [f"## {preset}", markdown_table(heads, lines)]
+        parts += [f"## {preset}", "\n".join(markdown_table(heads, lines, heads[1:]))]
     of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
     parts.append(
         f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "

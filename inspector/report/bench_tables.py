@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from calibnet.geometry import MiscalibrationRange
+from inspector.markdown import markdown_table
 from inspector.report.bench_rows import AXES, KINDS, NOTHING, about, costs, published_results, rows
 from inspector.report.bench_summary import LEGEND, summary
-from inspector.report.markdown import markdown_table
 
 Table = tuple[list[str], list[list[str]]]
 TITLE = "All methods on the same frames"
+WORDS = frozenset(("method", "of", "rig", "trained there", "trained on", "measured on", "says who", "range"))
+"""Heads of columns that hold words; all others hold figures."""
 
 
 def short_tables(content: dict[str, Any]) -> Iterator[tuple[str, Table]]:
@@ -33,11 +35,16 @@ def as_markdown(content: dict[str, Any]) -> str:
     """All tables for documents, the long ones folded."""
     parts = ["<!-- Made by calib-inspect bench --from FILE --markdown FILE. -->", f"# {TITLE}", about(content), LEGEND]
     for title, table in short_tables(content):
-        parts += [f"## {title}", markdown_table(*table)]
+        parts += [f"## {title}", _markdown(table)]
     parts.append("## Every rig and axis")
     for title, table in long_tables(content):
-        parts += [f"<details><summary>{title}</summary>", markdown_table(*table), "</details>"]
+        parts += [f"<details><summary>{title}</summary>", _markdown(table), "</details>"]
     return "\n\n".join(parts) + "\n"
+
+
+def _markdown(table: Table) -> str:
+    heads, body = table
+    return "\n".join(markdown_table(heads, body, set(heads) - WORDS))
 
 
 def _label(range_: str) -> str:

@@ -13,6 +13,7 @@ from calibnet.geometry import RANGES, MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace
 from inspector import entities
+from inspector.markdown import markdown_table
 from inspector.record.observation import Observation
 from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
@@ -104,7 +105,7 @@ def _stages(observation: Observation, path: Callable[[str], str] | None) -> list
         else:
             empty = [NOTHING, NOTHING] if with_errors else []
             rows.append([f"stage {number}", _range(RANGES[number - 1]), *empty, "skipped"])
-    return markdown(header, rows)
+    return markdown_table(header, rows)
 
 
 def _range(range_: MiscalibrationRange) -> str:
@@ -121,7 +122,7 @@ def _axes(observation: Observation) -> list[str]:
         "corrected by": None if known else pose_error(trace.corrected, trace.initial),
     }
     header = ["", "roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)"]
-    return markdown(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
+    return markdown_table(header, [[name, *_per_axis(error)] for name, error in rows.items() if error is not None])
 
 
 def _per_axis(error: PoseError) -> list[str]:
@@ -142,9 +143,3 @@ def matrix_lines(which: str, camera_from_lidar: Extrinsic) -> list[str]:
 
 def _error(error: PoseError | None) -> list[str]:
     return [] if error is None else [f"{error.rotation_deg:.2f}°", f"{error.translation_cm:.1f} cm"]
-
-
-def markdown(header: list[str], rows: list[list[str]]) -> list[str]:
-    """The lines of a Markdown table."""
-    ruler = ["---"] * len(header)
-    return ["| " + " | ".join(cells) + " |" for cells in (header, ruler, *rows)]

@@ -30,10 +30,11 @@ def test_a_covariance_that_is_right_about_itself() -> None:
 def test_one_that_is_too_small() -> None:
     coverage = Coverage.of(squares(2.0))
     assert coverage is not None and coverage.squared == pytest.approx(4.0, abs=0.15) and coverage.within < 0.6
-    assert str(coverage).startswith("squared error 3.99 ± 0.05 a degree of freedom") and "2000 runs" in str(coverage)
+    assert str(coverage).startswith("squared error 3.99 ± 0.05 per degree of freedom") and "2000 runs" in str(coverage)
 
 
 def test_nothing_stated_says_nothing_and_one_run_says_little() -> None:
     assert Coverage.of([squared_error(REFERENCE, REFERENCE, None)]) is None
     lone = Coverage.of([6.0])
     assert lone is not None and lone.as_dict()["squared"] == 1.0 and lone.as_dict()["squared_error"] is None
+    assert str(lone) == "squared error 1.00 per degree of freedom, within the 95 % region, 1 run"
