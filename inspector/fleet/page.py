@@ -14,7 +14,7 @@ from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted, told_together
 from inspector.fleet.table import APART, FAILED, ORDER, TABLE, Row, off, worst_first
-from inspector.report.template import stylesheet
+from inspector.report.template import html_page, stylesheet
 
 PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300
@@ -47,11 +47,9 @@ def write_page(rows: Sequence[Row], folder: Path) -> Path:
 def make_page(rows: Sequence[Row], folder: Path) -> str:
     """The page; links lead below its folder."""
     cars, worst = histories(rows), worst_first(rows)
-    template = Template(resources.files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
-    return template.substitute(
-        style=stylesheet(),
-        headline=escape(f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"),
-        about=escape(f"{told_together(rows)} {_moved(sum(bool(car.moves) for car in cars))}".strip()),
+    headline = f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"
+    about = f"{told_together(rows)} {_moved(sum(bool(car.moves) for car in cars))}".strip()
+    sections = Template(_resource("page.html")).substitute(
         cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
         more_cars=_more(len(cars), MOST_CARS, "cars"),
         heads="".join(_head(name) for name in HEADS),
@@ -59,6 +57,18 @@ def make_page(rows: Sequence[Row], folder: Path) -> str:
         more_rows=_more(len(worst), MOST_ROWS, "drives"),
         table=f'<a href="{TABLE}">{TABLE}</a>',
     )
+    return html_page(
+        f"Fleet: {headline}",
+        "Fleet of camera–LiDAR calibrations",
+        f'<h1>{escape(headline)}</h1>\n<p class="about">{escape(about)}</p>',
+        sections,
+        stylesheet() + _resource("page.css"),
+        _resource("page.js"),
+    )
+
+
+def _resource(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _moved(cars: int) -> str:

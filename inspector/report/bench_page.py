@@ -8,36 +8,13 @@ from typing import Any
 from inspector.report.bench_rows import about
 from inspector.report.bench_summary import LEGEND
 from inspector.report.bench_tables import TITLE, long_tables, short_tables
-from inspector.report.template import stylesheet
+from inspector.report.template import html_page, stylesheet
 
-_PAGE = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="generator" content="calib-inspect">
-<title>{title}</title>
-<link rel="icon" href="data:,">
-<style>
-{style}
-main {{ max-width: 1360px; }}
-td, th {{ text-align: left; vertical-align: top; padding: 4px 14px 4px 0; }}
-td:last-child {{ white-space: normal; }}
-summary {{ cursor: pointer; font-weight: 600; }}
-</style>
-</head>
-<body>
-<main>
-<header>
-<p class="kind">Camera–LiDAR calibration: methods compared</p>
-<h1>{title}</h1>
-<p class="about">{about}</p>
-<p>{legend}</p>
-</header>
-{sections}
-</main>
-</body>
-</html>
+STYLE = """
+main { max-width: 1360px; }
+td, th { text-align: left; vertical-align: top; padding: 4px 14px 4px 0; }
+td:last-child { white-space: normal; }
+summary { cursor: pointer; font-weight: 600; }
 """
 
 
@@ -45,8 +22,10 @@ def page(content: dict[str, Any]) -> str:
     """The page of what ``bench --json`` wrote."""
     sections = [_section(title, *table) for title, table in short_tables(content)]
     sections += [_section(title, *table, folded=True) for title, table in long_tables(content)]
-    said = {"title": TITLE, "about": escape(about(content)), "legend": escape(LEGEND)}
-    return _PAGE.format(style=stylesheet(), sections="\n".join(sections), **said)
+    header = f'<h1>{TITLE}</h1>\n<p class="about">{escape(about(content))}</p>\n<p>{escape(LEGEND)}</p>'
+    return html_page(
+        TITLE, "Camera–LiDAR calibration: methods compared", header, "\n".join(sections), stylesheet() + STYLE
+    )
 
 
 def _section(title: str, heads: list[str], body: list[list[str]], folded: bool = False) -> str:

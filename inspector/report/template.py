@@ -1,4 +1,4 @@
-"""What the reports of a run and of a rig have in common: the frame of the page, and two pictures under a slider."""
+"""The base of all pages, and what the reports of a run and of a rig share: verdict, files, pictures under a slider."""
 
 from __future__ import annotations
 
@@ -59,10 +59,7 @@ def report_page(head: Head, sections: str, recording: str, recording_bytes: int,
         recording_bytes: its size.
         states: whose curves have colours.
     """
-    return template("report.html").substitute(
-        title=escape(head.title),
-        style=stylesheet(states),
-        kind=escape(head.kind),
+    header = template("report.html").substitute(
         grade=GRADES[head.word],
         word=head.word.capitalize(),
         reasons=head.reasons,
@@ -71,10 +68,31 @@ def report_page(head: Head, sections: str, recording: str, recording_bytes: int,
         about=escape(head.about),
         recording=escape(recording),
         serve_command=escape(SERVE_COMMAND.format(recording=recording)),
-        sections=sections,
-        size=f"{recording_bytes / 1e6:.1f} MB",
-        metrics=escape(head.metrics),
-        script=_resource("page.js"),
+    )
+    files = template("files.html").substitute(
+        recording=escape(recording), size=f"{recording_bytes / 1e6:.1f} MB", metrics=escape(head.metrics)
+    )
+    return html_page(head.title, head.kind, header, sections + files, stylesheet(states), _resource("page.js"))
+
+
+def html_page(title: str, kind: str, header: str, sections: str, style: str, script: str = "") -> str:
+    """A whole page of HTML, which needs no other file but those that it shows.
+
+    Args:
+        title: in the browser's tab.
+        kind: of page, above its header.
+        header: as HTML.
+        sections: as HTML.
+        style: CSS, see `stylesheet`.
+        script: JavaScript.
+    """
+    return template("page.html").substitute(
+        title=escape(title),
+        kind=escape(kind),
+        header=header.strip(),
+        sections=sections.strip(),
+        style=style.strip(),
+        script=f"<script>\n{script.strip()}\n</script>" if script else "",
     )
 
 
