@@ -82,3 +82,31 @@ def test_no_module_imports_itself_through_others() -> None:
     modules = sources(ROOT, PACKAGES)
     assert {"calibnet", "inspector", "calibnet.datasets.synthetic.world"} <= modules.keys()
     assert circle(modules) == []
+
+
+def rooms(package: str, modules: dict[str, str]) -> dict[str, set[str]]:
+    """The rooms of a package, its folders and the modules beside them, with those that each imports."""
+    found: dict[str, set[str]] = {}
+    for name in modules:
+        if name.startswith(f"{package}."):
+            imported = {one.split(".")[1] for one in imports(name, modules) if one.startswith(f"{package}.")}
+            found.setdefault(name.split(".")[1], set()).update(imported)
+    return {room: imported - {room} for room, imported in found.items()}
+
+
+def test_two_rooms_that_import_each_other_are_seen() -> None:
+    modules = {"p.r.a": "import p.s.a", "p.r.b": "", "p.s.a": "", "p.s.b": "import p.r.b"}
+        "p": "",
+        "p.r": "",
+        "p.r.a": "import p.s.a",
+        "p.s": "",
+        "p.s.a": "",
+        "p.s.b": "import p.r.b",
+        "p.r.b": "",
+    }
+    assert rooms("p", modules) == {"r": {"s"}, "s": {"r"}}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_room_imports_itself_through_others(package: str) -> None:
+    TopologicalSorter(rooms(package, sources(ROOT, PACKAGES))).prepare()
