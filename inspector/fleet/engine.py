@@ -169,9 +169,9 @@ def _on(
 def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Done:
     """Do a piece on a worker that has room; one whose memory is taken retires first, and its nanny starts another.
 
-    Libraries keep some memory of whatever they did, Rerun 7 MB a recording. Nothing is under way at this moment, so
-    nothing is lost; beyond 0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle. A
-    worker that simply ended would count against its piece, which finds the next one as full, for all fill alike.
+    Libraries may keep some memory of whatever they did. Nothing is under way at this moment, so nothing is lost; beyond
+    0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle. A worker that simply ended
+    would count against its piece, which finds the next one as full, for all fill alike.
     """
     from distributed import Reschedule, get_worker
 

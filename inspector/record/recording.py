@@ -72,6 +72,7 @@ class Recording:
         self._layout, self._contents = layout, layout.contents
         self._tabs = wanted_tabs(layout)
         self._seconds: dict[int, float] = {}
+        self._flushed = 0
         blueprint = make_blueprint(layout, self._tabs)
         options, title = (
             {name: _plain(value) for name, value in description.options.items()},
@@ -92,9 +93,7 @@ class Recording:
         log_frame(self._rec, observation, self._contents)
         for tab in self._tabs:
             tab.log(self._rec, observation, self._contents)
-        self._stream.flush()
-        if len(self._seconds) % HANDED_BACK_EVERY == 0:
-            hand_back()
+        self._flush_frame()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
         """Log which frames could not be used, and why; nothing else is there of them."""
@@ -141,7 +140,7 @@ class Recording:
         """Log what the drive's extrinsic makes of one of its frames."""
         observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
         log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
-        self._stream.flush()
+        self._flush_frame()
 
     def close(self, advance: Callable[[int, int], bool] | None = None) -> str:
         """Flush and write the footer; nothing, where nothing can be written any more.
@@ -154,6 +153,13 @@ class Recording:
         """
         self._stream.close(advance)
         return self._stream.remark
+
+    def _flush_frame(self) -> None:
+        """Hand a frame to the sinks and, now and then, free memory to the system."""
+        self._stream.flush()
+        self._flushed += 1
+        if self._flushed % HANDED_BACK_EVERY == 0:
+            hand_back()
 
     def __enter__(self) -> Recording:
         return self
