@@ -33,12 +33,12 @@ class Change:
 
     @property
     def rotation_deg(self) -> float:
-        """By what angle."""
+        """Angle of the move in degrees."""
         return float(np.degrees(np.linalg.norm(self.offset[3:])))
 
     @property
     def translation_cm(self) -> float:
-        """How far."""
+        """Distance of the move in centimetres."""
         return float(100 * np.linalg.norm(self.offset[:3]))
 
     @property

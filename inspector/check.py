@@ -34,7 +34,7 @@ KINDS = {
     "unused": ("share of rejected and skipped frames", " %"),
     "fit": ("error expected of the matches", " px"),
 }
-"""Of limits, with their units."""
+"""Names of the limits, with their units."""
 ERRORS, OF_THE_RUN = ("rotation", "translation"), ("sigma_rotation", "sigma_translation", "unused")
 """Those that need a reference, and those that are one figure of a run and no statistic over its frames."""
 

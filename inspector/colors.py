@@ -31,7 +31,7 @@ VERDICTS: Final[dict[str, Rgb]] = {
     "rejected": (255, 110, 100),
     "cannot tell": (255, 205, 80),
 }
-"""Of the words of `calibnet.verdict`."""
+"""Colours of the words of `calibnet.verdict`."""
 FOUND: Final[Rgb] = (90, 255, 120)
 STAGES: Final[dict[int, Rgb]] = {
     1: (255, 140, 40),

@@ -17,7 +17,7 @@ STEP = "step"
 """Timeline: ``frame * 8 + stage``; stage 0 is the miscalibrated frame, 1 to 5 are after a stage, then come
 `STEP_REFERENCE` and `STEP_RESULT`."""
 STEPS_PER_FRAME, STEP_REFERENCE, STEP_RESULT = 8, 6, 7
-"""Of each frame; the truth, where it is known; and what is believed in the end, with its verdict."""
+"""On `STEP`: steps of a frame, the step of the reference where it is known, and that of the result with its verdict."""
 
 RUN = "run"
 """Property: the options that identify the run."""
@@ -75,7 +75,7 @@ LEGEND_CERTAINTY = "legend/certainty"
 """What the brightness of probabilities and confidences stands for."""
 
 PICTURE = "picture"
-"""Of a scale: what its stage saw, under the maps; see `of_scale`."""
+"""Entity below a scale: the picture that its stage saw, under the maps; see `of_scale`."""
 RIG = "rig/solved"
 """Recordings of several cameras: what was found of each."""
 RIG_JSON = "rig_json"

@@ -12,7 +12,7 @@ from calibnet.watch import SMALLEST_CM, SMALLEST_DEG, WINDOW, Change, Watch, Wat
 
 NO_CHANGE, CHANGED, CANNOT_TELL = "no change", "changed", "cannot tell"
 AXES = ("x", "y", "z", "pitch", "yaw", "roll")
-"""Of an offset: moves along the camera's axes (right, down, ahead), and turns about them."""
+"""Axes of an offset: moves along the camera's axes (right, down, ahead), and turns about them."""
 
 
 def word(watched: Watched) -> str:

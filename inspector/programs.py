@@ -23,7 +23,7 @@ SWITCHED_OFF = ("0", "off", "false", "no")
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
 PR_SET_PDEATHSIG = 1
-"""Of Linux's prctl: the signal that a process gets when its parent ends."""
+"""Option of Linux's prctl: the signal that a process gets when its parent ends."""
 
 
 def rerun_binary() -> str:

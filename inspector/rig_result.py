@@ -14,7 +14,7 @@ from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
 COLUMNS = ("camera", "verdict", "off the reference", "sure to (1σ)", "alone it says", "corrected by", "matches off")
-"""Of a table with a row a camera, what matters most first: a narrow window cuts the rest off."""
+"""Columns of the table with a row per camera, what matters most first: a narrow window cuts off the rest."""
 
 
 class Residual(NamedTuple):
@@ -118,7 +118,7 @@ class RigResult:
 
     @property
     def how(self) -> str:
-        """In which way they were solved."""
+        """How the cameras were solved, for people."""
         if self.tolerance:
             return f"as one rig, each within {self.tolerance} of its place on it"
         return "as one rigid rig" if self.rigid else "each on its own"

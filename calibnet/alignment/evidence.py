@@ -47,7 +47,7 @@ FEWEST_POINTS, ENOUGH_POINTS = 30, 100
 MOST_POINTS = 2000
 """Points of a term at most; more are thinned out evenly."""
 BINS = 16
-"""Of the histograms of reflectance and of brightness."""
+"""Bins of the histograms of reflectance and of brightness."""
 INFORMATION_WEIGHT = 10.0
 """Weight of the information distance in the sum; the two kinds of edges, whose values are means, weigh 1."""
 
@@ -214,7 +214,7 @@ def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, 
 
 
 def blurred(image: NDArray[np.floating] | NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
-    """By a Gaussian of so many pixels."""
+    """The image blurred by a Gaussian of ``sigma`` pixels."""
     return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma), np.float32)
 
 

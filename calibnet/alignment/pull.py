@@ -32,7 +32,7 @@ class Sampled(NamedTuple):
     points: NDArray[np.float32]
 
     def gradient(self, weights: Floats | float, pivot: Vector3) -> Vector6:
-        """Of the values' weighted sum by a motion ``(translation m, rotation rad)``: forces and torques, summed up.
+        """Gradient ``[6]`` of the values' weighted sum by ``(translation m, rotation rad)``: summed forces and torques.
 
         Args:
             weights: ``[N]``, or one for all.

@@ -21,7 +21,7 @@ class ImageViews:
     """
 
     def __init__(self, frame: Frame, clock: Clock) -> None:
-        """Of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
+        """Make views of ``frame``; ``clock`` is called with ``"resize"`` and ``"image_features"`` when each is done."""
         self.frame, self.clock = replace(frame, points=np.asfortranarray(frame.points)), clock
         self._views: dict[tuple[int, ...], View] = {}
 

@@ -65,7 +65,7 @@ def _check_order(frames: list[Frame]) -> None:
 
 
 def _check_reading(sequence: Sequence, frames: list[Frame]) -> None:
-    """By position from either end, every time anew, and not beyond the end."""
+    """Check reading by position: from either end, repeatedly, and not beyond the end."""
     for position, frame in enumerate(frames):
         _same(frame, sequence[position], f"read at position {position}")
     _same(frames[-1], sequence[-1], "read at position -1")

@@ -20,7 +20,7 @@ LONGEST_ROW, LONGEST_LINE = 4096, 64 * 1024
 LONGEST_WORD = 64
 """Characters of a number in a text file that are read."""
 MOST_BYTES = 256 * MEGABYTE
-"""Of a scan, in its file and unpacked."""
+"""Largest scan, in its file and unpacked."""
 Columns = dict[str, NDArray[np.generic]]
 """Values ``[N]`` by name, in lower case; of a name given twice the first counts."""
 

@@ -65,7 +65,7 @@ def _kitti_360(root: Path, name: str) -> Iterator[Sequence]:
 
 
 def _nuscenes(root: Path, name: str) -> Iterator[Sequence]:
-    """Of every scene ``CAM_FRONT``; ``SCENE/CAMERA`` names another one."""
+    """``CAM_FRONT`` of every scene; ``SCENE/CAMERA`` names another camera."""
     from calibnet.datasets.nuscenes_tables import find_tables, scene_names
 
     scene, _, camera = name.partition("/")

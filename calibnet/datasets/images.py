@@ -21,9 +21,9 @@ from calibnet.runtime.reading import MEGABYTE, read_file
 
 logging.getLogger("PIL").addHandler(logging.NullHandler())  # what Pillow thinks of a damaged file is in our sentence
 LARGEST_BYTES = 256 * MEGABYTE
-"""Of a picture's file."""
+"""Largest file of a picture."""
 MOST_PIXELS = 100_000_000
-"""Of a picture: 300 MB once it is decoded."""
+"""Most pixels of a picture: 300 MB once it is decoded."""
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
 DEPTHS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "I;16", "I;16B", "I;16L"}
 """Kinds of pixels, as Pillow calls them, that are a camera's; others have 32 bits."""

@@ -56,12 +56,12 @@ class Lens:
 
     @property
     def camera(self) -> CameraModel:
-        """As it is."""
+        """The camera as it is, lens included."""
         return self.middle.camera
 
     @property
     def pinhole(self) -> PinholeCamera:
-        """Of the picture's middle."""
+        """The pinhole camera of the picture's middle."""
         return self.middle.pinhole
 
     @property

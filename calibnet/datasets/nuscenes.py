@@ -104,7 +104,7 @@ def _motion(pair: Pair, sensors: dict[str, Sensor], poses: dict[str, Transform] 
 
 
 def _calibration(pair: Pair, sensors: dict[str, Sensor]) -> Calibration:
-    """Of the camera, with the LiDAR in our axes.
+    """The calibration of the camera, with the LiDAR in our axes.
 
     Raises:
         DatasetError: the camera has no matrix.

@@ -17,7 +17,7 @@ from calibnet.geometry.types import Intrinsics, Transform
 from calibnet.runtime.reading import MEGABYTE, open_file
 
 LARGEST_BYTES = 4096 * MEGABYTE
-"""Of a table."""
+"""Largest table."""
 LARGEST_RECORD = MEGABYTE
 BETWEEN = re.compile(r"\s*,?\s*")
 """Two records."""

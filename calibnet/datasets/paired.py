@@ -27,7 +27,7 @@ from calibnet.runtime.reading import register_input
 from calibnet.runtime.text import one_line
 
 SCANS_LOOKED_AT = 4
-"""Of a drive, to see how it stores intensity."""
+"""Scans of a drive that are read to find the scale of its intensity."""
 
 
 class Both(NamedTuple):
@@ -72,7 +72,7 @@ class PairedSequence(ABC):
 
     notes: tuple[str, ...] = ()
     cloud_columns: tuple[str, ...] | None = KITTI
-    """Of ``.bin`` clouds; None to recognise them."""
+    """Columns of ``.bin`` clouds; None to recognise them."""
 
     def __init__(self, name: str, rig: str, files: Sequence[FrameFiles]) -> None:
         self.name = one_line(name)

@@ -15,13 +15,13 @@ from calibnet.geometry.types import Floats
 from calibnet.runtime.reading import TEXT_BYTES, read_text
 
 TIMES = "timestamps.txt"
-"""Beside the files of a folder: a time a line, in the order of their names."""
+"""File of times beside the files of a folder: one a line, in the order of their names."""
 MAX_TIME_DIFFERENCE_MS = 50.0
-"""Between an image and a scan of one frame, by default: half a turn of a scanner."""
+"""Largest time between an image and a scan of one frame, by default: half a turn of a scanner."""
 WORTH_A_WARNING_MS = 20.0
-"""Apart, from which on what drives is smeared: 28 cm at 50 km/h."""
+"""Time between them above which the user is warned: 28 cm of way at 50 km/h."""
 CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
-"""Digits of a time since 1970 in seconds, milli-, micro- and nanoseconds, and seconds of each unit."""
+"""By the number of digits of a time since 1970, its unit in seconds."""
 NEWEST = 4e9
 """Seconds since 1970 beyond which a number is no time."""
 

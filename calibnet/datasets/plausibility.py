@@ -29,9 +29,9 @@ MIDDLE, CROPPED = (0.25, 0.75), (-0.5, 1.5)
 SAME_SHAPE, OTHER_SIZE, SURELY_OTHER = 0.1, 1.35, 1.8
 """A matrix is of another size where its factors across and down are alike within the first, and exceed the second."""
 NEAREST_M, FARTHEST_M = 0.5, 250.0
-"""Half of a scan's points are farther, and nearer, than this."""
+"""Metres between which the median distance of a scan's points lies."""
 LONGEST_ARM_M = 30.0
-"""Between camera and LiDAR; a lorry is 20 m long."""
+"""Largest distance between camera and LiDAR; a lorry is 20 m long."""
 STEEP = 0.9
 """Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
 FLAT = 0.4
@@ -119,7 +119,7 @@ def focal_length(camera: PinholeCamera) -> Implausible | None:
 
 
 def distortion(camera: CameraModel) -> Implausible | None:
-    """Of OpenCV's lenses, whose rectified picture has the size and the matrix of the picture itself."""
+    """Whether a lens leaves hardly anything of the rectified picture, which has the size and matrix of the original."""
     width, height = camera.pinhole.width, camera.pinhole.height
     u, v = np.meshgrid(np.linspace(0, width - 1, GRID), np.linspace(0, height - 1, GRID))
     pixels = np.column_stack([u.ravel(), v.ravel(), np.ones(u.size)])
@@ -162,7 +162,7 @@ def picture_size(camera: PinholeCamera) -> Implausible | None:
 
 
 def principal_point(camera: PinholeCamera) -> Implausible | None:
-    """In the middle of the picture, more or less."""
+    """Whether the principal point is near the middle of the picture."""
     shares = camera.center[0] / camera.width, camera.center[1] / camera.height
     if all(MIDDLE[0] <= share <= MIDDLE[1] for share in shares):
         return None

@@ -17,7 +17,7 @@ LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
 COMPRESSED = 128
 """Formats of points from here on are compressed: LAZ."""
 LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 8, 60, 2048
-"""Of computing and, on a busy machine, of waiting for a scan to be unpacked; and what that needs besides its points."""
+"""Limits of unpacking a scan: seconds of computing, seconds in all on a busy machine, and memory besides its points."""
 UNPACK = """
 import io, resource, sys
 most, seconds = int(sys.argv[1]), int(sys.argv[2])

@@ -27,7 +27,7 @@ and the prior, which would draw it to the start, does not count."""
 FARTHEST_TRANSLATION_M, FARTHEST_ROTATION_DEG = 0.3, 0.6
 """Standard deviations of what the frames agree on, over all axes, beyond which edges would pull onto a neighbour."""
 REWEIGHTINGS = 10
-"""Times that frames are weighted anew; weights settle after three or four."""
+"""Iterations of the reweighting; weights settle after three or four."""
 
 
 class Consensus:

@@ -8,14 +8,14 @@ from calibnet.datasets.selection import spread
 from calibnet.trace import Estimate
 
 POINTS = 12
-"""Of the curve, at most."""
+"""Most points of the curve."""
 
 
 class Due:
-    """Positions at which something is to be done."""
+    """Positions of a drive at which something is to be done, ticked off as the drive goes on."""
 
     def __init__(self, positions: list[int]) -> None:
-        """Sorted ones."""
+        """Wait for ``positions``, which are sorted."""
         self._left = list(positions)
 
     def reached(self, position: int) -> bool:
@@ -33,7 +33,7 @@ class Convergence:
     """The curve; its last point is the estimate of all frames."""
 
     def __init__(self, frames: int) -> None:
-        """Of a drive of so many frames."""
+        """Begin the curve of a drive of ``frames`` frames."""
         self.points: list[tuple[int, Estimate]] = []
         self._due = Due(spread(frames, POINTS)[:-1])
         self._frame = 0

@@ -60,7 +60,7 @@ class Said:
         return np.asarray(by_rig @ of_rig @ by_rig.T + own, np.float64)
 
     def _share(self, tolerance: Matrix6) -> Matrix6:
-        """Of what a camera says against the rig, as much as it moves by."""
+        """Gain ``[6, 6]``: the share of a camera's offset from its place on the rig by which it is moved."""
         return np.asarray(tolerance @ inverse(tolerance + self.covariance), np.float64)
 
 

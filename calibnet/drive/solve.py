@@ -24,7 +24,7 @@ from calibnet.verdict import BadFrame
 FRAMES_UNTIL_LAST_LOOK = 24
 """Frames, spread over the drive, that all looks but the last one see."""
 LOOKS = 2
-"""Times that each stage corrects a drive, on scans projected anew; the last one does so once more in the end."""
+"""Looks of each stage at a drive, each on scans projected anew; the last stage takes one more, at all frames."""
 FRAMES_ALIGNED = 24
 """Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
 

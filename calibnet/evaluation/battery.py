@@ -33,7 +33,7 @@ PLAIN = Corruption("none", "", None, unaltered, middle=False)
 ONE_MOUNT = Corruption("one-mount", "", None, unaltered, middle=False)
 """A drive as it should be."""
 DRIVE_FRAMES = 12
-"""Of a drive that is put on two mounts, at most."""
+"""Most frames of a drive that is put on two mounts."""
 
 Judge = Callable[[Frame, Extrinsic, CascadeTrace | None, Search | None], Verdict]
 """Gives the verdict on a frame, the guess it was calibrated from, the trace, which is None where it could not be run,

@@ -26,7 +26,7 @@ from calibnet.methods.card import card_of
 
 FRAMES, DRIVES = "frames", "drives"
 AUDITED = ("grey", "swapped")
-"""Of `calibnet.evaluation.audit`, what every method is put to."""
+"""The alterations of `calibnet.evaluation.audit` that every method is measured on."""
 TIMED = 3
 """Frames whose median time is a method's latency, after one that is not timed."""
 

@@ -43,7 +43,7 @@ class Coverage:
 
     @classmethod
     def of(cls, squares: Iterable[float]) -> Coverage | None:
-        """Of squared errors by the covariance, see `squared_error`; None where no run states one."""
+        """The coverage of runs by their `squared_error`; None where no run states a covariance."""
         known = np.array([square for square in squares if np.isfinite(square)])
         if not len(known):
             return None

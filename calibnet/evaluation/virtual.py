@@ -19,11 +19,11 @@ from calibnet.evaluation.faults import thinned
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
 
 NARROWEST = 1.6
-"""Times the focal length at most; a wider lens would show what the picture does not have."""
+"""Largest factor on the focal length; a wider lens would show what the picture does not have."""
 OFF_CENTRE = 0.1
 """Share of the picture by which the part that is kept may lie beside its middle."""
 MOST_PITCH_DEG, MOST_YAW_DEG, MOST_ROLL_DEG = 4.0, 10.0, 5.0
-"""By which the camera is turned, either way."""
+"""Largest angles by which the camera is turned, either way."""
 RESIZED = (0.6, 1.2)
 """Pixels of the virtual camera, relative to those of the part that it shows."""
 

@@ -26,7 +26,7 @@ MARGIN_DEG = 4.0
 HIGHEST_DEG = 35.0
 """Degrees above and below the horizon that a face sees."""
 STEP_DEG = 0.5
-"""In which it is searched how far the lens sees."""
+"""Step in which the angle is searched up to which the lens sees."""
 SEEN = 0.5
 """Share of a direction's heights that the lens has to see for the direction to count."""
 NARROWEST_DEG = 15.0

@@ -18,7 +18,7 @@ SMOOTHING = 1e-4
 SMALLEST = 1e-12
 """The distance at which it stops where all points are the same, in their unit."""
 RECENTRINGS = 3
-"""Times that rotation vectors are taken anew from the median so far: only from their centre are they true distances."""
+"""Iterations in which rotation vectors are taken relative to the median so far: only about it are they distances."""
 
 
 def median_pose(extrinsics: Sequence[Extrinsic]) -> Extrinsic:

@@ -25,7 +25,7 @@ FILLED = 0.5
 WORTH_SAYING_DEG = 5.0
 """Degrees that are left out, from which on a user is told."""
 STEP_DEG = 0.25
-"""In which it is searched how far a lens sees."""
+"""Step in which the angle is searched up to which a lens sees."""
 
 
 @dataclass(frozen=True, eq=False)

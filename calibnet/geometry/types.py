@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
-"""Of a shape that the docstring gives."""
+"""Double precision; the shape is given where it is used."""
 
 Transform: TypeAlias = NDArray[np.float64]
 """``[4, 4]``, a rigid ``target_from_source`` in metres: a miscalibration, a correction."""

@@ -39,7 +39,7 @@ class Directions(NamedTuple):
 
     @classmethod
     def of(cls, points: NDArray[np.float32]) -> Directions:
-        """Of ``points [N, 3]`` or more columns."""
+        """The directions of ``points [N, >=3]``."""
         x, y, z = points[:, :3].T
         across = np.hypot(x, y)
         return cls(np.degrees(np.arctan2(y, x)), np.degrees(np.arctan2(z, across)), np.hypot(across, z))

@@ -31,11 +31,11 @@ class Unjudged:
 
     @property
     def card(self) -> MethodCard:
-        """Of the method itself."""
+        """The card of the method itself."""
         return card_of(self.calibrator)
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """As the method does, with another verdict."""
+        """Calibrate as the method does, and put the verdict *cannot tell* on it unless it is rejected."""
         trace = self.calibrator.calibrate(frame, initial, detail)
         return replace(trace, method=self.name, verdict=self._verdict(initial, trace.arrived, trace.verdict))
 
@@ -56,13 +56,13 @@ class UnjudgedDrive(Unjudged):
 
     @property
     def drives_only(self) -> bool:
-        """As the method says."""
+        """Whether the method calibrates whole drives only."""
         return drives_only(self.calibrator)
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
     ) -> DriveEstimate:
-        """As the method does, with another verdict."""
+        """Calibrate as the method does, and put the verdict *cannot tell* on it unless it is rejected."""
         estimate = self.calibrator.calibrate_drive(frames, initial, observer)
         verdict = self._verdict(initial, estimate.camera_from_lidar, estimate.verdict)
         used = replace(verdict, covariance=estimate.covariance, used=estimate.frames, skipped=estimate.skipped)

@@ -19,7 +19,7 @@ ABLATIONS: dict[str, str | None] = {
     "hybrid-loss": "hybrid_loss",
     FULL: None,
 }
-"""In the order of the paper's rows; the last is the network with all modules."""
+"""The ablations in the order of the paper's rows; the last is the network with all modules."""
 
 
 def ablated(config: NetworkConfig, name: str) -> NetworkConfig:

@@ -99,7 +99,7 @@ class Pointwise(Conv3d):
         return ACTIVATIONS[self.activation](F.linear(volume, self.weight.flatten(1), self.bias))
 
     def pack(self, precision: torch.dtype) -> None:
-        """As other convolutions, but several cells in a row as one that has all their channels.
+        """Pack as other convolutions do, but with several cells in a row as one that has all their channels.
 
         Few channels leave most of the processor's wide products idle; of more, by weights that are zero between cells,
         it makes the same numbers in half the time.

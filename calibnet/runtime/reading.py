@@ -21,7 +21,7 @@ from calibnet.errors import CalibnetError, DatasetError
 
 MEGABYTE = 1 << 20
 TEXT_BYTES = 16 * MEGABYTE
-"""Of lists of times or frames; a calibration, a manifest or a preset has `SETTINGS_BYTES` at most."""
+"""Largest list of times or frames; a calibration, a manifest or a preset has `SETTINGS_BYTES` at most."""
 SETTINGS_BYTES = MEGABYTE // 4
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 """How the file begins that stands where Git LFS has not fetched one."""

@@ -49,7 +49,7 @@ def file_name(text: str) -> str:
 
 
 def _escaped(character: str) -> str:
-    """As Python writes it, for instance a backslash and ``n``; a byte of a name that is no UTF-8 by its value."""
+    """A character as Python escapes it, for instance a backslash and ``n``; a byte that is not UTF-8 by its value."""
     if "\udc80" <= character <= "\udcff":
         return f"\\x{ord(character) - 0xDC00:02x}"
     return character.encode("unicode_escape").decode("ascii")

@@ -22,7 +22,7 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.reading import is_input, kind_of, open_file
 
 HEAD_BYTES = 1 << 20
-"""Of a file that is there, from which its kind is told."""
+"""How much of an existing file is read to tell its kind."""
 
 
 class OutputError(ConfigError):

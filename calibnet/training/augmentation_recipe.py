@@ -32,7 +32,7 @@ class ScanRecipe:
     band_deg: tuple[float, float] = (0.35, 0.6)
     """Width of a band, degrees."""
     bands: tuple[int, int] = (2, 4)
-    """Of how many neighbouring bands one is kept."""
+    """Bounds of n, where one of n neighbouring bands is kept."""
     tilt_deg: float = 6.0
     """Standard deviation of the angles by which the scanner of these bands is tilted about its x and y axes."""
     upended: float = 0.1

@@ -20,7 +20,7 @@ from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import write_whole
 
 LARGEST_BYTES = 4 << 30
-"""Of a checkpoint: weights, their average and two moments of each, in single precision."""
+"""Largest checkpoint: weights, their average and two moments of each, in single precision."""
 KEY = "calib-inspect-training"
 
 

@@ -41,7 +41,7 @@ class TrainingOptions:
     learning_rate: float = 1e-3
     """Peak of the learning rate."""
     seed: int = 0
-    """Of everything random."""
+    """Seed of everything random."""
     workers: int = 1
     """Other processes that prepare samples."""
     initialize: str | None = None

@@ -33,13 +33,13 @@ from calibnet.runtime.text import one_line
 from calibnet.training.data import Source
 
 KEY = "calib-inspect-frames"
-"""Of the metadata that says what a part's sources are."""
+"""Key of the metadata that says what a part's sources are."""
 PATTERN = "frames-{:03d}.safetensors"
 STEPS_PER_METRE = 256
 """Resolution of packed points; 16 bits reach 128 m, farther points are left out."""
 FARTHEST_M = 2**15 / STEPS_PER_METRE
 LARGEST_BYTES = 4 << 30
-"""Of a part."""
+"""Largest size of a part."""
 LARGEST_SCAN = 1 << 28
 """Bytes of a scan, unpacked: some forty million points."""
 

@@ -18,7 +18,7 @@ from calibnet.runtime.reading import MEGABYTE, read_file
 from calibnet.runtime.writing import write_whole
 
 LARGEST = 64 * MEGABYTE
-"""Of a scene's file, packed or not; one has 3 to 5."""
+"""Largest file of a scene, packed or not; usual ones have 3 to 5 MB."""
 ROBOT_EVERY = 4
 """One of so many scenes is a robot's, mostly in a hall, instead of a car's."""
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from calibnet.network.network import CalibrationNetwork
 
 LARGEST_BYTES = 1 << 30
-"""Of a file of weights; ours have 10 MB."""
+"""Largest file of weights; ours have 10 MB."""
 HEADER = "calib-inspect"
 MOVED = {"zooms", "rounds", "gains", "largest_match_error"}
 """Keys of older headers that act no more: how a network is used is said by its manifest."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SUFFIXES = {"json": "json", "koide3": "json", "urdf": "urdf"} | dict.fromkeys(
     ("ros", "yaml", "opencv", "autoware"), "yaml"
 )
-"""Of the files of a rig's cameras, by format."""
+"""Suffixes of the files of a rig's cameras, by format."""
 ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 MOST_WORKERS = 8
-"""Of a gigabyte of memory each, unless more are asked for."""
+"""Most worker processes, of a gigabyte of memory each, unless more are asked for."""
 
 
 @click.command("fit-verdict")

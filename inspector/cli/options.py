@@ -174,12 +174,12 @@ class Size(click.ParamType[int]):
 
 SIZE = Size()
 SEED = click.IntRange(0, 2**63 - 1)
+"""Seed of everything random; recordings keep it as a 64-bit number."""
 CORES = os.cpu_count() or 1
 THREADS = click.IntRange(1, CORES)
-"""Of the CPU: torch ends the process at many more than there can be."""
+"""Threads of the CPU: torch ends the process at many more than there can be."""
 USUAL_THREADS = min(2, CORES)
-"""That latencies are measured with."""
-"""Of everything random; recordings keep it as a 64-bit number."""
+"""Threads that latencies are measured with."""
 RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()
@@ -203,7 +203,7 @@ KNOWN_OPTIONS = (
     click.option("--prior-translation", type=LENGTH, help="The camera's place is known to this, on each axis."),
     click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
 )
-"""Of every command that starts from an extrinsic of which something may be known."""
+"""Options of every command that starts from an extrinsic of which something may be known."""
 METHOD_OPTIONS = (
     click.option(
         "--method",
@@ -221,4 +221,4 @@ METHOD_OPTIONS = (
     ),
     click.option("--intrinsics", is_flag=True, help="Let pcba adjust the camera's focal length and centre as well."),
 )
-"""Of every command that calibrates with any method."""
+"""Options of every command that calibrates with any method."""

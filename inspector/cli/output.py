@@ -27,7 +27,7 @@ overwrite_option = click.option(
     callback=_let_overwrite,
     help="Let outputs replace files of any kind; without it, files of their own kind only.",
 )
-"""Of every command that writes what its user names."""
+"""Option of every command that writes what its user names."""
 JSON_FILE = click.Path(dir_okay=False, writable=True, allow_dash=True)
 """Type of a ``--json FILE|-`` option."""
 

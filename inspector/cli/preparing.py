@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from inspector.run.session import Session
 
 UNJUDGED = "No result will be accepted: what it finds is not judged, which only the cascade's is."
-"""Of every method but the cascade."""
+"""Said of every method but the cascade."""
 
 
 def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Session:

@@ -36,7 +36,7 @@ OWN = tuple(
         entities.LEGEND_POINTS,
     )
 )
-"""Of every run."""
+"""Entities of every run that are compared."""
 RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
 DRIVES_ARE_LEVEL = "level: whole drive as one"
 """What the legend says of lines that are the same at all frames."""

@@ -53,7 +53,7 @@ class LiveApp:
         )
 
     def _answer(self, make: Callable[[Any], bytes], media_type: str) -> Callable[[Request], Awaitable[Response]]:
-        """Of the frame at hand; the page adds its position to the address, so that nothing old is shown."""
+        """Answer about the current frame; the page adds its position to the address, so that no old answer is shown."""
 
         async def answer(_: Request) -> Response:
             content = await asyncio.to_thread(make, self._session.bench.frame)

@@ -30,7 +30,7 @@ class StagedCalibrator(DriveCalibrator, Protocol):
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Of the stages, coarse to fine."""
+        """Numbers of the stages, coarse to fine."""
         ...
 
     def only(self, number: int) -> DriveCalibrator:
@@ -72,7 +72,7 @@ class Bench:
 
     @property
     def name(self) -> str:
-        """Of the sequence."""
+        """Name of the sequence."""
         return self._sequence.name
 
     def show(self, position: int, frame: Frame) -> None:

@@ -27,7 +27,7 @@ from inspector.record.tabs.registry import Tab
 TIMELINE = "try"
 APPLICATION_ID = "calib-inspect-live"
 TABS: tuple[Tab, ...] = (cost_volumes, cascade, exhibits, scene, hourglass)
-"""Of the viewer beside the page, which has the overview itself; the one that answers a click in the picture first."""
+"""Tabs of the viewer beside the page, which has the overview itself; first the one that answers a click."""
 CONTENTS = Contents(frozenset({Part.OVERLAYS, Part.VOLUMES, Part.HOURGLASS, Part.SCENE}), dense=True)
 
 

@@ -18,7 +18,7 @@ AXES = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z
 STEPS = {"coarse": (0.25, 0.02), "fine": (0.02, 0.002)}
 """Degrees and metres that a key moves by; with Shift a tenth."""
 RELEASE_S = 0.3
-"""As long as keys come faster than that, nobody has let go."""
+"""Pause after the last key from which on it counts as released."""
 POLL_S = 0.05
 LEFT, RIGHT, ESCAPE = ("\x1b[D", "\x1bOD"), ("\x1b[C", "\x1bOC"), "\x1b"
 MESSAGES: dict[str, dict[str, Any]] = {

@@ -115,7 +115,7 @@ class RecordedRun:
 
     @property
     def drive_error(self) -> PoseError | None:
-        """Of the drive's extrinsic; None where none was solved, or without a reference."""
+        """Error of the drive's extrinsic; None where none was solved, or without a reference."""
         reference = self.frames[0].reference
         return None if self.drive is None or reference is None else pose_error(self.drive, reference)
 

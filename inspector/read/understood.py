@@ -23,7 +23,7 @@ from calibnet.runtime.schema import validated
 from calibnet.runtime.text import one_line
 
 LARGEST = 1e6
-"""Of an entry of a camera matrix, and of an extrinsic, pixels or metres."""
+"""Largest entry of a camera matrix in pixels, and of an extrinsic in metres."""
 RIGID_TOLERANCE = 1e-2
 """Largest entry of ``R^T R - I`` of an extrinsic; runs of single precision stay far below."""
 Number = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]

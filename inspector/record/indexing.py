@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 CHUNK_BYTES = 2 << 20
 """Size of a chunk, as Rerun's own `rrd optimize` cuts them; at most so much of every entity is held in memory."""
 MOST_BATCHES = 32
-"""Of an entity's rows that are held at the same time."""
+"""Most batches of an entity's rows that are held at the same time."""
 ROUND_BYTES, ROUND_SHARE = 8 << 20, 2
 """What comes between two rounds, in which chunks end whatever their size: so many bytes at least, and half of what was
 written before. So the front part of a file, as of a copy that is not complete, is of use, and chunks remain few."""
 SORTED = b"rerun:is_sorted"
-"""Of a column that was found to be sorted; Rerun finds that out anew where it is not said."""
+"""Metadata of a column that was found to be sorted; Rerun finds that out anew where it is not said."""
 
 
 class NotIndexedError(CalibnetError):

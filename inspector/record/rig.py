@@ -38,10 +38,10 @@ from inspector.rig_result import CameraResult, RigResult
 MOMENTS = 40
 """Frames of each camera that are shown, from all over the drive."""
 POINTS = 40_000
-"""Of the cloud at most."""
+"""Most points of the cloud."""
 CLOUD, WORLD, TEXT = "rig/cloud", "rig", "rig/result"
 LEFT_SHARE = 0.64
-"""Of the tab's width that the pictures take."""
+"""Share of the tab's width that the pictures take."""
 
 
 @dataclass(frozen=True)

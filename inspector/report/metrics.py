@@ -203,7 +203,7 @@ def misplacement_cm(error: PoseError) -> float:
 
 
 def _rounded(error: PoseError) -> dict[str, float]:
-    """To a millionth, which is far below what can be measured: the file of a long run stays small."""
+    """An error rounded to a millionth, far below what can be measured, so that the file of a long run stays small."""
     return {name: round(value, 6) for name, value in asdict(error).items()}
 
 

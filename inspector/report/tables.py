@@ -10,7 +10,7 @@ from inspector.report.metrics import Figures, State
 from inspector.report.verdict import ROTATION, TRANSLATION
 
 STATISTICS, MORE = ("median", "p95"), ("mean", "std")
-"""Of both errors; a telephone shows the first two."""
+"""Statistics of both errors; a telephone shows the first two."""
 
 
 def stages_table(figures: Figures) -> str:

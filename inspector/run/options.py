@@ -141,7 +141,7 @@ class RunOptions:
 
     @cached_property
     def positions(self) -> list[int]:
-        """Of the frames to run.
+        """Positions of the frames to run.
 
         Raises:
             DatasetError: there are none.
@@ -197,7 +197,7 @@ class RunOptions:
 
     @property
     def title(self) -> str:
-        """Of the recording."""
+        """Title of the recording."""
         of = "" if self.method == CASCADE else f", {self.method}"
         return f"{self.sequence.name}, {self.start}{of}"
 

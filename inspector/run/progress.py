@@ -25,7 +25,7 @@ def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole dri
 
 
 class _Description(ProgressColumn):
-    """As it is, where rich would take brackets in a name for its own."""
+    """The description as it is, where rich would take brackets in a name for markup."""
 
     def render(self, task: Task) -> Text:
         return Text(one_line(task.description))

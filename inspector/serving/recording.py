@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 RECORDING = "recording.rrd"
 PIECE_BYTES = 1 << 20
 PAUSE_S = 0.1
-"""Between looks at whether the file has grown."""
+"""Pause between checks whether the file has grown."""
 
 
 def recording_app(file: Path, viewer: Path, begun: threading.Event, ended: threading.Event) -> Starlette:

@@ -50,7 +50,7 @@ CHANNELS: dict[str, tuple[type[np.generic], int, int | None]] = {
 }
 """Encodings of raw images: type and number of a pixel's values, and how OpenCV makes RGB of them."""
 POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-"""Of the fields of a PointCloud2."""
+"""NumPy types of the fields of a PointCloud2."""
 
 
 def stamp_of(data: bytes, is_ros2: bool) -> float:
@@ -143,7 +143,7 @@ def links_of(message: Any) -> Iterator[Link]:
 
 
 def _rotation(xyzw: NDArray[np.float64]) -> Rotation:
-    """Of a quaternion; NaN of one that is none, which no frame may depend on."""
+    """The rotation of a quaternion; NaN where it is not one, so that no frame can use it."""
     from scipy.spatial.transform import Rotation as ScipyRotation
 
     length = float(np.linalg.norm(xyzw))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibnet.geometry.types import Floats
 
 MOMENTS = 40
-"""Of a bag, by default: more frames of one drive tell little more."""
+"""Frames taken from a bag by default: more of one drive tell little more."""
 SHORTEST_S = 1.0
 """From one to the next."""
 TRIED = 3

@@ -15,7 +15,7 @@ from calibnet.errors import DatasetError
 from calibnet.runtime.reading import MEGABYTE, require_file
 
 METADATA_BYTES = 16 * MEGABYTE
-"""Of a ROS 2 bag's metadata.yaml."""
+"""Largest metadata.yaml of a ROS 2 bag."""
 
 
 class Topic(NamedTuple):

@@ -10,12 +10,12 @@ from collections.abc import Callable
 from typing import Any
 
 LARGEST_BYTES = 512 << 20
-"""Of an unpacked chunk or message; recorders begin a new chunk after a few megabytes."""
+"""Largest unpacked chunk or message; recorders begin a new chunk after a few megabytes."""
 STEP_BYTES = 16 << 20
 MOST_TIMES = 100
 """What a whole packed file may grow by, beyond `LARGEST_BYTES`; pictures and scans shrink to a third or so."""
 RESERVE_BYTES = 1 << 30
-"""Of the disk for temporary files, which whole files are unpacked to."""
+"""Room that is left on the disk of temporary files, to which whole bags are unpacked."""
 
 
 def bound_unpacking() -> None:

@@ -17,7 +17,7 @@ COEFFICIENTS = r"distortioncoeff(icient)?s?|distcoeffs?|distortion|d|d1|dist"
 MODEL = r"distortionmodel|lensmodel|cameramodel"
 WIDTH, HEIGHT, SIZE = r"(image|img|frame)?width", r"(image|img|frame)?height", r"(image|img|frame)size|resolution"
 LIDAR_FROM_CAMERA = "CameraExtrinsicMat"
-"""Of Autoware.AI's calibration tool, which also writes ``CameraMat``, ``DistCoeff`` and ``ImageSize``."""
+"""Key of Autoware.AI's calibration tool, which also writes ``CameraMat``, ``DistCoeff`` and ``ImageSize``."""
 
 
 def is_known(content: Any, of_opencv: bool) -> bool:

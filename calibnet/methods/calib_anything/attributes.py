@@ -22,7 +22,7 @@ PLANES, PLANE_M, PLANE_SHARE = 3, 0.15, 0.08
 """Most planes that are cut out (the ground, walls), how far off them their points may be, and the share of the scan
 that has to lie on one."""
 CLUSTER_M, PIECE_M, CLUSTER_FEWEST = 0.8, 1.6, 8
-"""Between neighbours of one segment, and between those of one piece of a plane; the fewest of them."""
+"""Largest distance of neighbours in a cluster, and in a piece of a plane; the fewest points of a cluster."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Attributes:
 
 
 def attributes(scan: NDArray[np.float32], seed: int = 0) -> Attributes:
-    """Of the points of a scan ``[N, 4]``.
+    """The attributes of the points of a scan ``[N, 4]``.
 
     The paper cuts planes out of the scan and clusters what is left; so does this. With the fewer points that are
     searched with, clusters are wide.

@@ -17,10 +17,10 @@ NEAREST_M = 0.5
 FEWEST = 5
 """Points in a mask below which it tells nothing."""
 FEWEST_POINTS = 200
-"""In the picture at the guess."""
+"""Fewest points in the picture at the guess."""
 WEIGHTS = {"reflectance": 0.35, "normals": 0.3, "segments": 0.35}
-"""Of the three in a mask's score. The paper leaves them open: reflectance and segments change at the edges of things,
-normals also within them."""
+"""Weights of the three attributes in a mask's score. The paper leaves them open: reflectance and segments change at the
+edges of things, normals also within them."""
 
 
 class Consistency:

@@ -14,11 +14,11 @@ from calibnet.errors import ConfigError
 from calibnet.geometry import PinholeCamera
 
 SCALE, SMALLEST, BLUR = 150.0, 120, 0.8
-"""Of the segmentation: how readily regions grow, the fewest pixels of one, and how much the picture is blurred."""
+"""Parameters of the segmentation: scale (larger regions), fewest pixels of a region, and blur."""
 MOST_MASKS = 2000
 """Files read for a picture."""
 LARGEST_SHARE = 0.5
-"""Of the picture; what covers more tells nothing: it is the sky, or everything."""
+"""Largest share of the picture that a mask may cover: a larger one is the sky, or everything."""
 NONE = -1
 
 Labels = NDArray[np.int64]

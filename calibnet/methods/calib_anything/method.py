@@ -23,8 +23,8 @@ from calibnet.trace import CascadeTrace, StageTrace
 HEIGHT, WIDTH = 256, 832
 """The picture is resized to the area of so many pixels, its aspect kept."""
 ROUNDS = ((1.0, 0.0, 300), (0.5, 0.5, 200), (0.25, 0.25, 200), (0.1, 0.15, 200), (0.04, 0.06, 150))
-"""Of the search: shares of the range's angles and offsets within which is drawn, and how often. The paper begins with
-the rotation alone, then searches all six at random; how far and how often is ours."""
+"""Rounds of the search: shares of the range's angles and of its offsets within which poses are drawn, and how many. The
+paper begins with the rotation alone, then searches all six at random; how far and how often is ours."""
 SEED = 0
 
 

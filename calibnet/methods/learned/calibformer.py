@@ -27,7 +27,7 @@ from calibnet.network.target import Target
 
 FEATURES = 128
 HEADS = 8
-"""Of the correlation, and of the attention."""
+"""Heads of the correlation and of the attention."""
 RADIUS = 4
 WIDTH = 256
 ENCODER, DECODER = 4, 2

@@ -11,7 +11,7 @@ from calibnet.network.batch import NetworkInputs
 
 
 def multiply_adds(network: MethodNetwork) -> int:
-    """Of its convolutions and matrix products, for one look at one frame.
+    """Multiply-adds of a network's convolutions and matrix products, for one look at one frame.
 
     A network like it is run as in training: PyTorch counts nothing of the form that attention has in inference alone.
     """

@@ -70,7 +70,7 @@ class LCCNet(MethodNetwork):
         return MethodOutput(scaled_pose(translation, rotation, self.range), regressed, shown)
 
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
-        """Half the pose's error, half the distance of the points."""
+        """The paper's loss: the error of the pose and the distance of the points, half each."""
         estimate, truth = output.correction, target.correction
         share = 1 - POINTS
         return told(

@@ -23,7 +23,7 @@ MOST_STEPS = 20
 STILL = 1e-6
 """Relative gain of the cost below which the search ends."""
 STEP = 1e-6
-"""Of the numerical derivatives, in the units of the parameters: metres, radians, shares, and pixels."""
+"""Step of the numerical derivatives, in the units of the parameters: metres, radians, shares, and pixels."""
 
 
 @dataclass(frozen=True, eq=False)

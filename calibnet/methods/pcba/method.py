@@ -25,14 +25,14 @@ from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import CANNOT_TELL, BadFrame, Verdict, moved
 
 MOST_FRAMES = 24
-"""Of a drive, from its beginning; one after the other, for points are followed through them."""
+"""Most frames of a drive, from its beginning: successive ones, since points are tracked through them."""
 LEAST_MOTION_M = 2.0
 """That the car has to drive: from one place nothing is seen twice from different ones."""
 FEWEST = 60
 """Landmarks on planes, below which nothing is adjusted."""
 MOST_LANDMARKS = 1200
 FARTHEST = 2.0
-"""Of the range, beyond which an answer is none: without any hold an adjustment ends metres away."""
+"""Multiple of the range beyond which a result is refused: an unconstrained adjustment ends metres away."""
 
 
 class Round(NamedTuple):

@@ -15,7 +15,7 @@ from calibnet.geometry.se3 import invert, transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
 
 CORNERS, QUALITY, APART_PX = 500, 0.01, 12
-"""Of a frame: most corners, least strength relative to the strongest, and how far they stand apart."""
+"""Corners of a frame: the most, least strength relative to the strongest, and how far they stand apart."""
 LONGEST, SHORTEST = 6, 3
 """Frames that a point is followed through, and the fewest."""
 WINDOW_PX, LEVELS = 21, 3

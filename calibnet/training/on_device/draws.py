@@ -203,7 +203,7 @@ class DrawnSamples(Dataset[Draw]):
         points: Sequence[int],
         first: Sequence[int],
     ) -> None:
-        """Of frames whose cameras, extrinsics and numbers of points are these; ``first`` is each source's first."""
+        """Draw for these frames, given by camera, extrinsic and number of points; ``first`` is each source's first."""
         self.samples, self.cameras, self.extrinsics = samples, list(cameras), list(extrinsics)
         self.points, self.first = list(points), list(first)
 

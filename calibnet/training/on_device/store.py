@@ -18,7 +18,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.training.data import Source
 
 LARGEST_BYTES = 16 << 30
-"""Of all frames together, as they lie on the device."""
+"""Largest size of all frames together on the device."""
 
 
 @dataclass(frozen=True)

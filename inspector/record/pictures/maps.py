@@ -14,9 +14,9 @@ from calibnet.trace import ScaleTrace
 from inspector import colors
 
 OPACITY = 0.62
-"""Of a cell that holds a point."""
+"""Opacity of a cell that holds a point."""
 TEMPERATURE = 14.0
-"""By which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
+"""Factor by which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
 
 
 def flow_image(
@@ -43,7 +43,7 @@ def share_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr.Enc
 
 
 def _image(picture: NDArray[np.uint8], seen: NDArray[np.bool_]) -> rr.EncodedImage:
-    """As PNG, a third of the bytes. The viewer heeds pixels' opacity only in images that are not opaque as a whole."""
+    """The picture as PNG, a third of the bytes; the viewer heeds alpha only where the image's opacity is below 1."""
     done, encoded = cv2.imencode(".png", np.dstack([picture[..., ::-1], 255 * seen.astype(np.uint8)]))
     assert done, "maps are small"
     return rr.EncodedImage(contents=encoded.tobytes(), media_type="image/png", opacity=OPACITY)

@@ -13,7 +13,7 @@ from inspector.record.pictures.channel_grid import palette_png, slice_grid
 INSET = 0.15
 """How far a frame lies within another of the same tile, in heights of the tile."""
 BRIGHTEST_PERCENTILE = 90.0
-"""Of the cells' peak probabilities: what is as probable is drawn brightest."""
+"""Percentile of the cells' peak probabilities that is drawn brightest."""
 
 
 def slices_picture(scale: ScaleTrace) -> rr.EncodedImage:

@@ -29,17 +29,17 @@ from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 NAME = "Whole drive as one"
 
 PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
-"""Of the extrinsic, in the camera frame, with the unit of their curves."""
+"""Parameters of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
 LEGEND_CURVES = "legend/drive"
 """The names of the curves in their colours."""
 CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT}
-"""Of every parameter, with their colours."""
+"""Curves of every parameter, with their colours."""
 
 
 NOT_YET = "# Not solved yet\n\nThe whole drive is solved as one when the last of its frames is calibrated."
 TEXT_SHARE = 0.24
-"""Of the tab's width that it takes."""
+"""Share of the tab's width that the text takes."""
 
 
 def parameter(name: str) -> str:

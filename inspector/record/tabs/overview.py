@@ -36,7 +36,7 @@ from inspector.record.tabs.views import (
 NAME = "Overview"
 
 LARGE_SHARE = 0.62
-"""Of the tab's width that the large picture takes."""
+"""Share of the tab's width that the large picture takes."""
 LARGEST_OVERLAY, LARGEST_SMALL = 600.0, 250.0
 """Heights in pixels beyond which what else is in their column would have too little room."""
 _SMALL = (entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_REFERENCE)
@@ -57,7 +57,7 @@ def fit_stage(number: int) -> str:
 
 
 def wanted(layout: Layout) -> bool:
-    """In every recording."""
+    """Every recording has data for it."""
     return True
 
 
@@ -116,7 +116,7 @@ def _pictures(layout: Layout) -> dict[str, str]:
 
 
 def _height(layout: Layout, share: float) -> float:
-    """Of a picture with its caption that takes this share of the screen's width, in pixels."""
+    """Height in pixels of a picture with its caption that takes ``share`` of the screen's width."""
     width, height = layout.image
     return share * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
 

@@ -14,7 +14,7 @@ SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
 """Pixels that tabs are laid out for."""
 LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
 LEGEND_SHARE = 0.06
-"""Of a page's height that its legend takes."""
+"""Share of a page's height that its legend takes."""
 DIMMED = 0.65
 """Opacity of the image under points, so that these stand out."""
 COLORED_BY = {

@@ -30,13 +30,13 @@ CURVES = {
     "upper": ("+1σ", colors.LIMIT, 1.0),
     "lower": ("-1σ", colors.LIMIT, 1.0),
 }
-"""Of every axis: its name, colour and width."""
+"""Curves of every axis: name, colour and width."""
 CHANGE = "change"
 """Mark of an axis at frames where the mount has moved."""
 MARK_SIZE = 6.0
 NOT_YET = "# Not looked at yet\n\nWhether the mount moved is told when the whole drive is solved."
 TEXT_SHARE = 0.24
-"""Of the tab's width that it takes."""
+"""Share of the tab's width that the text takes."""
 
 
 def curve(axis: str, kind: str) -> str:
