@@ -1,7 +1,8 @@
-"""What the cascade tells about itself: every picture, curve and table is made from these types.
+"""The record of a run: what the cascade, or another method, did to a frame or to a drive.
 
-Arrays are NumPy, so that readers need no torch. Pixels are those of a stage's input camera
-(`StageTrace.camera`), whose image is the frame's, resized, and turned upright before where the camera is not.
+Recordings, reports and tables are made from these types alone. Arrays are NumPy, so that readers need no torch. Pixels
+are those of a stage's input camera (`StageTrace.camera`); its image is the frame's, turned upright where the camera is
+rolled, and resized.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform, Vec
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 
 MARGIN = 1.2
-"""How far a calibration may end from its start, relative to the range that was searched, to be believed."""
+"""How far a calibration may end from its initial extrinsic, relative to the range searched, to be believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +66,13 @@ class StageDetail:
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Where one look finds the scan in the picture: the occupied cells of its finest scale, row by row.
+    """Where one look finds the LiDAR points in the image: the occupied cells of its finest scale, row by row.
 
     Attributes:
         points: ``[N, 3]`` float32 metres, the nearest point of each cell in the camera frame before the correction.
         displacement: ``[N, 2]`` float32 pixels ``(dx, dy)`` of the stage's camera, from where a point is projected to
             where it is found.
-        scale: ``[N, 2]`` float32, what absolute error the network expects of each.
+        scale: ``[N, 2]`` float32 pixels, the absolute error that the network expects of each.
     """
 
     points: NDArray[np.float32] = field(repr=False)
@@ -93,14 +94,14 @@ class StageTrace:
         milliseconds: wall time by part, for instance ``{"projection": 2.1, "cost_volumes": 3.0}``.
         information: ``[6, 6]`` inverse covariance of the correction's ``(translation m, rotation rad)`` as the
             network states it, or None from a head that does not.
-        detail: intermediate results of its first round, or None when they were not asked for.
-        match_error_px: what error the network expects of its matches in its last round, in pixels of ``camera``.
-        matches: of its last look, relative to `looked_from`; None where a trace was made without.
+        detail: intermediate results of its first look, or None when they were not asked for.
+        match_error_px: the error that the network expects of its matches in its last look, in pixels of ``camera``.
+        matches: of its last look, relative to `looked_from`; None from a method without matches.
         last_before: ``camera_from_lidar`` that its last look started from; None where that is ``before``.
-        upright: ``[3, 3]``, ``camera`` from the frame's camera, where the picture was turned upright; None where it
-            was not. `detail` and `matches` are of the turned picture, all extrinsics of the frame's own camera.
-        exhibits: what else a method has to show of it; empty when that was not asked for.
-        curves: of its search, likewise.
+        upright: ``[3, 3]``, rotation to ``camera`` from the frame's camera, where the image was turned upright; None
+            where it was not. `detail` and `matches` are of the turned image, all extrinsics of the frame's own camera.
+        exhibits: pictures that a method shows of its work; empty when they were not asked for.
+        curves: numbers over the steps of its search, likewise.
     """
 
     number: int
@@ -125,7 +126,7 @@ class StageTrace:
         return self.before if self.last_before is None else self.last_before
 
     def followed_by(self, again: StageTrace) -> StageTrace:
-        """This and a second round of the same stage as one; the detail stays that of the first look."""
+        """This and a further look of the same stage as one trace; the detail stays that of the first look."""
         parts = dict.fromkeys([*self.milliseconds, *again.milliseconds])  # in their order
         return replace(
             self,
@@ -147,11 +148,11 @@ class CascadeTrace:
         initial: ``camera_from_lidar`` the run started from, 4x4.
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (preparation, resizing, image features).
-        wider: stages of wider ranges that ran before them, because a first try left the range it searched.
-        again: one more look of the last stage from where the run arrived, which tells most about the result; it is not
-            applied. None where the rest speaks against the result already, or too few points are in the picture there.
+        wider: stages of wider ranges that ran before them, because a first run left the range it searched.
+        again: one more look of the last stage, from where the run arrived: it is not applied, and is what the verdict
+            is told by most. None where the result is rejected anyhow, or too few points are in the image there.
         verdict: whether the result is good; None from a method that does not say.
-        match_error_limit_px: what the last stage may expect its matches to be off, in pixels of its ``camera``.
+        match_error_limit_px: largest match error of the last stage that is believed, in pixels of its ``camera``.
         method: name of the method whose run it is; empty for the cascade.
     """
 
@@ -176,12 +177,12 @@ class CascadeTrace:
 
     @property
     def fits(self) -> bool:
-        """Whether picture and scan fit together there; true where the last stage cannot tell."""
+        """Whether image and scan fit together under `arrived`; true where the last stage states no match error."""
         return not self.stages or not self.stages[-1].match_error_px > self.match_error_limit_px
 
     @property
     def rejected(self) -> bool:
-        """Whether what the stages found is taken to be wrong."""
+        """Whether the verdict on what the stages found is *rejected*."""
         return self.verdict is not None and self.verdict.word == REJECTED
 
     @property
@@ -196,9 +197,9 @@ class Estimate:
 
     Attributes:
         camera_from_lidar: 4x4.
-        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, a perturbation in the camera frame: of networks
-            alone as they state it, widened until it explains how far the frames scatter; where edges were
-            aligned, with what the networks get wrong in all frames alike, as far as the pictures leave it open.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, a perturbation in the camera frame. Of networks
+            alone it is the one they state, scaled to the scatter of the frames; where edges were aligned, it includes
+            the common error of the networks as far as the edges leave it open.
         frames: that went into it.
     """
 
@@ -208,26 +209,26 @@ class Estimate:
 
     @property
     def rotation_deg(self) -> float:
-        """Standard deviation of the rotation: the root of the summed variances of its axes."""
+        """Standard deviation of the rotation in degrees: the root of the summed variances of its axes."""
         return float(np.degrees(np.sqrt(np.trace(self.covariance[3:, 3:]))))
 
     @property
     def translation_cm(self) -> float:
-        """Standard deviation of the translation, likewise."""
+        """Standard deviation of the translation in centimetres, likewise."""
         return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
 
 
 @dataclass(frozen=True, eq=False)
 class DriveLook:
-    """What one frame of a drive says in the last look, which all frames take from the same extrinsic.
+    """What one frame of a drive says in the last look, which starts from the same extrinsic for all frames.
 
     Attributes:
         frame: its index.
         position: its position in the drive.
         offset: ``[6]``, ``(translation m, rotation rad)`` from there to where it believes the extrinsic to be.
         information: ``[6, 6]`` of it as the network states it, or None.
-        match_error_px: what error it expects of its matches.
-        misfit: what their residuals cost, see `calibnet.judging.witnesses.misfit`.
+        match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
+        misfit: mean cost of their residuals, see `calibnet.judging.witnesses.misfit`.
         bent_misfit: the same with whichever other lens explains them best.
     """
 
@@ -249,13 +250,13 @@ class DriveEstimate(Estimate):
             sequence; the last one is the estimate.
         skipped: frames that could not be read, or calibrated in the last look.
         verdict: whether the estimate is good; None from a method that does not say.
-        networks: what the networks alone said, where edges were aligned after them; its covariance knows only how far
-            frames scatter, not what all of them get wrong. None where nothing was aligned: it would be the estimate.
-        free: what the frames say without what is known beforehand of the extrinsic; None where nothing is.
+        networks: the estimate of the networks alone, where edges were aligned after them; its covariance has the
+            scatter of the frames, not their common error. None where nothing was aligned: it would be the estimate.
+        free: the estimate without what is known beforehand of the extrinsic; None where nothing is.
         looks: what each frame says by itself, relative to ``looked_from``.
         looked_from: ``camera_from_lidar`` that the last look started from; None from a method without looks.
-        traces: of the frames by their index, from a method that tells something of whole drives alone: each goes from
-            the drive's start to its estimate, with what is to be shown of the frame.
+        traces: of the frames by their index, from a method that calibrates whole drives only: each goes from the
+            drive's initial extrinsic to its estimate, with what is to be shown of the frame.
     """
 
     history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())

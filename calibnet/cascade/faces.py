@@ -1,7 +1,7 @@
-"""What a stage sees through the faces of a wide lens, as one look: their normal equations add up.
+"""The looks of a stage through the faces of a wide lens, joined to one look by adding their normal equations.
 
-The faces are pinhole cameras in one place, so that they are a rig whose pose is the camera's (`calibnet.drive.rig`):
-what one of them cannot see, the way it looks, is across the picture of another.
+The faces are pinhole cameras in one place, a rigid rig whose pose is the camera's (`calibnet.drive.rig`): a motion
+along the optical axis of one, which it determines badly, moves the points across the image of another.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from calibnet.trace import StageTrace
 
 
 def seen_by_camera(look: StageTrace, face_from_camera: Rotation) -> StageTrace:
-    """A look through a face as one of the camera: its extrinsics, correction and information, not its matches."""
+    """A look through a face with extrinsics, correction and information of the camera; matches stay the face's."""
     back, axes = transform(face_from_camera.T, np.zeros(3)), np.kron(np.eye(2), face_from_camera)
     return replace(
         look,
@@ -34,14 +34,15 @@ def seen_by_camera(look: StageTrace, face_from_camera: Rotation) -> StageTrace:
 
 
 def joined(looks: Sequence[StageTrace], limit_px: float) -> StageTrace:
-    """Looks of one stage through faces, all as `seen_by_camera`, as one.
+    """Join looks of one stage through faces, all as `seen_by_camera` gives them, to one.
 
-    Each counts as firmly as results of such looks are found to be right, which is less than their networks state. A
-    face that shows another thing than the scan, as the bonnet, is left out where another one fits.
+    Each is weighted by the covariance that results of such looks were measured to have, which is larger than the one
+    their networks state. A face that does not fit the scan, such as one filled by the bonnet, is left out where another
+    one fits.
 
     Args:
-        looks: at least one; camera, details and matches are those of the first that counts.
-        limit_px: the match error that a look may expect to be believed.
+        looks: at least one; camera, details and matches are those of the first that is used.
+        limit_px: largest match error at which a look is believed.
     """
     fitting = [look for look in looks if not look.match_error_px > limit_px] or list(looks)
     first = fitting[0]
@@ -66,7 +67,7 @@ def joined(looks: Sequence[StageTrace], limit_px: float) -> StageTrace:
 
 
 def _firmness(look: StageTrace) -> np.ndarray:
-    """Information ``[6, 6]`` of a look as its results are found to be right."""
+    """Information ``[6, 6]`` of a look, by the covariance that such results were measured to have."""
     if look.information is None:
         return np.eye(6)
     return inverse(Spread().covariance(look.information, look.range, look.range, look.match_error_px))

@@ -1,4 +1,4 @@
-"""Frames as networks have learnt to see them: with one scan, and a picture that stands upright."""
+"""Frames as the networks were trained on them: one scan each, and an upright image."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from calibnet.geometry.visibility import as_one_scan
 
 
 def prepared(frame: Frame, upright: Upright) -> Frame:
-    """The frame, turned as `upright` says, and of a cloud of several scans what one would have; else the very same."""
+    """The frame turned upright, its cloud reduced to one scan where it holds several; otherwise the frame itself."""
     if remark := several(frame.points):
         known = any(other.name == remark.name for other in frame.remarks)  # to whoever read the frame
         remarks = frame.remarks if known else (*frame.remarks, remark)

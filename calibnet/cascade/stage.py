@@ -35,9 +35,9 @@ FEWEST_CELLS = 20
 
 
 class View(NamedTuple):
-    """A frame's image at the size a stage wants, ``[1, 3, H, W]``, and what its image branch makes of it.
+    """A frame's image at a stage's input size, ``[1, 3, H, W]``, and the features of its image branch.
 
-    Of a wide lens that of each face instead; its own are those of the first.
+    Of a wide lens, ``faces`` has a view of each face, and image and features are those of the first.
     """
 
     image: Tensor
@@ -54,7 +54,7 @@ class Stage:
         range: what the network was trained for.
         network: in evaluation mode.
         settings: image size, looks and gain.
-        match_error_limit_px: what error the stage may expect of its matches, in pixels of its image, to be believed.
+        match_error_limit_px: largest match error at which the stage is believed, in pixels of its image.
     """
 
     number: int
@@ -207,9 +207,10 @@ class Stage:
 
 
 def with_prior(look: StageTrace, pose_prior: PosePrior) -> StageTrace:
-    """A look as what is known of the extrinsic leaves it; its information stays what the network states.
+    """A look whose correction is fused with the user's prior; its information stays what the network states.
 
-    The network is believed as far as its results are found to be right, which is less than it states.
+    The network's correction is weighted by the covariance that its results were measured to have (`Spread`), which is
+    larger than the one it states.
     """
     firm = None
     if look.information is not None:

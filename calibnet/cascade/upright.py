@@ -1,8 +1,8 @@
-"""Cameras that are mounted on their side, on their head or at any roll: their picture is turned upright first.
+"""Turning the image upright where the camera is mounted on its side, upside down or at any other roll.
 
-The networks have learnt from upright pictures. A roll that is known is none of their business: the guess of the
-extrinsic tells it, since the LiDAR's z axis points up. The picture is turned about its principal point, which moves no
-parallax, so that the turned camera is as exact as the real one; and what the stages find is turned back.
+The networks were trained on upright images. The initial extrinsic tells the roll, since the LiDAR's z axis points up.
+The image is turned about its principal point, a pure rotation of the camera, so that nothing is lost by it; results of
+the stages are turned back.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from calibnet.verdict import Verdict
 AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
 
 TOLERATED_DEG = 8.0
-"""Roll up to which nothing is resampled: training had as much, and a picture that is turned loses its corners."""
+"""Roll in degrees up to which nothing is resampled: training had as much, and turning an image loses its corners."""
 BEYOND_RANGE_DEG = 3.0
-"""Roll beyond the range searched from which on it is the mount's: less may be what the guess gets wrong."""
+"""Degrees by which a roll must exceed the range searched to be the mount's and not an error of the guess."""
 LEVEL = 0.5
-"""Length, seen by the camera, of an upward unit vector below which the camera looks up or down and has no roll."""
+"""Length in the image plane of an upward unit vector, below which the camera looks up or down and has no roll."""
 QUARTER = np.pi / 2
 QUARTER_TURN: Rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FILLED = 1 / 3

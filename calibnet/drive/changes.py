@@ -1,9 +1,9 @@
-"""Did the mount move during a drive? Where what single frames say changes, by how much, and how sure that is.
+"""Change-point detection on what single frames of a drive say: where the mount moved, by how much, and how surely.
 
-What frames say (`calibnet.trace.DriveLook`) scatters, and neighbours err alike, as they see the same things. So noise
-is measured twice: from frame to frame, and over blocks, whose means scatter more than those of independent errors.
-Changes are found by the segmentation of least squared error with a price for each change (PELT, of the library
-ruptures), or by a slope where that explains more, and then tested by themselves.
+What frames say (`calibnet.trace.DriveLook`) scatters, and the errors of neighbouring frames are correlated, since they
+see the same things. So noise is measured twice: from frame to frame, and over blocks, whose means scatter more than
+those of independent errors. Changes are found by penalised least-squares segmentation (PELT, of the library ruptures),
+or by a slope where that explains more; each is then tested for significance.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""What the frames of a drive agree on: the mount is the same in all of them, so they are solved together.
+"""The extrinsic that the frames of a drive agree on: they share one mount, so they are solved together.
 
-Every frame says with its normal equations where it believes the extrinsic to be and how firmly. Their
-sum, each frame weighted by how well it agrees with the others, is the estimate of all; how far they
-scatter around it is its uncertainty. A frame leaves 42 numbers behind, so memory does not grow with
-images or scans. What the networks get wrong in all frames alike, the edges of some frames tell
+Every frame contributes normal equations: a correction and its information matrix. Their sum, with robust weights
+(Cauchy) for frames that disagree with the others, gives the estimate; the scatter of the frames about it scales its
+covariance. Of each frame 42 numbers are kept, so memory does not grow with images or scans. Errors that the networks
+make in all frames alike are not averaged out by this; aligning edges of some frames corrects them
 (`calibnet.alignment`).
 """
 
@@ -20,12 +20,12 @@ from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vecto
 from calibnet.trace import Estimate
 
 OUTLIER = 3.0
-"""A frame so many times farther off than the median one counts half as much (Cauchy weights)."""
+"""Distance, relative to the median frame's, at which a frame's weight is one half (Cauchy weights)."""
 FIRM = 1000.0
-"""Information of a frame whose network states none, relative to the prior's: the estimate is the frames' mean then,
-and the prior, which would draw it to the start, does not count."""
+"""Information of a frame whose network states none, relative to that of the range: so large that the estimate is the
+mean of the frames, and is not drawn to the initial extrinsic."""
 FARTHEST_TRANSLATION_M, FARTHEST_ROTATION_DEG = 0.3, 0.6
-"""Standard deviations of what the frames agree on, over all axes, beyond which edges would pull onto a neighbour."""
+"""Standard deviations of the estimate, over all axes, beyond which edges would be aligned with wrong ones nearby."""
 REWEIGHTINGS = 10
 """Iterations of the reweighting; weights settle after three or four."""
 
@@ -47,7 +47,8 @@ class Consensus:
             range_information: inverse covariance of the range the stage was trained for. Every frame's information
                 contains it; the estimate counts it once.
             pose_prior: what is known of the extrinsic beforehand, counted once as well.
-            common_error: covariance of what the networks get wrong in all frames alike, against which that is weighed.
+            common_error: covariance of what the networks get wrong in all frames alike; added to that of the frames
+                where they are weighed against the prior.
         """
         self.before, self.range_information, self.pose_prior = before, range_information, pose_prior
         self.common_error = np.zeros((6, 6)) if common_error is None else common_error
@@ -63,7 +64,7 @@ class Consensus:
         self._informations.append(FIRM * self.range_information if information is None else information)
 
     def estimate(self) -> Estimate:
-        """What the frames so far agree on, and what is known beforehand.
+        """The estimate from the frames so far and from what is known beforehand.
 
         Raises:
             ValueError: there are none.
@@ -74,7 +75,7 @@ class Consensus:
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
     def free_estimate(self) -> Estimate:
-        """What the frames agree on, without what is known beforehand."""
+        """The estimate from the frames alone, without what is known beforehand."""
         mean, covariance = self.agreed()
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
@@ -96,10 +97,10 @@ class Consensus:
         return mean, covariance
 
     def aligned(self, evidence: Sequence[Evidence], common_error: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
-        """What the frames and the evidence of some of them agree on.
+        """The estimate from the frames and the evidence of some of them, their edges and reflectance.
 
-        The covariance counts what the networks get wrong in all frames alike, too, as far as the evidence leaves it
-        open. Frames that scatter farther than edges pull are not aligned.
+        Its covariance includes the common error of the networks, as far as the evidence does not determine it. Frames
+        that scatter farther than edges can be matched are not aligned.
 
         Args:
             evidence: of any of the frames, gathered under ``before``.

@@ -1,9 +1,9 @@
-"""One pose of a rig of several cameras, which are known relative to each other: what is blind to one, another sees.
+"""One pose of a rig of several cameras whose poses relative to each other are known.
 
-Every camera's frames agree on a correction of that camera, as those of a drive do. What they agree on, with its
-uncertainty and with what the networks get wrong in all frames of one camera alike, is one measurement of the rig's
-pose (`calibnet.drive.rig_pose`); their normal equations add up in the rig's frame. Edges of all cameras are aligned by
-that one pose in the end.
+What one camera determines badly, such as the way ahead, another one that looks to the side determines well. The frames
+of each camera are solved together as those of a drive are. The result, with its covariance and the common error of the
+networks, is one measurement of the rig's pose (`calibnet.drive.rig_pose`); the cameras' normal equations are added in
+the rig's frame. In the end edges of all cameras are aligned by that one pose.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from calibnet.datasets.rig import RigCamera
 from calibnet.datasets.selection import spread
 from calibnet.drive.consensus import FARTHEST_ROTATION_DEG, FARTHEST_TRANSLATION_M, Consensus
 from calibnet.drive.convergence import Due
-from calibnet.drive.rig_pose import Said, joined
-from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, Looking, agree, said
+from calibnet.drive.rig_pose import CameraConsensus, rig_correction
+from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, DriveStage, agree, drive_look
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
 from calibnet.geometry.prior import PosePrior
@@ -69,7 +69,7 @@ class RigEstimate(DriveEstimate):
 
 
 def solve_rig(
-    stages: Sequence[Looking],
+    stages: Sequence[DriveStage],
     cameras: Sequence[RigCamera],
     initial: Extrinsic,
     common_error: Matrix6,
@@ -102,9 +102,9 @@ def solve_rig(
     rig = initial
     places = {camera.name: camera.camera_from_rig for camera in cameras}
 
-    def look(stage: Looking, positions: list[list[int]], last: bool) -> list[Said]:
-        """What the frames of each camera say, of those that have any that can be used."""
-        found = list[Said]()
+    def look(stage: DriveStage, positions: list[list[int]], last: bool) -> list[CameraConsensus]:
+        """What the frames of each camera agree on, without cameras of which no frame can be used."""
+        found = list[CameraConsensus]()
         failure: CalibnetError | None = None
         for camera, chosen in zip(cameras, positions, strict=True):
             place = places[camera.name]
@@ -125,7 +125,7 @@ def solve_rig(
                 place: Transform = place,
                 due: Due = to_align,
             ) -> None:
-                one = said(frame, position, trace)
+                one = drive_look(frame, position, trace)
                 of_camera[camera.name].append(one)
                 looks.append(in_rig(one, place))
                 if aligns and due.reached(position):
@@ -138,7 +138,7 @@ def solve_rig(
             except (CalibrationError, DatasetError) as error:
                 failure = error
                 continue
-            found.append(Said.of(camera, consensus, common_error))
+            found.append(CameraConsensus.of(camera, consensus, common_error))
         if failure is not None and not found:
             raise failure
         return found
@@ -146,15 +146,15 @@ def solve_rig(
     aligns = is_finest(stages[-1].range)
     for stage in stages:
         for _ in range(LOOKS):
-            told = look(stage, some, last=False)
-            rig = pose_from_vector(joined(told, rig, pose_prior, tolerance)[0]) @ rig
-            places |= {one.camera.name: one.placed(rig, tolerance) for one in told}
-    told = look(stages[-1], everything, last=True)
-    mean, covariance = joined(told, rig, pose_prior, tolerance)
+            agreed = look(stage, some, last=False)
+            rig = pose_from_vector(rig_correction(agreed, rig, pose_prior, tolerance)[0]) @ rig
+            places |= {one.camera.name: one.placed(rig, tolerance) for one in agreed}
+    agreed = look(stages[-1], everything, last=True)
+    mean, covariance = rig_correction(agreed, rig, pose_prior, tolerance)
     of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
     opened = None
     if pose_prior is not None:
-        free, spread_of_free = joined(told, rig, None, tolerance)
+        free, spread_of_free = rig_correction(agreed, rig, None, tolerance)
         opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(looks))
     if aligns:
         too_far = (
@@ -175,12 +175,12 @@ def solve_rig(
         looks=tuple(looks),
         looked_from=rig,
         free=opened,
-        cameras=tuple(_of_cameras(cameras, told, found, of_camera, tolerance)),
+        cameras=tuple(_of_cameras(cameras, agreed, found, of_camera, tolerance)),
     )
 
 
 def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:
-    """What a camera's look says, of the rig that it is on."""
+    """A camera's look as one of the rig that it is on."""
     offset = pose_vector(invert(camera_from_rig) @ pose_from_vector(look.offset) @ camera_from_rig)
     to_camera = adjoint(camera_from_rig)
     information = None if look.information is None else to_camera.T @ look.information @ to_camera
@@ -189,15 +189,15 @@ def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:
 
 def _of_cameras(
     cameras: Sequence[RigCamera],
-    told: Sequence[Said],
+    agreed: Sequence[CameraConsensus],
     rig: Estimate,
     looks: dict[str, list[DriveLook]],
     tolerance: Matrix6 | None,
 ) -> Iterator[CameraEstimate]:
     """What was found of each camera."""
-    said_by = {one.camera.name: one for one in told}
+    by_name = {one.camera.name: one for one in agreed}
     for camera in cameras:
-        one = said_by.get(camera.name)
+        one = by_name.get(camera.name)
         if one is None:
             to_camera, wide = adjoint(camera.camera_from_rig), 0.0 if tolerance is None else tolerance
             there = camera.camera_from_rig @ rig.camera_from_lidar

@@ -1,9 +1,9 @@
 """The pose of a rig that its cameras agree on, and where each camera is on it.
 
-A camera's frames say where that camera is. If it is known exactly relative to the rig, that is a measurement of the
-rig's pose; if it is known within a tolerance, it is one that is less sure by as much, and the camera itself ends
-between what it says and where the rig wants it. The tolerance 0 is the rigid rig, an endless one each camera on its
-own.
+The frames of a camera measure the pose of that camera. Where the camera's place on the rig is known exactly, this is a
+measurement of the rig's pose; where it is known within a tolerance, the tolerance is added to its covariance, and the
+camera itself ends between its own measurement and its place on the rig. With no tolerance the rig is rigid; with an
+infinite one each camera is calibrated on its own.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
 
 
 @dataclass(frozen=True, eq=False)
-class Said:
-    """What the frames of one camera say together.
+class CameraConsensus:
+    """What the frames of one camera of a rig agree on.
 
     Attributes:
         camera: of the rig, where it is expected on it.
-        camera_from_lidar: 4x4, where they say that it is.
+        camera_from_lidar: 4x4, as its frames have it.
         covariance: ``[6, 6]`` of that, with what the networks get wrong in all its frames alike.
     """
 
@@ -35,13 +35,13 @@ class Said:
     covariance: Matrix6 = field(repr=False)
 
     @classmethod
-    def of(cls, camera: RigCamera, consensus: Consensus, common_error: Matrix6) -> Said:
-        """What frames agree on; ``common_error`` is the covariance of what is wrong in all of them alike."""
+    def of(cls, camera: RigCamera, consensus: Consensus, common_error: Matrix6) -> CameraConsensus:
+        """From a consensus and the covariance of errors that all its frames share."""
         mean, covariance = consensus.agreed()
         return cls(camera, pose_from_vector(mean) @ consensus.before, covariance + common_error)
 
     def off(self, rig: Extrinsic) -> Vector6:
-        """How far the camera is from where it is expected on the rig ``rig_from_lidar``, in its own frame."""
+        """Offset ``[6]`` of the camera from its place on the rig ``rig_from_lidar``, in its own frame."""
         return pose_vector(self.camera_from_lidar @ invert(self.camera.camera_from_rig @ rig))
 
     def placed(self, rig: Extrinsic, tolerance: Matrix6 | None) -> Transform:
@@ -64,19 +64,22 @@ class Said:
         return np.asarray(tolerance @ inverse(tolerance + self.covariance), np.float64)
 
 
-def joined(
-    said: Sequence[Said], rig: Extrinsic, pose_prior: PosePrior | None = None, tolerance: Matrix6 | None = None
+def rig_correction(
+    cameras: Sequence[CameraConsensus],
+    rig: Extrinsic,
+    pose_prior: PosePrior | None = None,
+    tolerance: Matrix6 | None = None,
 ) -> tuple[Vector6, Matrix6]:
     """The correction of a rig's pose that its cameras agree on, and its covariance.
 
     Args:
-        said: by the frames of each camera.
+        cameras: what the frames of each agree on.
         rig: ``rig_from_lidar`` that is corrected.
         pose_prior: what is known of the rig's pose beforehand.
         tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for none at all.
     """
     information, moment = np.zeros((6, 6)), np.zeros(6)
-    for one in said:
+    for one in cameras:
         camera_from_rig = one.camera.camera_from_rig
         to_camera = adjoint(camera_from_rig)
         spread = one.covariance if tolerance is None else one.covariance + tolerance

@@ -1,4 +1,4 @@
-"""One extrinsic from a drive: what the stages make of all frames together, then what their edges say of it."""
+"""One extrinsic from all frames of a drive: first by the stages of the cascade, then by aligning edges."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FRAMES_ALIGNED = 24
 """Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
 
 
-class Looking(Protocol):
+class DriveStage(Protocol):
     """What a drive needs of a `calibnet.cascade.Stage`."""
 
     @property
@@ -52,7 +52,7 @@ class Looking(Protocol):
 
 
 def solve_drive(
-    stages: Sequence[Looking],
+    stages: Sequence[DriveStage],
     frames: Frames,
     initial: Extrinsic,
     common_error: Matrix6,
@@ -61,10 +61,10 @@ def solve_drive(
 ) -> DriveEstimate:
     """Correct the extrinsic that all frames share.
 
-    Each stage corrects what all frames together make of it, and again on the scans projected anew. Until the end some
-    frames from all over the drive are enough; the last look sees them all. What the finest stage leaves is aligned
-    without training (`calibnet.alignment`) on some frames from all over the drive; edges pull no farther than that.
-    One frame is in memory at a time, and 4 MB of each that is aligned.
+    Each stage looks at some frames from all over the drive, their consensus corrects the extrinsic, and this is
+    repeated on the scans projected anew; the last look is at all frames. After the finest stage, edges and reflectance
+    of some frames are aligned (`calibnet.alignment`), which corrects a few pixels at most. One frame is in memory at a
+    time, and 4 MB of each that is aligned.
 
     Args:
         stages: coarse to fine.
@@ -108,7 +108,7 @@ def solve_drive(
     looks = list[DriveLook]()
 
     def taken_in(position: int, frame: Frame, look: StageTrace, consensus: Consensus) -> None:
-        looks.append(said(frame, position, look))
+        looks.append(drive_look(frame, position, look))
         if aligns and to_align.reached(position):
             evidence.append(gather(frame, consensus.before))
         convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
@@ -133,8 +133,8 @@ def solve_drive(
     )
 
 
-def said(frame: Frame, position: int, look: StageTrace) -> DriveLook:
-    """What a look at a frame says."""
+def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
+    """What one look at one frame of a drive says, as the drive keeps it."""
     return DriveLook(
         frame.index,
         position,
@@ -146,7 +146,7 @@ def said(frame: Frame, position: int, look: StageTrace) -> DriveLook:
 
 
 def agree(
-    stage: Looking,
+    stage: DriveStage,
     read: Callable[[int], Frame],
     positions: list[int],
     extrinsic: Extrinsic,
@@ -155,18 +155,18 @@ def agree(
     pose_prior: PosePrior | None = None,
     common_error: Matrix6 | None = None,
 ) -> Consensus:
-    """What one look of a stage at each of some frames of a drive comes to.
+    """The consensus of one look of a stage at each of some frames of a drive.
 
     Args:
         stage: that looks.
         read: gives the frame at a position.
         positions: of the frames.
         extrinsic: under which it looks.
-        taken_in: called after each frame that could be calibrated, with its position, its look and the
+        taken_in: called after each frame that could be calibrated, with its position, the frame, its look and the
             consensus so far.
-        skipped: takes in the frames that could not be read or calibrated.
+        skipped: frames that could not be read or calibrated are appended to it.
         pose_prior: what is known of the extrinsic beforehand.
-        common_error: what that is weighed against, see `Consensus`.
+        common_error: see `Consensus`.
 
     Raises:
         CalibrationError: none of the frames could be calibrated.
@@ -194,7 +194,7 @@ def agree(
 
 
 def believed(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
-    """The look, if picture and scan fit together.
+    """The look, if it expects its matches to fit.
 
     Raises:
         CalibrationError: they do not.

@@ -1,4 +1,4 @@
-"""Watching a drive: what its frames say, also where the mount moves so far that no one extrinsic fits them all."""
+"""Finding moves of the mount during a drive, also such large ones that no single extrinsic fits all frames."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from calibnet.watch import Watched
 FEWEST = 2 * SHORTEST
 """Frames that a drive needs to be watched."""
 TRUSTED = 0.6
-"""Share of the finest stage's range up to which one look from the extrinsic of all frames says how far off one is."""
+"""Share of the finest stage's range up to which one look measures how far a frame is from the drive's extrinsic."""
 BLIND_DEG, BLIND_CM = 1.0, 50.0
-"""A change that cannot be told: if two windows of frames differ by so much by chance (three standard deviations)."""
+"""If two windows of frames differ by so much by chance (three standard deviations), changes cannot be told."""
 
 
 class Part:
@@ -43,7 +43,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedPart:
     """A part, and what its frames agree on."""
 
     part: Part
@@ -133,10 +133,10 @@ def judge_looks(looks: dict[int, DriveLook], count: int, origin: Extrinsic, skip
 
 def solved_parts(
     calibrator: DriveCalibrator, part: Part, initial: Extrinsic, observer: Callable[[int, int], None] | None
-) -> list[Solved]:
+) -> list[SolvedPart]:
     """A drive as one, or its halves where half of its frames or more do not fit together, down to `SHORTEST` frames."""
     try:
-        solved = Solved(part, calibrator.calibrate_drive(part, initial, observer))
+        solved = SolvedPart(part, calibrator.calibrate_drive(part, initial, observer))
         if 2 * solved.estimate.frames > len(part) or len(part) < FEWEST:
             return [solved]
     except (CalibrationError, DatasetError):
@@ -153,7 +153,7 @@ def far_parts(
     looks: dict[int, DriveLook],
     origin: Extrinsic,
     observer: Callable[[int, int], None] | None,
-) -> list[Solved]:
+) -> list[SolvedPart]:
     """Parts between changes that lie far from the extrinsic of all, or do not fit there, solved by themselves.
 
     Args:
@@ -179,7 +179,7 @@ def far_parts(
             continue
         part = Part(frames, start, stop)
         with contextlib.suppress(CalibrationError, DatasetError):  # what fits nowhere stays skipped
-            solved.append(Solved(part, calibrator.calibrate_drive(part, middle @ origin, observer)))
+            solved.append(SolvedPart(part, calibrator.calibrate_drive(part, middle @ origin, observer)))
     return solved
 
 

@@ -19,7 +19,7 @@ from calibnet.geometry.se3 import (
 from calibnet.geometry.types import Matrix6, Transform
 
 SMALLEST_SIGMA = np.float32(1e-4)
-"""Metres or radians: a range of zero is taken as known this well, not beyond doubt."""
+"""Metres or radians: standard deviation of an axis whose range is zero."""
 
 
 @dataclass(frozen=True, order=True)
@@ -75,7 +75,7 @@ RANGES: tuple[MiscalibrationRange, ...] = tuple(
 
 
 def is_finest(range_: MiscalibrationRange) -> bool:
-    """Whether no stage comes after that of ``range_``: only it can judge, and leaves pixels."""
+    """Whether ``range_`` is that of the last stage of the cascade, the only one whose results are judged."""
     return range_ == RANGES[-1]
 
 

@@ -1,9 +1,9 @@
-"""What one scan would have seen of a cloud that several scans were put together to.
+"""Reducing a cloud accumulated from several scans to what a single scan would have seen of it.
 
-Such a cloud shows both sides of things, what is behind them, and everything that moved as often as there were scans:
-nothing that a camera sees from where it stood, or that networks have learnt from single scans. Every scan that looked
-into a direction left about as many points there, so that the depth that most of them agree on is that of something that
-stood still and was in sight; whatever lies before it has come or gone, and what lies behind it was hidden.
+An accumulated cloud shows both sides of things, what is hidden behind them, and everything that moved as often as there
+were scans. A camera sees none of this, and the networks were trained on single scans. Every scan leaves about as many
+points in a direction, so that the depth that most of them agree on is that of something static and visible: points in
+front of it belong to what moved, points behind it were hidden.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from calibnet.alignment.evidence import InRig
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets.rig import RigCamera
 from calibnet.drive.consensus import Consensus
-from calibnet.drive.rig_pose import Said, joined
+from calibnet.drive.rig_pose import CameraConsensus, rig_correction
 from calibnet.geometry import RANGES, invert, miscalibration, pose_error, rotation_from_vector, transform
 from calibnet.geometry.prior import Prior, inverse
 from calibnet.geometry.se3 import adjoint, pose_from_vector, pose_vector
@@ -43,8 +43,8 @@ def saying(
     return consensus
 
 
-def say(cameras: list[RigCamera], agreed: list[Consensus], common: np.ndarray) -> list[Said]:
-    return [Said.of(camera, consensus, common) for camera, consensus in zip(cameras, agreed, strict=True)]
+def say(cameras: list[RigCamera], agreed: list[Consensus], common: np.ndarray) -> list[CameraConsensus]:
+    return [CameraConsensus.of(camera, consensus, common) for camera, consensus in zip(cameras, agreed, strict=True)]
 
 
 def test_what_all_cameras_say_alike_is_the_rig_s_pose():
@@ -52,7 +52,7 @@ def test_what_all_cameras_say_alike_is_the_rig_s_pose():
     cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], SIDE)]
     firm = np.full(6, 1e-4)
     agreed = [saying(camera.camera_from_rig, REFERENCE, truth, firm) for camera in cameras]
-    mean, covariance = joined(say(cameras, agreed, 1e-10 * np.eye(6)), REFERENCE)
+    mean, covariance = rig_correction(say(cameras, agreed, 1e-10 * np.eye(6)), REFERENCE)
     found = pose_from_vector(mean) @ REFERENCE
     error = pose_error(found, truth)
     assert error.rotation_deg < 0.02 and error.translation_cm < 0.1
@@ -66,8 +66,8 @@ def test_one_camera_s_blind_axis_is_another_s_best():
     side = transform(rotation_from_vector([0.0, np.pi / 2, 0.0]), [0.0, 0.0, 0.0])
     cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], side)]
     agreed = [saying(camera.camera_from_rig, REFERENCE, truth, blind_ahead, 0.08) for camera in cameras]
-    alone, _ = joined(say(cameras[:1], agreed[:1], 1e-8 * np.eye(6)), REFERENCE)
-    both, covariance = joined(say(cameras, agreed, 1e-8 * np.eye(6)), REFERENCE)
+    alone, _ = rig_correction(say(cameras[:1], agreed[:1], 1e-8 * np.eye(6)), REFERENCE)
+    both, covariance = rig_correction(say(cameras, agreed, 1e-8 * np.eye(6)), REFERENCE)
     assert alone[2] == pytest.approx(0.13, abs=0.01)
     assert_allclose(both[:3], [0.04, 0.0, 0.05], atol=2e-3)
     assert np.sqrt(covariance[2, 2]) < 0.005
@@ -78,7 +78,7 @@ def test_more_cameras_are_surer():
         RigCamera(str(number), [], transform(rotation_from_vector([0, number, 0]), [0, 0, 0])) for number in range(4)
     ]
     agreed = [saying(camera.camera_from_rig, REFERENCE, REFERENCE, np.full(6, 0.01)) for camera in cameras]
-    one, four = (joined(say(cameras[:n], agreed[:n], COMMON), REFERENCE)[1] for n in (1, 4))
+    one, four = (rig_correction(say(cameras[:n], agreed[:n], COMMON), REFERENCE)[1] for n in (1, 4))
     assert np.trace(four) == pytest.approx(np.trace(one) / 4, rel=0.01)
 
 
@@ -86,12 +86,12 @@ def test_what_is_known_of_the_rig_counts():
     cameras = [RigCamera("side", [], SIDE)]
     truth = miscalibration([0.3, -0.4, 0.2], [0.03, -0.02, 0.01]) @ REFERENCE
     agreed = [saying(SIDE, REFERENCE, truth, np.full(6, 1e-3))]
-    mean, _ = joined(say(cameras, agreed, COMMON), REFERENCE, Prior.of("xyz").about(REFERENCE))
+    mean, _ = rig_correction(say(cameras, agreed, COMMON), REFERENCE, Prior.of("xyz").about(REFERENCE))
     assert_allclose(mean[:3], 0.0, atol=1e-6)
     assert np.abs(mean[3:]).max() > 1e-3
 
 
-def two_that_differ(off: np.ndarray) -> list[Said]:
+def two_that_differ(off: np.ndarray) -> list[CameraConsensus]:
     """The first camera says that the rig is where it was, the second that it itself is off by so much."""
     cameras = [RigCamera("front", [], np.eye(4)), RigCamera("side", [], SIDE)]
     firm = np.full(6, 0.01)
@@ -105,7 +105,7 @@ def test_within_a_tolerance_cameras_end_as_all_that_is_known_makes_most_likely()
     off = 1e-3 * np.array([4.0, -2.0, 3.0, 1.0, 2.0, -1.0])
     told = two_that_differ(off)
     tolerance = np.diag([0.02**2] * 3 + [0.005**2] * 3)
-    mean, covariance = joined(told, REFERENCE, tolerance=tolerance)
+    mean, covariance = rig_correction(told, REFERENCE, tolerance=tolerance)
     rig = pose_from_vector(mean) @ REFERENCE
     # unknown: motion of the rig, and of each camera in its own frame; measured: the cameras; expected: on the rig
     normal, right = np.zeros((18, 18)), np.zeros(18)
@@ -132,8 +132,8 @@ def test_within_a_tolerance_cameras_end_as_all_that_is_known_makes_most_likely()
 def test_no_tolerance_is_the_rigid_rig_and_an_endless_one_each_camera_on_its_own():
     off = 1e-2 * np.array([4.0, -2.0, 3.0, 1.0, 2.0, -1.0])
     told = two_that_differ(off)
-    rigid, of_rig = joined(told, REFERENCE)
-    none, _ = joined(told, REFERENCE, tolerance=1e-14 * np.eye(6))
+    rigid, of_rig = rig_correction(told, REFERENCE)
+    none, _ = rig_correction(told, REFERENCE, tolerance=1e-14 * np.eye(6))
     assert_allclose(none, rigid, atol=1e-9)
     rig = pose_from_vector(rigid) @ REFERENCE
     assert_allclose(told[1].placed(rig, 1e-14 * np.eye(6)), SIDE, atol=1e-9)
