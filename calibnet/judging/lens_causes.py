@@ -24,6 +24,8 @@ LEAST_BARREL, MOST_LOST = -0.07, 0.2
 equidistant lens may add there: of pinholes it adds more."""
 COARSE = 3
 """From the last stage backwards: the look whose window still holds a whole bend."""
+BARREL = ("distortion", "lens-model")
+"""What a barrel-shaped picture may come from."""
 
 
 def lens_causes(trace: CascadeTrace) -> tuple[Cause, ...]:
@@ -40,8 +42,9 @@ def lens_causes(trace: CascadeTrace) -> tuple[Cause, ...]:
         return (_principal_point(aside, by_center),)
     if focal.focal > 1 + LEAST_FOCAL and by_focal >= max(STRONG_GAIN, by_center):
         return (_focal_length(focal.focal, by_focal),)
-    if barrel := _barrel(trace):
-        return barrel
+    shorter = focal.focal < 1 - LEAST_FOCAL and by_focal >= max(least, by_center * off_center)
+    if bent := _bent(trace):  # a shorter focal length bends nothing, but a coarse look takes it for a bend as well
+        return (_focal_length(focal.focal, by_focal),) if shorter and len(bent) > len(BARREL) else bent
     if off_focal and by_focal >= max(least, by_center * off_center):
         return (_focal_length(focal.focal, by_focal),)
     if off_center and by_center >= least:
@@ -63,11 +66,12 @@ def _gain(other: Fit, alone: Fit) -> float:
     return 1 - other.cost / alone.cost if alone.cost > 0 else 0.0
 
 
-def _barrel(trace: CascadeTrace) -> tuple[Cause, ...]:
+def _bent(trace: CascadeTrace) -> tuple[Cause, ...]:
+    """What a coarse look says that bends the picture; a focal length first, where that explains it better."""
     coarse = _fits(trace.stages[-COARSE]) if len(trace.stages) >= COARSE else []
     if not coarse:
         return ()
-    alone, *_, radial, equidistant = coarse
+    alone, focal, _, radial, equidistant = coarse
     if radial.radial > LEAST_BARREL or _gain(equidistant, alone) < -MOST_LOST:
         return ()
     text = (
@@ -75,7 +79,9 @@ def _barrel(trace: CascadeTrace) -> tuple[Cause, ...]:
         "(equidistant)."
     )
     evidence = f"k1 of about {radial.radial:+.2f} fits the matches of stage {trace.stages[-COARSE].number}"
-    return tuple(Cause(name, text, evidence) for name in ("distortion", "lens-model"))
+    barrel = tuple(Cause(name, text, evidence) for name in BARREL)
+    by_focal = _gain(focal, alone)
+    return (_focal_length(focal.focal, by_focal), *barrel) if by_focal > _gain(radial, alone) else barrel
 
 
 def _principal_point(aside: float, gain: float) -> Cause:

@@ -46,6 +46,18 @@ def test_a_lens_is_named_with_its_direction(bend: Callable[[Floats], Floats], na
     assert all(said in cause.text for cause in found)
 
 
+@pytest.mark.parametrize(("fine", "names"), [(1.0, ["focal-length", *BARREL]), (0.98, ["focal-length"])])
+def test_a_bend_that_a_shorter_focal_length_explains_better_is_told_by_the_fine_look(
+    fine: float, names: list[str]
+) -> None:
+    """A coarse look takes a focal length that is far too long for a bend as well."""
+    bent = run(GUESS, REFERENCE, matches(np.eye(4), lambda places: 0.85 * places, noise=0.5)).stages
+    straight = run(GUESS, REFERENCE, matches(np.eye(4), lambda places: fine * places, noise=0.5))
+    found = lens_causes(replace(straight, stages=(bent[0], *straight.stages[1:])))
+    assert [cause.name for cause in found] == names
+    assert "shorter" in found[0].text
+
+
 def test_what_the_look_again_finds_counts_and_without_matches_nothing_is_named() -> None:
     shorter = matches(np.eye(4), lambda places: 0.97 * places, noise=0.5)
     straight = run(GUESS, REFERENCE, matches(np.eye(4), noise=0.5))
