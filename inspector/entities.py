@@ -48,6 +48,11 @@ OVERLAY_CURRENT = "overlay/current"
 """On `STEP` one after the other: start, every stage, reference, result; on the other timelines the result.
 
 The result is that of the whole drive once it is solved as one."""
+OVERLAY_WORST = "overlay/worst"
+"""The result of the frame that ended worst, at all times. No link of Rerun 0.41's leads to a time of a file: those that
+name a time begin with the port of the viewer that opens it, and ``recording://`` names an entity alone."""
+IMAGE_WORST = "overlay/worst/image"
+"""The picture of that frame."""
 OVERLAY_DRIVE = "overlay/drive"
 """Points under the extrinsic that all frames agree on."""
 DRIVE_TEXT = "drive/verdict"
@@ -85,6 +90,8 @@ TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"
 """Below it the losses of a training run, and below the next its figures on held-out frames."""
 VALIDATION = "validation"
+APPLICATIONS = (APPLICATION_ID, COMPARISON_APPLICATION_ID, TRAINING_APPLICATION_ID)
+"""All that we record for a viewer to open."""
 
 ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 """The error curves and their units."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from inspector import entities
 from inspector.cli.options import FOLDER
 from inspector.cli.output import overwrite_option, say
 from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
@@ -28,9 +29,10 @@ class SizeType(click.ParamType[tuple[int, int]]):
 
 
 @click.command()
-@click.argument("recording", type=RECORDING, metavar="RUN.rrd")
+@click.argument("recording", type=RECORDING, metavar="FILE.rrd")
 @click.option("--out", type=FOLDER, metavar="DIR", help="Folder of the tabs' pictures; created if need be.")
 @click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Of the viewer's window.")
+@click.option("--theme", type=click.Choice(["dark", "light"]), default="dark", show_default=True, help="Of the viewer.")
 @click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first; with --animate, three]")
 @click.option("--tab", "wanted", multiple=True, metavar="TEXT", help="Only tabs whose name contains this. Repeatable.")
 @overwrite_option
@@ -44,28 +46,33 @@ def pictures(
     recording: Path,
     out: Path | None,
     size: tuple[int, int],
+    theme: str,
     frame: int | None,
     wanted: tuple[str, ...],
     animate: Path | None,
 ) -> None:
     """Take a picture of every tab of a recording in the real viewer, without a window.
 
+    FILE.rrd is the recording of a run, a rig, a comparison, a training or of `watch`; --animate takes that of a run.
+
     That needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers). --animate needs none, and
     takes no pictures of the tabs unless --out is given as well.
     """
     if out is None and animate is None:
         raise click.UsageError("Give --out DIR for pictures of the tabs, --animate FILE for one that moves, or both.")
-    run = open_run(recording)
-    numbers = [recorded.index for recorded in run.frames]
-    if frame is not None and frame not in numbers:
-        raise click.UsageError(f"{recording} has no frame {frame}, only {numbers[0]} to {numbers[-1]}.")
     if animate is not None:
+        run = open_run(recording)
+        numbers = [recorded.index for recorded in run.frames]
+        if frame is not None and frame not in numbers:
+            raise click.UsageError(f"{recording} has no frame {frame}, only {numbers[0]} to {numbers[-1]}.")
         from inspector.report.animation import spread, write_animation
 
         write_animation(run, animate, spread(run) if frame is None else [frame])
         say(animate)
     if out is not None:
+        from inspector.read.file import RecordingFile
         from inspector.read.screenshots import take_pictures
 
-        for file in take_pictures(recording, out, size, numbers[0] if frame is None else frame, wanted):
+        RecordingFile(recording, entities.APPLICATIONS)  # what is no recording of ours is said before a viewer starts
+        for file in take_pictures(recording, out, size, frame, wanted, theme):
             say(file)

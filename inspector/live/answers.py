@@ -70,6 +70,11 @@ class Answers:
         """Those that can be run one at a time."""
         return list(self._method.numbers) if isinstance(self._method, StagedCalibrator) else []
 
+    @property
+    def solves_drives(self) -> bool:
+        """Whether the method can solve all frames together."""
+        return isinstance(self._method, DriveCalibrator)
+
     def get_ready(self) -> None:
         """Let the networks see the frame once, unasked: the first look at a size of picture takes twice as long."""
         method, frame, start = self._method, self._bench.frame, self._bench.extrinsic

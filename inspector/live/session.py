@@ -92,6 +92,7 @@ class LiveSession:
             "name": self.bench.name,
             "known": self._known,
             "stages": self._answers.stages,
+            "drives": self._answers.solves_drives,
             "range": [self._range.rotation_deg, self._range.translation_m],
             "target": str(self._target.file),
             "palettes": palettes(),

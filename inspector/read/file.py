@@ -6,7 +6,7 @@ import contextlib
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,13 +34,18 @@ class RecordingFile:
         cut: whether the file ends before its footer, because the run was killed or the copy is not complete.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, applications: Sequence[str] = (entities.APPLICATION_ID,)) -> None:
         """Open the file; nothing but its footer is read yet.
+
+        Args:
+            path: the file.
+            applications: of `entities`, one of which must have recorded it.
 
         Raises:
             RecordingError: there is no such file, it is not a recording, not ours, or too damaged.
         """
         self.path = path
+        self._applications = applications
         self.cut = False
         self._copy: tempfile.TemporaryDirectory[str] | None = None  # lives as long as this object
         if not path.exists():
@@ -106,7 +111,7 @@ class RecordingFile:
 
     def _ours(self, entries: list[StoreEntry]) -> StoreEntry:
         for entry in entries:
-            if entry.application_id == entities.APPLICATION_ID:
+            if entry.application_id in self._applications:
                 return entry
         if not entries:
             raise self._unreadable()

@@ -37,7 +37,12 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
 
 def log_image(rec: Subtree, frame: Frame) -> None:
     """The picture as the camera took it."""
-    rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
+    rec.log(entities.IMAGE, image_of(frame))
+
+
+def image_of(frame: Frame) -> rr.EncodedImage:
+    """The picture as the camera took it, for an entity."""
+    return rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY)
 
 
 def verdict_values(verdict: Verdict) -> rr.AnyValues:

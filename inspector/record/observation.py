@@ -104,6 +104,21 @@ class Observation:
             return False
         return after.rotation_deg > before.rotation_deg or after.translation_cm > before.translation_cm
 
+    @property
+    def badness(self) -> float:
+        """What makes a frame the worst of a run: degrees and decimetres that it ended off the reference.
+
+        Without a reference, the pixels by which its last stage expects its matches to be off; -inf where it expects
+        nothing.
+        """
+        error = self.error(self.trace.corrected)
+        if error is not None:
+            return error.rotation_deg + error.translation_cm / 10
+        last = self.trace.stages[-1] if self.trace.stages else None
+        if last is None or not math.isfinite(last.match_error_px):
+            return -math.inf
+        return self.image_px(last, last.match_error_px)
+
 
 class Grid(NamedTuple):
     """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width`` of them."""
@@ -176,6 +191,16 @@ class Layout:
     def start(self) -> str:
         """What the extrinsic before the first stage is called in names of views."""
         return "Miscalibrated" if self.has_reference else "As given"
+
+    @property
+    def several(self) -> bool:
+        """Whether several frames are known to follow one another."""
+        return self.frames is not None and self.frames[0] != self.frames[1]
+
+    @property
+    def with_worst(self) -> bool:
+        """Whether one of its frames is known to be the worst."""
+        return self.several and (self.has_reference or self.with_fit)
 
     @property
     def stages_with_volumes(self) -> tuple[StageLayout, ...]:

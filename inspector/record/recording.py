@@ -8,6 +8,7 @@ bounded and a killed run leaves all frames but the one in work.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,6 +31,7 @@ from inspector.record.stream import Stream
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
+from inspector.record.tabs.overview import WORST, log_worst
 from inspector.record.tabs.registry import wanted_tabs
 from inspector.record.tabs.watch import log_watch
 
@@ -73,6 +75,7 @@ class Recording:
         self._tabs = wanted_tabs(layout)
         self._seconds: dict[int, float] = {}
         self._flushed = 0
+        self._worst = -math.inf
         blueprint = make_blueprint(layout, self._tabs)
         options, title = (
             {name: _plain(value) for name, value in description.options.items()},
@@ -93,6 +96,9 @@ class Recording:
         log_frame(self._rec, observation, self._contents)
         for tab in self._tabs:
             tab.log(self._rec, observation, self._contents)
+        if self._layout.with_worst and observation.badness > self._worst:
+            self._worst = observation.badness
+            log_worst(self._rec, observation, self._contents)
         self._flush_frame()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
@@ -121,6 +127,8 @@ class Recording:
         """Log what all frames together make of the extrinsic, the verdict on the given one, and remarks."""
         if estimate.verdict is not None:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
+        if math.isfinite(self._worst):
+            remarks = [*remarks, f"*{WORST}*, above the picture, shows that one."]
         log_drive(self._rec, estimate, reference, self._seconds, given, remarks)
         self._stream.flush()
 

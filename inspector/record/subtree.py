@@ -57,6 +57,18 @@ class Subtree:
         self._stream.set_time(entities.STEP, sequence=index * entities.STEPS_PER_FRAME + stage)
 
 
+class Timeless(Subtree):
+    """The same entities, where all that is logged holds at all times, in place of what was logged so before."""
+
+    def __init__(self, rec: Subtree) -> None:
+        """Log where ``rec`` does."""
+        super().__init__(rec._stream, rec._prefix)
+
+    def log(self, entity: str, *components: Components) -> None:
+        """Log what holds at all times."""
+        self.log_for_all(entity, *components)
+
+
 def below(prefix: str, entity: str) -> str:
     """An entity's path below a prefix; the entity as it is where there is none."""
     prefix = prefix.strip("/")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -49,6 +50,7 @@ class Summary:
     started: float = field(default_factory=time.monotonic)
     ended: float | None = None
     _numbers: list[int] = field(default_factory=list, repr=False)
+    _bad: list[float] = field(default_factory=list, repr=False)
     _worse: list[int] = field(default_factory=list, repr=False)
     _initial: list[PoseError] = field(default_factory=list, repr=False)
     _corrected: list[PoseError] = field(default_factory=list, repr=False)
@@ -62,8 +64,8 @@ class Summary:
         self.method = trace.method
         if trace.verdict is not None:
             self.verdicts[observation.frame.index] = trace.verdict
-        if observation.reference is not None:
-            self._numbers.append(observation.frame.index)
+        self._numbers.append(observation.frame.index)
+        self._bad.append(observation.badness)
         if observation.worse:
             self._worse.append(observation.frame.index)
         word = None if trace.verdict is None else trace.verdict.word
@@ -113,12 +115,16 @@ class Summary:
     def of_frames(self) -> list[str]:
         """Sentences on the frames one by one: their median, the worst, and how many became worse."""
         if not self._initial:
-            return [f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with."]
+            lines = [f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with."]
+            if len(self._bad) > 1 and math.isfinite(max(self._bad)):
+                worst = self._bad.index(max(self._bad))
+                lines.append(f"Fits worst: frame {self._numbers[worst]}, matches {self._bad[worst]:.1f} px off.")
+            return lines
         lines = [
             f"Error, median over frames: {_middle(self._initial)} initially, {_middle(self._corrected)} corrected."
         ]
         if len(self._corrected) > 1:
-            worst = max(range(len(self._corrected)), key=lambda position: self._corrected[position].translation_cm)
+            worst = self._bad.index(max(self._bad))
             lines.append(f"Worst: frame {self._numbers[worst]}, {_figures(self._corrected[worst])} left.")
         if self._worse:
             count, numbers = len(self._worse), ", ".join(map(str, self._worse))

@@ -15,7 +15,7 @@ from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.lettering import text_png
 from inspector.record.pictures.overlay import Overlay, Thinning, make_overlay
 from inspector.record.pictures.painting import make_painter
-from inspector.record.subtree import Subtree
+from inspector.record.subtree import Subtree, Timeless
 
 SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=180, pixel=0.25)
 """Sparse keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
@@ -50,13 +50,17 @@ class FrameOverlays:
         rec.log(entity, self._under(reference).archetype())
         self._log_caption(rec, entity, "reference")
 
-    def log_result(self, rec: Subtree, entity: str) -> None:
+    def log_worst(self, rec: Subtree) -> None:
+        """Log the result at all times, as that of the worst frame."""
+        self.log_result(Timeless(rec), entities.OVERLAY_WORST, f"frame {self._observation.frame.index}, ")
+
+    def log_result(self, rec: Subtree, entity: str, whose: str = "") -> None:
         """Log the points under what is believed in the end, and the verdict on it above."""
         trace = self._observation.trace
         word = "" if trace.verdict is None else trace.verdict.word
         became = "worse than before" if self._observation.worse else "corrected"
         name = f"{REJECTED}, left as it was" if trace.rejected else ", ".join(filter(None, [became, word]))
-        self.log(rec, entity, name, trace.corrected, colors.VERDICTS.get(word, colors.LETTERS))
+        self.log(rec, entity, f"{whose}{name}", trace.corrected, colors.VERDICTS.get(word, colors.LETTERS))
 
     def _under(self, camera_from_lidar: Extrinsic) -> Overlay:
         key = camera_from_lidar.tobytes()

@@ -145,12 +145,11 @@ def _lines(
         lines += [f"**Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm**, {solved}.", ""]
     else:
         lines += [f"{solved.capitalize()}.", ""]
-    lines += [*matrix_lines("The drive's", estimate.camera_from_lidar), ""]
     if remarks:
         lines += [f"Each frame alone: {' '.join(remarks)}", ""]
     if estimate.skipped:
         lines += ["Skipped:", "", *(f"- frame {bad.frame}: {bad.why}" for bad in estimate.skipped), ""]
-    return lines
+    return [*lines, *matrix_lines("The drive's", estimate.camera_from_lidar), ""]
 
 
 def offset(error: PoseError, name: str) -> float:

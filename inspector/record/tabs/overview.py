@@ -15,6 +15,7 @@ import rerun.blueprint as rrb
 
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
+from inspector.record.frame import image_of
 from inspector.record.observation import Layout, Observation
 from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.frame_overlays import frame_overlays
@@ -35,6 +36,7 @@ from inspector.record.tabs.views import (
 
 NAME = "Overview"
 
+WORST = "Worst frame"
 LARGE_SHARE = 0.62
 """Share of the tab's width that the large picture takes."""
 LARGEST_OVERLAY, LARGEST_SMALL = 600.0, 250.0
@@ -81,10 +83,19 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
         _log_fit(rec, observation)
 
 
+def log_worst(rec: Subtree, observation: Observation, contents: Contents) -> None:
+    """Show a frame's result in the tab of the worst one, in place of an earlier frame's."""
+    frame_overlays(observation, contents).log_worst(rec)
+    rec.log_for_all(entities.IMAGE_WORST, image_of(observation.frame))
+
+
 def view(layout: Layout) -> View:
     """The large picture above curves, and beside them what is to be said of it."""
     names = _pictures(layout)
     pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
+    if layout.with_worst:
+        worst = overlay_view(WORST, entities.OVERLAY_WORST, layout.image, image_of=entities.IMAGE_WORST)
+        pictures.append(worst)
     left: list[View] = [rrb.Tabs(*pictures, active_tab=0, name="Result"), point_legend(layout)]
     shares = [min(_height(layout, LARGE_SHARE) + 2 * TITLE_HEIGHT, LARGEST_OVERLAY), LEGEND_HEIGHT]
     if _curve_views(layout) and layout.stages and Part.CURVES in layout.contents.parts:

@@ -28,7 +28,11 @@ View = rrb.View | rrb.Container
 
 
 def overlay_view(
-    name: str, points: str, image: tuple[int, int] | None = None, caption: bool = True
+    name: str,
+    points: str,
+    image: tuple[int, int] | None = None,
+    caption: bool = True,
+    image_of: str = entities.IMAGE,
 ) -> rrb.Spatial2DView:
     """Points over the frame's image, and the caption above it.
 
@@ -37,6 +41,7 @@ def overlay_view(
         points: entity of the overlay.
         image: size of the image; what lies beyond it and the caption does not widen the view then.
         caption: show it; a small view has no room for letters that can be read.
+        image_of: entity of the image.
     """
     bounds = None
     if image is not None:
@@ -44,11 +49,11 @@ def overlay_view(
         bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(top, image[1]))
     return rrb.Spatial2DView(
         origin="/",
-        contents=[f"/{entities.IMAGE}", f"/{points}/**", *([] if caption else [f"- /{entities.caption(points)}"])],
+        contents=[f"/{image_of}", f"/{points}/**", *([] if caption else [f"- /{entities.caption(points)}"])],
         name=name,
         visual_bounds=bounds,
         background=colors.GROUND,
-        overrides={f"/{entities.IMAGE}": rr.EncodedImage.from_fields(opacity=DIMMED)},
+        overrides={f"/{image_of}": rr.EncodedImage.from_fields(opacity=DIMMED)},
     )
 
 
@@ -121,7 +126,7 @@ def curve_view(name: str, origin: str, *contents: str, highest: float | None = N
 
 def frames_named(layout: Layout) -> dict[str, colors.Rgb]:
     """What the legend of curves says of their ends, in a colour that has no dot."""
-    if layout.frames is None or layout.frames[0] == layout.frames[1]:
+    if layout.frames is None or not layout.several:
         return {}
     return {"from frame {} to {}".format(*layout.frames): colors.GROUND}
 

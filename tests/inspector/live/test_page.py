@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from re import Pattern
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -195,6 +195,28 @@ def test_two_windows_show_the_same_and_one_may_close(
         frame.wait_for_function("window.given.length === 2")
         assert set(frame.evaluate("window.given")) == {"RRF2"}
         assert frame.evaluate("window.options.url") == []
+
+
+class SingleFrames:
+    """A method without stages that solves no drives."""
+
+    def calibrate(self, frame: Any, initial: Any, detail: bool = False) -> Any:
+        return FakeCascade().calibrate(frame, initial, detail)
+
+
+def test_what_a_method_cannot_do_is_not_offered(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    page = opened(browser, serve(make(cascade=SingleFrames())))
+    assert page.locator("#drive").is_hidden()
+    assert page.locator("#run").inner_text() == "Run"
+    counts(page, "#single button", 0)
+    page.locator("#run").click()
+    answered(page)
+    page = opened(browser, serve(make()))
+    assert page.locator("#drive").is_visible()
+    assert page.locator("#run").inner_text() == "Run all stages"
+    counts(page, "#single button", 3)
 
 
 def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:

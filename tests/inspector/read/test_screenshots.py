@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from inspector.read.screenshots import HeadlessViewer, file_stem, smaller
+from inspector.read.headless import LIGHT, HeadlessViewer
+from inspector.read.screenshots import file_stem, smaller
 
 VULKAN_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 
@@ -24,8 +25,9 @@ def test_the_first_picture_of_the_demo_is_complete(record: Callable[..., Any], t
         pytest.skip("no Vulkan driver: apt-get install -y mesa-vulkan-drivers")
     file = tmp_path / "demo.rrd"
     record(file, length=2, sequence=SyntheticSequence(seed=0, length=2))
-    with HeadlessViewer() as viewer:
+    with HeadlessViewer(theme=LIGHT) as viewer:
         viewer.open(file)
+        assert (viewer.times("frame"), viewer.times("nothing")) == ((0, 1), None)
         viewer.show_time("frame", 1)
         picture = np.asarray(Image.open(io.BytesIO(viewer.picture())).convert("RGB"))
         complaints = {view.name: list(view.reports) for view in viewer.client.get_state().views if view.reports}
@@ -35,6 +37,7 @@ def test_the_first_picture_of_the_demo_is_complete(record: Callable[..., Any], t
     large, small = picture[240:520, :1180], picture[900:1030, 1200:]  # colourful, not empty views
     for panel in (large, small):
         assert (np.ptp(panel.astype(int), axis=2) > 60).mean() > 0.1
+    assert picture[300:500, 1300:1850].mean() > 200, "the ground of the words is light"
     stems = [file_stem(page) for page in pages]
     assert stems[0] == "overview"
     assert {"cascade-all-stages", "hourglass-stage-3-channels", "3d-side-by-side"} <= set(stems)

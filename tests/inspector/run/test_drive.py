@@ -45,10 +45,15 @@ def recorded(file: Path) -> RecordedRun:
 
 
 def text_of(file: Path) -> str:
+    return said_last(file, entities.DRIVE_TEXT, "TextDocument:text")
+
+
+def said_last(file: Path, entity: str, component: str) -> str:
+    """What holds at all times."""
     from rerun.chunk import RrdReader
 
-    *_, last = RrdReader(file).store().stream().filter(content=f"/{entities.DRIVE_TEXT}")
-    text: str = last.to_record_batch()["TextDocument:text"].to_pylist()[0][0]
+    *_, last = RrdReader(file).store().stream().filter(content=f"/{entity}", components=component)
+    text: str = last.to_record_batch()[component].to_pylist()[0][0]
     return text
 
 
@@ -187,6 +192,8 @@ def test_frames_that_became_worse_are_counted(record: Callable[..., Any], tmp_pa
     summary = record(tmp_path / "w.rrd", cascade_type=Worse, detail="overview", strides=(32,))
     told = summary.of_frames()
     assert told[1].startswith("Worst: frame 1, ")
+    caption = said_last(tmp_path / "w.rrd", entities.caption(entities.OVERLAY_WORST), "text")
+    assert caption.startswith("frame 1, worse than before"), "the tab of the worst frame shows it at all times"
     assert told[2] == "1 of 3 frames worse than before, in angle or place: 1."
 
 
