@@ -40,7 +40,7 @@ def log_image(rec: Subtree, frame: Frame) -> None:
     rec.log(entities.IMAGE, image_of(frame))
 
 
-def image_of(frame: Frame) -> rr.EncodedImage:
+def image_of(frame: Frame) -> rr.EncodedImage | rr.Image:
     """The picture as the camera took it, for an entity."""
     return rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY)
 
