@@ -184,6 +184,12 @@ def _small_bag(kind: str) -> bytes:
     return small_bag(kind)
 
 
+def _small_foxglove() -> tuple[bytes, ...]:
+    from tests.hostile.bags import small_foxglove
+
+    return small_foxglove("json"), small_foxglove("protobuf")
+
+
 def _stamps(data: bytes) -> object:
     from calibnet.datasets.pairing import times_of
 
@@ -223,6 +229,7 @@ TARGETS: dict[str, Target] = {
         for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".feather", ".parquet")
     },
     **{f"bag{kind}": Target(partial(_bag, kind), (_small_bag(kind),)) for kind in (".bag", ".db3", ".mcap")},
+    "foxglove.mcap": Target(partial(_bag, ".mcap"), _small_foxglove()),
     "image": Target(_image, (*(_small(form) for form in ("PNG", "JPEG", "BMP", "TIFF", "WEBP")), _small_floats())),
     "calibration": Target(
         _calibration,

@@ -149,7 +149,12 @@ class BagWriter:
 
 def write_bag(path: Path, kind: str, frames: Sequence[Frame], period: float = 1.0, late: float = 0.01) -> Path:
     """A bag of frames, a ``period`` apart; each scan is ``late`` seconds after its image, and is there twice."""
-    bag, start = BagWriter(path, kind), 1_700_000_000.0
+    return write_frames(BagWriter(path, kind), frames, period, late)
+
+
+def write_frames(bag: BagWriter, frames: Sequence[Frame], period: float = 1.0, late: float = 0.01) -> Path:
+    """The same with a writer."""
+    start = 1_700_000_000.0
     bag.write("/tf_static", bag.transforms(frames[0].camera_from_lidar), start)
     bag.write("/cam/camera_info", bag.info(frames[0], "plumb_bob", [0.0] * 5), start)
     for number, frame in enumerate(frames):

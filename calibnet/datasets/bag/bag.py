@@ -23,7 +23,7 @@ from calibnet.datasets.bag.moments import STILL_M, change, periods, stillest
 from calibnet.datasets.bag.recording import BagRecording, Stamped
 from calibnet.datasets.bag.topics import found_topic, info_of
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
-from calibnet.datasets.calibration_files.frames import camera_from_lidar
+from calibnet.datasets.calibration_files.frames import Link, camera_from_lidar
 from calibnet.datasets.cloud_table import CloudError, points_of
 from calibnet.datasets.development import Development, ImageError, Levels
 from calibnet.datasets.folder import DEPTHS_LOOKED_AT
@@ -36,6 +36,9 @@ from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
 from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
+
+MOST_TRANSFORMS = 2000
+"""Messages of a topic of transforms that are looked at."""
 
 
 @dataclass(frozen=True)
@@ -190,19 +193,22 @@ class Bag:
         return np.concatenate([self._raw(scans[position])[:, 3] for position in spread(len(scans), 4)])
 
     def _of_transforms(self, frames: FrameChoice) -> Extrinsic:
+        topics = self._bag.of_type(TRANSFORMS)
+        static = [topic for topic in topics if topic.name.endswith("tf_static")]
         links = [
             link
-            for topic in self._bag.of_type(TRANSFORMS)
-            if topic.name.endswith("tf_static")
-            for message in self._bag.messages(topic.name)
+            for topic in static or topics
+            for message in self._bag.messages(topic.name, most=MOST_TRANSFORMS)
             for link in links_of(message.content)
         ]
+        where = f"{self._bag}, {' and '.join(topic.name for topic in static or topics)}"
+        links = links if static else steady(links)
         if not links:
             raise DatasetError(
                 f"Bag {self._bag} has no /tf_static, which would say where the LiDAR is; give a first guess with "
                 "--guess FILE."
             )
-        return camera_from_lidar(links, frames, f"{self._bag}, /tf_static")
+        return camera_from_lidar(links, frames, where)
 
     def _moments(self, images: list[Stamped], scans: list[Stamped]) -> tuple[list[Moment], tuple[str, ...]]:
         """The frames: of each period the stillest scan, with the image nearest to it."""
@@ -241,6 +247,18 @@ class Bag:
         if 1000 * farthest > WORTH_A_WARNING_MS and still < len(moments):
             notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm: record while standing, if you can.")
         return moments, tuple(notes)
+
+
+def steady(links: Sequence[Link]) -> list[Link]:
+    """Those that never change: what is on one mount, where static transforms are told among the others."""
+    told: dict[tuple[str, str], list[Link]] = {}
+    for link in links:
+        told.setdefault((link.parent, link.child), []).append(link)
+    return [
+        same[0]
+        for same in told.values()
+        if all(np.allclose(one.parent_from_child, same[0].parent_from_child, atol=1e-6) for one in same)
+    ]
 
 
 def _around(taken: NDArray[np.float64], swept: NDArray[np.float64]) -> NDArray[np.int64]:

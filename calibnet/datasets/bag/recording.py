@@ -7,12 +7,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from calibnet.datasets.bag.mcap_file import McapFile, is_foreign
 from calibnet.datasets.bag.messages import stamp_of
 from calibnet.datasets.bag.unpacking import bound_unpacking
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import MEGABYTE, require_file
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
 
 METADATA_BYTES = 16 * MEGABYTE
 """Largest metadata.yaml of a ROS 2 bag."""
@@ -64,11 +68,15 @@ class BagRecording:
                 require_file(file, "Bag", largest, DatasetError, "copy it again")
         bound_unpacking()
         old = any(path.suffix == ".bag" for path in self.paths)
+        self._reader: AnyReader | McapFile
         with self.failures():
-            self._reader = AnyReader(
-                self.paths, default_typestore=get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
-            )
-            self._reader.open()
+            if len(self.paths) == 1 and is_foreign(self.paths[0]):
+                self._reader = McapFile(self.paths[0])
+            else:
+                self._reader = AnyReader(
+                    self.paths, default_typestore=get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+                )
+                self._reader.open()
         weakref.finalize(self, _close, self._reader)
 
     @property
@@ -84,8 +92,8 @@ class BagRecording:
         """When the messages of a topic were recorded, and the times that their headers say."""
         with self.failures():
             return [
-                Stamped(recorded, stamp_of(data, self._reader.is2) or recorded * 1e-9)
-                for _, recorded, data in self._reader.messages(self._connections(topic))
+                Stamped(recorded, self._stamp(connection, data) or recorded * 1e-9)
+                for connection, recorded, data in self._reader.messages(self._connections(topic))
             ]
 
     def messages(self, topic: str, start: int | None = None, most: int | None = None) -> Iterator[Message]:
@@ -101,8 +109,7 @@ class BagRecording:
             for number, (connection, recorded, data) in enumerate(found):
                 if number == most:
                     return
-                content = self._reader.deserialize(data, connection.msgtype)
-                yield Message(content, stamp_of(data, self._reader.is2) or recorded * 1e-9)
+                yield Message(self._content(connection, data), self._stamp(connection, data) or recorded * 1e-9)
 
     def message(self, topic: str, at: int | None = None) -> Message:
         """The message of a topic that was recorded at a time, or its first.
@@ -137,6 +144,16 @@ class BagRecording:
 
     def _connections(self, topic: str) -> list[Any]:
         return [one for one in self._reader.connections if one.topic == topic]
+
+    def _stamp(self, connection: Any, data: bytes) -> float:
+        if isinstance(self._reader, McapFile):
+            return float(connection.stamp(data))
+        return stamp_of(data, self._reader.is2)
+
+    def _content(self, connection: Any, data: bytes) -> Any:
+        if isinstance(self._reader, McapFile):
+            return connection.decode(data)
+        return self._reader.deserialize(data, connection.msgtype)
 
 
 def _files(path: Path) -> list[Path]:

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from bz2 import BZ2Decompressor
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 LARGEST_BYTES = 512 << 20
@@ -19,7 +20,8 @@ RESERVE_BYTES = 1 << 30
 
 
 def bound_unpacking() -> None:
-    """Let rosbags unpack no piece and no file that is larger, of whatever bag it reads from now on."""
+    """Let rosbags and mcap unpack no piece and no file that is larger, of whatever bag they read from now on."""
+    import mcap.stream_reader
     from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
     from rosbags.rosbag1.reader import decompressors
     from rosbags.rosbag2 import reader
@@ -29,6 +31,9 @@ def bound_unpacking() -> None:
     lz4, zstd.decompress = bounded(LZ4FrameDecompressor), bounded(zstd.ZstdDecompressor)
     zstd.open = bounded_file(zstd.ZstdFile)
     decompressors.update(bz2=bounded(BZ2Decompressor), lz4=lz4)
+    foreign: Any = vars(mcap.stream_reader)
+    foreign["lz4"] = SimpleNamespace(decompress=lz4)
+    foreign["zstandard"] = SimpleNamespace(decompress=lambda data, _: zstd.decompress(data))
     DECOMPRESSORS.update(lz4=lambda data, _: lz4(data), zstd=lambda data, _: zstd.decompress(data))
 
 

@@ -1,0 +1,116 @@
+"""Messages of Foxglove's own schemas, in protobuf or JSON, as those of ROS that `messages` reads.
+
+The schemas are described at docs.foxglove.dev/docs/sdk/schemas.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from calibnet.errors import DatasetError
+
+POINT_TYPES = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
+"""Of a field of points: those of PointCloud2, which has signed numbers before unsigned ones."""
+
+
+def seconds_of(time: Any) -> float:
+    """A time, of protobuf (seconds, nanos) or of JSON (sec, nsec), in seconds."""
+    if hasattr(time, "nanos"):
+        return float(time.seconds + 1e-9 * time.nanos)
+    return float(time.sec + 1e-9 * time.nsec)
+
+
+def _header(message: Any) -> SimpleNamespace:
+    return SimpleNamespace(frame_id=message.frame_id, seconds=seconds_of(message.timestamp))
+
+
+def _bytes(data: bytes | str) -> bytes:
+    return base64.b64decode(data) if isinstance(data, str) else bytes(data)
+
+
+def _compressed(message: Any) -> SimpleNamespace:
+    return SimpleNamespace(header=_header(message), data=_bytes(message.data))
+
+
+def _raw(message: Any) -> SimpleNamespace:
+    return SimpleNamespace(
+        header=_header(message),
+        width=message.width,
+        height=message.height,
+        encoding=message.encoding,
+        step=message.step,
+        data=memoryview(_bytes(message.data)),
+        is_bigendian=False,
+    )
+
+
+def _points(message: Any) -> SimpleNamespace:
+    pose = getattr(message, "pose", None)
+    if pose is not None and not _is_identity(pose):
+        raise DatasetError("its points have a pose of their own within their frame, which is not read")
+    data = memoryview(_bytes(message.data))
+    count = len(data) // max(1, message.point_stride)
+    fields = [
+        SimpleNamespace(name=field.name, offset=field.offset, datatype=POINT_TYPES.get(int(field.type), 0), count=1)
+        for field in message.fields
+    ]
+    return SimpleNamespace(
+        header=_header(message),
+        width=count,
+        height=1,
+        point_step=message.point_stride,
+        row_step=count * message.point_stride,
+        fields=fields,
+        data=data,
+        is_bigendian=False,
+    )
+
+
+def _is_identity(pose: Any) -> bool:
+    place, turn = getattr(pose, "position", None), getattr(pose, "orientation", None)
+    here = place is None or max(abs(place.x), abs(place.y), abs(place.z)) < 1e-9
+    return here and (turn is None or max(abs(turn.x), abs(turn.y), abs(turn.z)) < 1e-9)
+
+
+def _camera(message: Any) -> SimpleNamespace:
+    return SimpleNamespace(
+        header=_header(message),
+        width=message.width,
+        height=message.height,
+        distortion_model=message.distortion_model or ("" if any(message.D) else "plumb_bob"),
+        d=list(message.D),
+        k=list(message.K),
+        binning_x=0,
+        binning_y=0,
+        roi=SimpleNamespace(x_offset=0, y_offset=0),
+    )
+
+
+def _transform(message: Any) -> SimpleNamespace:
+    return SimpleNamespace(
+        header=SimpleNamespace(frame_id=message.parent_frame_id, seconds=seconds_of(message.timestamp)),
+        child_frame_id=message.child_frame_id,
+        transform=SimpleNamespace(translation=message.translation, rotation=message.rotation),
+    )
+
+
+def _of_several(transforms: list[SimpleNamespace]) -> SimpleNamespace:
+    seconds = transforms[0].header.seconds if transforms else 0.0
+    return SimpleNamespace(header=SimpleNamespace(frame_id="", seconds=seconds), transforms=transforms)
+
+
+AS_ROS: dict[str, tuple[str, Callable[[Any], SimpleNamespace]]] = {
+    "foxglove.CompressedImage": ("sensor_msgs/msg/CompressedImage", _compressed),
+    "foxglove.RawImage": ("sensor_msgs/msg/Image", _raw),
+    "foxglove.PointCloud": ("sensor_msgs/msg/PointCloud2", _points),
+    "foxglove.CameraCalibration": ("sensor_msgs/msg/CameraInfo", _camera),
+    "foxglove.FrameTransform": ("tf2_msgs/msg/TFMessage", lambda one: _of_several([_transform(one)])),
+    "foxglove.FrameTransforms": (
+        "tf2_msgs/msg/TFMessage",
+        lambda several: _of_several([_transform(one) for one in several.transforms]),
+    ),
+}
+"""For each schema the type of ROS that says the same, and how a message becomes one."""

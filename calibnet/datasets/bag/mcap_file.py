@@ -1,0 +1,155 @@
+"""MCAP files that no ROS 2 recorded: of Foxglove's own schemas, of ROS 1 messages, or of ROS 2 ones through a bridge.
+
+rosbags reads those of ROS 2 alone; these are read through the format's own library, with the same bounds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from calibnet.datasets.bag.foxglove import AS_ROS
+from calibnet.datasets.bag.messages import IMAGES, INFOS, POINTS, TRANSFORMS, stamp_of
+
+MAGIC = b"\x89MCAP0\r\n"
+HEADER = 64
+READ = (*IMAGES, *POINTS, *INFOS, *TRANSFORMS)
+Decode = Callable[[bytes], Any]
+
+
+class Info(NamedTuple):
+    """The type of a topic's messages, as ROS 2 names it, and how many there are."""
+
+    msgtype: str
+    msgcount: int
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A topic's messages of one schema.
+
+    Attributes:
+        id: in the file.
+        topic: its name.
+        msgtype: of ROS 2.
+        decode: makes a message of its bytes, with the fields that ROS has; None where nobody here reads it.
+        stamp: the time that it says, in seconds; 0 for none.
+    """
+
+    id: int
+    topic: str
+    msgtype: str
+    decode: Decode | None
+    stamp: Callable[[bytes], float]
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file is an MCAP file that does not say that ROS 2 recorded it."""
+    if path.suffix != ".mcap" or path.is_dir():
+        return False
+    with path.open("rb") as file:
+        start = file.read(HEADER)
+    length = int.from_bytes(start[17:21], "little")
+    return start.startswith(MAGIC) and start[21 : 21 + length] != b"ros2"
+
+
+class McapFile:
+    """An open file, with what is asked of `rosbags.highlevel.AnyReader`.
+
+    Attributes:
+        connections: its channels.
+        topics: by name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open it; all that it says of itself is read."""
+        from mcap.reader import make_reader
+
+        self.stack: Any = path.open("rb")
+        self._make: Callable[[], Any] = lambda: make_reader(_rewound(self.stack), validate_crcs=True)
+        counts: dict[int, int] = {}
+        channels: dict[int, tuple[Any, Any]] = {}
+        summary = self._make().get_summary()
+        if summary is not None and summary.statistics is not None and summary.channels:
+            counts = dict(summary.statistics.channel_message_counts)
+            channels = {key: (one, summary.schemas.get(one.schema_id)) for key, one in summary.channels.items()}
+        else:  # nobody closed it
+            for schema, channel, _ in self._make().iter_messages():
+                counts[channel.id] = counts.get(channel.id, 0) + 1
+                channels[channel.id] = (channel, schema)
+        self.connections = [_channel(channel, schema) for channel, schema in channels.values()]
+        self.topics: dict[str, Info] = {}
+        for one in self.connections:
+            more = counts.get(one.id, 0)
+            known = self.topics.get(one.topic, Info(one.msgtype, 0))
+            self.topics[one.topic] = Info(one.msgtype, known.msgcount + more)
+
+    def messages(self, channels: Iterable[Channel], start: int | None = None) -> Iterator[tuple[Channel, int, bytes]]:
+        """Messages in the order of time, from one in nanoseconds on: channel, when it was recorded, bytes."""
+        wanted = {one.id: one for one in channels}
+        names = [one.topic for one in wanted.values()]
+        for _, channel, message in self._make().iter_messages(topics=names, starting_at=start):
+            if channel.id in wanted:
+                yield wanted[channel.id], int(message.log_time), message.data
+
+    def close(self) -> None:
+        """Close the file."""
+        self.stack.close()
+
+
+def _rewound(file: Any) -> Any:
+    file.seek(0)
+    return file
+
+
+def _channel(channel: Any, schema: Any) -> Channel:
+    """A channel, with how its messages are read."""
+    name = "" if schema is None else str(schema.name)
+    if name in AS_ROS:
+        kind, as_ros = AS_ROS[name]
+        own = _decoder(channel.message_encoding, schema)
+        if own is None:
+            return Channel(channel.id, channel.topic, name, None, lambda _: 0.0)
+        decode: Decode = lambda data: as_ros(own(data))  # noqa: E731
+        return Channel(channel.id, channel.topic, kind, decode, lambda data: float(decode(data).header.seconds))
+    package, _, last = name.rpartition("/")
+    kind = f"{package.removesuffix('/msg')}/msg/{last}" if package else name
+    old = channel.message_encoding == "ros1"
+    known = kind in READ and channel.message_encoding in ("ros1", "cdr")
+    decode_ros = _ros(kind, old, schema.data.decode() if schema.encoding.endswith("msg") else "") if known else None
+    return Channel(channel.id, channel.topic, kind, decode_ros, lambda data: stamp_of(data, not old))
+
+
+def _decoder(encoding: str, schema: Any) -> Decode | None:
+    """Of a message that is not of ROS; None where it is of an encoding that is not read here."""
+    if encoding == "json":
+        return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+    if encoding == "protobuf":
+        from mcap_protobuf.decoder import DecoderFactory
+
+        return DecoderFactory().decoder_for(encoding, schema)
+    return None
+
+
+def _ros(kind: str, old: bool, definition: str) -> Decode:
+    """Of a message of ROS, by the definition that came with it or, without one, by what ROS calls so."""
+    store = _store(kind, old, definition)
+    if old:
+        return lambda data: store.deserialize_ros1(data, kind)
+    return lambda data: store.deserialize_cdr(data, kind)
+
+
+@cache
+def _store(kind: str, old: bool, definition: str) -> Any:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    if not definition.strip():
+        return get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(definition, kind))
+    return store

@@ -1,0 +1,59 @@
+"""MCAP files that no ROS 2 recorded, as frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from calibnet.conformance import check_dataset
+from calibnet.datasets.bag import Bag
+from calibnet.errors import DatasetError
+from tests.support.bags import write_frames
+from tests.support.fakes import make_frame
+from tests.support.foreign_mcap import ForeignMcap, Rewritten, image_of, write_foxglove
+
+FRAMES = [make_frame(number, width=128, height=48, points=3000) for number in range(3)]
+
+
+def written(path: Path, encoding: str) -> Path:
+    if encoding in ("json", "protobuf"):
+        return write_foxglove(path, encoding, FRAMES)
+    return write_frames(Rewritten(path, encoding), FRAMES)
+
+
+@pytest.mark.parametrize("encoding", ["ros1", "cdr", "json", "protobuf"])
+def test_frames_are_those_that_were_recorded(encoding: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "drive.mcap", encoding)
+    check_dataset(lambda: Bag([path]))
+    bag = Bag([path])
+    assert len(bag) == 3
+    for frame, expected in zip(bag, FRAMES, strict=True):
+        assert_array_equal(frame.image, expected.image)
+        assert_allclose(frame.points, expected.points, atol=1e-6)
+        assert_allclose(frame.camera.matrix, expected.camera.matrix)
+        assert_allclose(frame.camera_from_lidar, expected.camera_from_lidar, atol=1e-9)
+    assert_allclose([frame.timestamp for frame in bag], [0, 1, 2], atol=1e-6)
+
+
+def test_a_file_that_nobody_closed_is_read_to_its_end(tmp_path: Path) -> None:
+    path = written(tmp_path / "drive.mcap", "protobuf")
+    whole = path.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: whole.rindex(b"/lidar")])
+    with pytest.raises(DatasetError, match="cannot be read"):
+        Bag([tmp_path / "cut.mcap"])
+
+
+def test_points_that_lie_elsewhere_in_their_frame_are_refused(tmp_path: Path) -> None:
+    pose = {"position": {"x": 0.0, "y": 0.0, "z": 1.2}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    path = write_foxglove(tmp_path / "drive.mcap", "json", FRAMES, pose=pose)
+    with pytest.raises(DatasetError, match="a pose of their own"):
+        Bag([path])
+
+
+def test_what_is_missing_is_listed(tmp_path: Path) -> None:
+    bag = ForeignMcap(tmp_path / "drive.mcap", "json")
+    bag.write("/cam/image", "CompressedImage", image_of(FRAMES[0], 1.0), 1.0)
+    with pytest.raises(DatasetError, match=r"no point clouds; there are: /cam/image \(1 CompressedImage\)"):
+        Bag([bag.close()])
