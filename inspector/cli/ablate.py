@@ -32,7 +32,7 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 
 @click.command()
 @click.option("--preset", "presets", multiple=True, help="Network. Repeatable.  [default: compact and paper]")
-@click.option("--range", "range_", type=RANGE, default="5/0.5", show_default=True, help="Of weights and errors.")
+@click.option("--range", "range_", type=RANGE, default="5/0.5", show_default=True, help="Range of weights and errors.")
 @click.option(
     "--weights",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
@@ -41,11 +41,11 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Of the miscalibrations.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option(
     "--timed", type=click.IntRange(0), default=3, show_default=True, help="Looks whose median is the latency; 0: none."
 )
-@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Of the CPU.")
+@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option(
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier run."
 )

@@ -48,7 +48,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 @click.option("--methods", default="all", show_default=True, metavar="NAME,NAME", help="Which methods; all for every.")
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option(
-    "--range", "ranges", multiple=True, type=RANGE, help="Of the miscalibrations. Repeatable.  [20/1.5, 5/0.5]"
+    "--range", "ranges", multiple=True, type=RANGE, help="Range of the miscalibrations. Repeatable.  [20/1.5, 5/0.5]"
 )
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option(
@@ -57,7 +57,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 @click.option(
     "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame or drive."
 )
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Of the miscalibrations.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option("--limit", type=click.FloatRange(1), default=300.0, show_default=True, help="Seconds for a row at most.")
 @click.option("--audit/--no-audit", default=True, help="Also with grey and other pictures.  [default: yes]")
 @click.option("--preset", default="compact", show_default=True, help="Network of the cascade.")
@@ -66,7 +66,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
     "--ours", multiple=True, type=NamedFolder(), help="A further row of the cascade, with weights of DIR. Repeatable."
 )
 @click.option("--masks", type=FOLDER, metavar="DIR", help="Masks for calib-anything, as in seq.")
-@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Of the CPU.")
+@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option(
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier bench."
 )

@@ -31,7 +31,7 @@ SCENES = 4
 @click.option(
     "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Runs of each of {SCENES} frames."
 )
-@click.option("--threads", type=THREADS, help="Of the CPU.  [default: all cores]")
+@click.option("--threads", type=THREADS, help="Threads of the CPU.  [default: all cores]")
 @click.option("--stages", type=STAGES, default="1-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to time.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")

@@ -19,16 +19,14 @@ LIMIT = NumberRange(min=0.0)
 @click.argument("recording", type=RECORDING, metavar="RUN.rrd")
 @click.option("--max-rotation", type=LIMIT, metavar="DEG", help="Largest rotation error allowed, in degrees.")
 @click.option("--max-translation", type=LIMIT, metavar="CM", help="Largest translation error allowed, in centimetres.")
-@click.option("--max-sigma-rotation", type=LIMIT, metavar="DEG", help="Largest uncertainty that it may state, 1σ.")
-@click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="Likewise of the translation.")
+@click.option("--max-sigma-rotation", type=LIMIT, metavar="DEG", help="Largest stated uncertainty of the rotation, 1σ.")
+@click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
 @click.option(
-    "--max-scatter-rotation", type=LIMIT, metavar="DEG", help="Farthest that frames may lie off their median."
+    "--max-scatter-rotation", type=LIMIT, metavar="DEG", help="Largest rotation of a frame off the frames' median."
 )
-@click.option("--max-scatter-translation", type=LIMIT, metavar="CM", help="Likewise of the translation.")
+@click.option("--max-scatter-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
 @click.option("--max-unused", type=LIMIT, metavar="PERCENT", help="Largest share of rejected and skipped frames.")
-@click.option(
-    "--max-fit", type=LIMIT, metavar="PX", help="Largest error that the last stage may expect of its matches."
-)
+@click.option("--max-fit", type=LIMIT, metavar="PX", help="Largest match error that the last stage expects.")
 @click.option(
     "--statistic",
     type=click.Choice(["median", "p95", "max", "drive"]),

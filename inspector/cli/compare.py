@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("recordings", type=RECORDING, nargs=-1, required=True, metavar="A.rrd B.rrd [C.rrd ...]")
-@click.option("--names", metavar="A,B", help="Of the runs, comma-separated.  [default: those of the files]")
+@click.option("--names", metavar="A,B", help="Names of the runs, comma-separated.  [default: those of the files]")
 @click.option("--common-frames", is_flag=True, help="Compare the frames that all runs have.")
 @viewing_options
 def compare(

@@ -50,17 +50,19 @@ if TYPE_CHECKING:
     help="2 or CAM_BACK, for instance.  [default: the dataset's own, as its command has it]",
 )
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
-@click.option("--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Of the miscalibrations.")
+@click.option(
+    "--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Range of the miscalibrations."
+)
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Of the miscalibrations.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
-@click.option("--audit", is_flag=True, help="Again with the image swapped, with a grey one, and with fewer rings.")
+@click.option("--audit", is_flag=True, help="Measure again with another drive's image, a grey one, and fewer rings.")
 @click.option(
     "--battery",
     is_flag=True,
-    help="Instead of all else: put some 70 faults into every frame, and see whether the verdict knows, and why.",
+    help="Instead: put some 70 faults into every frame, and count what the verdict says of them.",
 )
 @click.option(
     "--virtual",
@@ -69,7 +71,11 @@ if TYPE_CHECKING:
     help="Every sequence as N virtual rigs instead: narrower lenses, cameras turned, half of them with half the rings.",
 )
 @click.option("--drives/--no-drives", default=True, help="Also solve every drive from all its frames.  [default: yes]")
-@click.option("--classical/--no-classical", default=True, help="Also a refinement without training.  [default: yes]")
+@click.option(
+    "--classical/--no-classical",
+    default=True,
+    help="Also measure edge alignment, which needs no training.  [default: yes]",
+)
 @click.option(
     "--method",
     "methods",

@@ -52,7 +52,7 @@ MOST_WORKERS = 8
     type=click.FloatRange(0, min_open=True),
     help="Stop there if --runs and --drives are not done by then; what was run is kept, and counts the next time.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of everything random.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of everything random.")
 @click.option(
     "--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run, from their first's range."
 )

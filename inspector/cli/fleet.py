@@ -47,12 +47,12 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
     "--memory",
     type=SIZE,
     metavar="SIZE",
-    help="Of a worker, for instance 4GB.  [default: its share of the machine]",
+    help="Memory of a worker, for instance 4GB.  [default: its share of the machine]",
 )
 @click.option(
     "--detail", type=DETAIL, default="overview", show_default=True, help="How much of each frame is recorded."
 )
-@click.option("--frames", type=FRAMES, help="Of every drive, where its row says nothing else; as `verify` has it.")
+@click.option("--frames", type=FRAMES, help="Frames of every drive whose row says nothing else; as `verify` has it.")
 @click.option(
     "--options",
     default="",

@@ -40,7 +40,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         help=f"Begin with a miscalibration drawn from ± these, and let the sliders reach so far.  [{DEFAULT_RANGE}]",
     ),
     click.option("--miscalibrate", "miscalibration", type=MISCALIBRATION, help="Begin with this one."),
-    click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     *KNOWN_OPTIONS,

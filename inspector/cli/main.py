@@ -37,47 +37,50 @@ class LazyCommand:
         return command
 
 
-COMMANDS = {
-    "seq": LazyCommand("inspector.cli.inspect:runs.seq", "Calibrate a KITTI odometry sequence and record every stage."),
-    "raw": LazyCommand("inspector.cli.inspect:runs.raw", "The same for a KITTI raw drive."),
-    "object": LazyCommand("inspector.cli.inspect:runs.object", "The same for the KITTI object detection frames."),
-    "tracking": LazyCommand("inspector.cli.inspect:runs.tracking", "The same for a KITTI tracking sequence."),
-    "kitti360": LazyCommand("inspector.cli.inspect:runs.kitti360", "The same for a KITTI-360 drive."),
-    "nuscenes": LazyCommand("inspector.cli.inspect:runs.nuscenes", "The same for a scene of nuScenes."),
-    "folder": LazyCommand("inspector.cli.inspect:runs.folder", "The same for a folder of your own images and scans."),
-    "bag": LazyCommand("inspector.cli.inspect:runs.bag", "The same for a ROS 1 or ROS 2 bag, or an MCAP file."),
-    "rig": LazyCommand("inspector.cli.rig:rig", "Several cameras on one LiDAR, each alone or all as one rig."),
-    "demo": LazyCommand("inspector.cli.inspect:runs.demo", "The same for the synthetic world: needs no data."),
-    "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand and see what the cascade answers."),
-    "verify": LazyCommand("inspector.cli.verify:verify", "Whether the calibration that you have is good."),
-    "watch": LazyCommand("inspector.cli.watch:watch", "Whether the mount moved during a drive."),
-    "report": LazyCommand("inspector.cli.report:report", "A recording as a page with pictures, curves and figures."),
-    "compare": LazyCommand("inspector.cli.compare:compare", "Several recordings side by side, on one timeline."),
-    "export": LazyCommand("inspector.cli.export:export", "The extrinsic for KITTI, ROS 2 or OpenCV, or as JSON."),
-    "check": LazyCommand("inspector.cli.check:check", "Fail when a recording is rejected or exceeds limits; for CI."),
-    "pictures": LazyCommand("inspector.cli.pictures:pictures", "Pictures of every tab of a recording."),
-    "fleet": LazyCommand("inspector.cli.fleet:fleet", "Many drives, on this machine or on a cluster, in one table."),
-    "fleet-report": LazyCommand("inspector.cli.fleet_views:report", "A page of a fleet, worst first."),
-    "fleet-view": LazyCommand(
-        "inspector.cli.fleet_views:view", "All recordings of a fleet in one catalogue of Rerun's."
-    ),
-    "fleet-simulate": LazyCommand(
-        "inspector.cli.fleet_views:simulate", "A fleet of synthetic drives, to try and measure."
-    ),
-    "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade."),
-    "pack-training": LazyCommand(
-        "inspector.cli.pack_training:pack_training", "Pack training frames, to train elsewhere."
-    ),
-    "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
-    "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
-    "ablate": LazyCommand("inspector.cli.ablate:ablate", "What each module of the network costs and is worth."),
-    "bench": LazyCommand("inspector.cli.bench:bench", "All methods on the same frames: the paper's table, measured."),
-    "benchmark": LazyCommand(
-        "inspector.cli.benchmark:benchmark", "Milliseconds of the cascade by part, stage and frame."
-    ),
-    "info": LazyCommand("inspector.cli.model:info", "Parameters and multiply-adds of a network, by module."),
+SECTIONS = {
+    "Calibrate": {
+        "folder": LazyCommand("inspector.cli.inspect:runs.folder", "Calibrate a folder of your own images and scans."),
+        "bag": LazyCommand("inspector.cli.inspect:runs.bag", "Calibrate a ROS 1 or ROS 2 bag, or an MCAP file."),
+        "rig": LazyCommand("inspector.cli.rig:rig", "Calibrate several cameras with one LiDAR."),
+        "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand, and see the cascade's answer."),
+        "demo": LazyCommand("inspector.cli.inspect:runs.demo", "Calibrate a synthetic drive: needs no data."),
+        "seq": LazyCommand("inspector.cli.inspect:runs.seq", "Calibrate a KITTI odometry sequence."),
+        "raw": LazyCommand("inspector.cli.inspect:runs.raw", "Calibrate a KITTI raw drive."),
+        "object": LazyCommand("inspector.cli.inspect:runs.object", "Calibrate the KITTI object detection frames."),
+        "tracking": LazyCommand("inspector.cli.inspect:runs.tracking", "Calibrate a KITTI tracking sequence."),
+        "kitti360": LazyCommand("inspector.cli.inspect:runs.kitti360", "Calibrate a KITTI-360 drive."),
+        "nuscenes": LazyCommand("inspector.cli.inspect:runs.nuscenes", "Calibrate a nuScenes scene."),
+    },
+    "Judge a calibration": {
+        "verify": LazyCommand("inspector.cli.verify:verify", "Tell whether the calibration that you have is good."),
+        "watch": LazyCommand("inspector.cli.watch:watch", "Tell whether the mount moved during a drive."),
+        "check": LazyCommand("inspector.cli.check:check", "Check a recording's verdict and limits, for CI."),
+    },
+    "Use a recording": {
+        "report": LazyCommand("inspector.cli.report:report", "Make a page with pictures, curves and figures."),
+        "compare": LazyCommand("inspector.cli.compare:compare", "Show several recordings side by side."),
+        "export": LazyCommand("inspector.cli.export:export", "Write the extrinsic for ROS, KITTI, OpenCV and others."),
+        "pictures": LazyCommand("inspector.cli.pictures:pictures", "Take pictures of every tab."),
+    },
+    "Many drives": {
+        "fleet": LazyCommand("inspector.cli.fleet:fleet", "Verify many drives, on this machine or a cluster."),
+        "fleet-report": LazyCommand("inspector.cli.fleet_views:report", "Make a page of a fleet, worst drives first."),
+        "fleet-view": LazyCommand("inspector.cli.fleet_views:view", "Show a fleet's recordings in a Rerun catalogue."),
+        "fleet-simulate": LazyCommand("inspector.cli.fleet_views:simulate", "Make a fleet of synthetic drives to try."),
+    },
+    "Train and measure": {
+        "train": LazyCommand("inspector.cli.train:train", "Train one stage of the cascade, or all."),
+        "pack-training": LazyCommand("inspector.cli.pack_training:pack_training", "Pack frames to train elsewhere."),
+        "fit-verdict": LazyCommand("inspector.cli.fit_verdict:fit_verdict", "Fit the verdict to weights of your own."),
+        "evaluate": LazyCommand("inspector.cli.evaluate:evaluate", "Measure errors and success rates of every stage."),
+        "bench": LazyCommand("inspector.cli.bench:bench", "Measure all methods on the same frames."),
+        "ablate": LazyCommand("inspector.cli.ablate:ablate", "Measure what each module of the network is worth."),
+        "benchmark": LazyCommand("inspector.cli.benchmark:benchmark", "Measure milliseconds by part, stage and frame."),
+        "info": LazyCommand("inspector.cli.model:info", "Count parameters and multiply-adds by module."),
+    },
 }
-"""Every command, in the order in which ``--help`` lists them."""
+"""Every command, under the headings and in the order in which ``--help`` lists them."""
+COMMANDS = {name: command for section in SECTIONS.values() for name, command in section.items()}
 
 
 class LazyGroup(click.Group):
@@ -98,9 +101,11 @@ class LazyGroup(click.Group):
         return lazy.load() if lazy else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the list of commands from the texts in `COMMANDS`."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, lazy.help) for name, lazy in COMMANDS.items()])
+        """Write the lists of commands from the texts in `SECTIONS`."""
+        widest = max(map(len, COMMANDS))
+        for title, commands in SECTIONS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(widest), lazy.help) for name, lazy in commands.items()])
 
 
 def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None:

@@ -21,7 +21,7 @@ from inspector.cli.options import FOLDER, SIZE
 @click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
-@click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Of a part.")
+@click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Largest size of a part.")
 def pack_training(
     data: tuple[str, ...],
     validate: tuple[str, ...],

@@ -31,8 +31,10 @@ class SizeType(click.ParamType[tuple[int, int]]):
 @click.command()
 @click.argument("recording", type=RECORDING, metavar="FILE.rrd")
 @click.option("--out", type=FOLDER, metavar="DIR", help="Folder of the tabs' pictures; created if need be.")
-@click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Of the viewer's window.")
-@click.option("--theme", type=click.Choice(["dark", "light"]), default="dark", show_default=True, help="Of the viewer.")
+@click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Size of the viewer's window.")
+@click.option(
+    "--theme", type=click.Choice(["dark", "light"]), default="dark", show_default=True, help="Theme of the viewer."
+)
 @click.option("--frame", type=click.IntRange(0), help="Frame to show.  [default: the first; with --animate, three]")
 @click.option("--tab", "wanted", multiple=True, metavar="TEXT", help="Only tabs whose name contains this. Repeatable.")
 @overwrite_option

@@ -38,7 +38,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
     ),
     click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
-    click.option("--seed", type=SEED, default=0, show_default=True, help="Of everything random."),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
     click.option(
         "--drive/--no-drive",
         default=None,
@@ -77,7 +77,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         type=COLORING,
         default="depth",
         show_default=True,
-        help="Of the points over the image; edge: those at depth edges stand out; error: pixels off the reference.",
+        help="Colour of the points on the image; edge: depth edges stand out; error: pixels off the reference.",
     ),
     click.option(
         "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."

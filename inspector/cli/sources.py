@@ -172,9 +172,11 @@ SOURCES = (
         f"/tf_static or --guess. {AS_GIVEN}",
         parameters=(
             click.Argument(["files"], type=click.Path(path_type=Path), nargs=-1, required=True),
-            click.Option(["--image"], metavar="TOPIC", help="Of the images.  [default: the only one]"),
-            click.Option(["--points"], metavar="TOPIC", help="Of the point clouds.  [default: the only one]"),
-            click.Option(["--info"], metavar="TOPIC", help="Of the CameraInfo.  [default: the one beside the images]"),
+            click.Option(["--image"], metavar="TOPIC", help="Topic of the images.  [default: the only one]"),
+            click.Option(["--points"], metavar="TOPIC", help="Topic of the point clouds.  [default: the only one]"),
+            click.Option(
+                ["--info"], metavar="TOPIC", help="Topic of the CameraInfo.  [default: the one beside the images]"
+            ),
             GUESS,
             CAMERA_FRAME,
             LIDAR_FRAME,

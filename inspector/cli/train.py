@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 @click.option(
     "--image-encoder",
     type=click.Choice(["own", "efficientnet-lite0"]),
-    help="Instead of the preset's: own starts from nothing, the other from ImageNet.",
+    help="Image encoder instead of the preset's: own starts from nothing, the other from ImageNet.",
 )
 @click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
@@ -108,7 +108,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Draw miscalibrations from the range alone, as comparisons need it. Always so for --method.",
 )
-@click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Of everything random.")
+@click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Seed of everything random.")
 @click.option(
     "--initialize",
     type=click.Path(dir_okay=False, path_type=Path),
