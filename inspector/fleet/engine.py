@@ -40,6 +40,7 @@ SETTINGS = {
     "distributed.scheduler.allowed-failures": TRIES - 1,
     "distributed.admin.tick.limit": "1h",  # a busy machine is no news
     "distributed.worker.memory.terminate": 0.95,
+    "distributed.worker.profile.enabled": False,  # samples of the stack, kept for an hour: up to some 600 MB a worker
     "distributed.deploy.lost-worker-timeout": "1000h",  # or one that takes long to come back is given up for ever
 }
 

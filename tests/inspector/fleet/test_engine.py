@@ -169,6 +169,12 @@ def test_servers_listen_on_this_machine_only(client: Any) -> None:
     assert all(address.startswith("tls://127.0.0.1:") for address in [*addresses, *nannies])
 
 
+def test_workers_keep_no_samples_of_what_they_did(client: Any) -> None:
+    callbacks = client.run(lambda dask_worker: list(dask_worker.periodic_callbacks))
+    assert len(callbacks) == 2
+    assert not any("profile" in names for names in callbacks.values())
+
+
 def test_a_worker_whose_memory_fills_starts_anew_between_two_pieces(tmp_path: Path, two: Engine) -> None:
     pieces = [(tmp_path, number) for number in range(7)]  # one of the workers gets four
     done = sorted(outcome.done or 0 for outcome in run_all(two, hoard, pieces, StopRequest()))
