@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from inspector import entities
 from inspector.compare.comparison import ComparedRun, Comparison, of_kind
+from inspector.record.pictures.captions import caption_strip
 from inspector.record.tabs.views import (
     LEGEND_HEIGHT,
     SCREEN_HEIGHT,
@@ -114,5 +115,6 @@ def _overlay_height(comparison: Comparison) -> float:
     camera = comparison.first.frames[0].camera
     columns = min(len(comparison.runs), MOST_COLUMNS)
     rows = -(-len(comparison.runs) // columns)
-    wanted = rows * (SCREEN_WIDTH / columns * camera.height / camera.width + TITLE_BAR)
+    high = camera.height + caption_strip((camera.width, camera.height)).height
+    wanted = rows * (SCREEN_WIDTH / columns * high / camera.width + TITLE_BAR)
     return min(wanted, LARGEST_OVERLAY)

@@ -33,10 +33,10 @@ def _percent(value: float) -> str:
 
 
 COLUMNS: tuple[Column, ...] = (
-    ("rotation, median", lambda metrics: metrics.rotation_deg.median, _degrees),
-    ("rotation, p95", lambda metrics: metrics.rotation_deg.p95, _degrees),
-    ("translation, median", lambda metrics: metrics.translation_cm.median, _centimetres),
-    ("translation, p95", lambda metrics: metrics.translation_cm.p95, _centimetres),
+    ("rotation", lambda metrics: metrics.rotation_deg.median, _degrees),
+    ("p95", lambda metrics: metrics.rotation_deg.p95, _degrees),
+    ("translation", lambda metrics: metrics.translation_cm.median, _centimetres),
+    ("p95", lambda metrics: metrics.translation_cm.p95, _centimetres),
     ("< 2° and < 5 cm", lambda metrics: metrics.success_2deg_5cm, _percent),
     ("< 1° and < 2.5 cm", lambda metrics: metrics.success_1deg_2_5cm, _percent),
 )
@@ -85,7 +85,7 @@ def _pair(error: PoseError | None) -> str:
 def _errors(comparison: Comparison) -> list[str]:
     first, count = comparison.first, len(comparison.indices)
     if comparison.one_start:
-        rows = [["all, at the start", *_figures(first.initial, None)]]
+        rows = [["start of all", *_figures(first.initial, None)]]
     else:
         rows = [[f"{run.name}, at the start", *_figures(run.initial, None)] for run in comparison.runs]
     rows += [
@@ -97,7 +97,7 @@ def _errors(comparison: Comparison) -> list[str]:
         "",
         *markdown_table(["", *(name for name, _, _ in COLUMNS)], rows),
         "",
-        f"In brackets the difference to **{first.name}**. p95: 95 % of the frames are below.",
+        f"Medians; p95: 95 % of the frames are below. In brackets the difference to **{first.name}**.",
     ]
 
 
@@ -110,14 +110,14 @@ def _figures(metrics: Metrics | None, other: Metrics | None) -> list[str]:
         cell = say(value(metrics))
         change = 0.0 if other is None else value(metrics) - value(other)
         if say(abs(change)) != say(0.0):
-            cell += f" ({'−' if change < 0 else '+'}{say(abs(change))})"
+            cell += f" ({'−' if change < 0 else '+'}{say(abs(change)).removesuffix(' cm')})"
         cells.append(cell)
     return cells
 
 
 def _distances(comparison: Comparison) -> list[str]:
     rows = [[run.name, *_figures(run.distance(comparison.first), None)[:4]] for run in comparison.runs[1:]]
-    return markdown_table(["", *(name for name, _, _ in COLUMNS[:4])], rows)
+    return [*markdown_table(["", *(name for name, _, _ in COLUMNS[:4])], rows), "", "Medians, and 95th percentiles."]
 
 
 def _settings(comparison: Comparison) -> list[str]:
