@@ -129,8 +129,8 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
 
     from calibnet.cascade.cascade import Cascade
     from inspector.live.accept import Target
-    from inspector.live.bench import Bench
     from inspector.live.session import LiveSession
+    from inspector.live.workspace import Workspace
 
     if keeping.connect is not None and not keeping.native:
         raise click.UsageError("--connect belongs to --native: a page brings its own viewer.")
@@ -147,8 +147,8 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     else:
         method = open_other(options)
         say(UNJUDGED, err=True)
-    bench = Bench(sequence, options.positions, options.start, options.seed)
-    session = partial(LiveSession, bench, method, target, options.range or DEFAULT_RANGE, known=options.prior.words)
+    workspace = Workspace(sequence, options.positions, options.start, options.seed)
+    session = partial(LiveSession, workspace, method, target, options.range or DEFAULT_RANGE, known=options.prior.words)
     if keeping.native:
         in_a_window(session, keeping.connect)
     else:

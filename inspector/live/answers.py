@@ -21,10 +21,10 @@ from calibnet.errors import CalibrationError, ConfigError, DatasetError
 from calibnet.geometry import pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, DriveEstimate, StageTrace
-from inspector.live.bench import Bench, StagedCalibrator
 from inspector.live.stream import TryRecording
 from inspector.live.tries import Try
 from inspector.live.worker import Job, Worker
+from inspector.live.workspace import StagedCalibrator, Workspace
 from inspector.record.observation import Observation
 from inspector.record.pictures.matches import point_at
 
@@ -36,7 +36,7 @@ Progress = Callable[[int, int], None]
 
 
 class Answers:
-    """Asks the method about what is on the bench, and keeps what it says.
+    """Asks the method about what is on the workspace, and keeps what it says.
 
     Attributes:
         stream: the recording of it.
@@ -44,7 +44,7 @@ class Answers:
 
     def __init__(
         self,
-        bench: Bench,
+        workspace: Workspace,
         stream: TryRecording,
         method: Calibrator,
         worker: Worker,
@@ -53,13 +53,13 @@ class Answers:
         """Nothing runs yet.
 
         Args:
-            bench: what is tried.
+            workspace: what is tried.
             stream: where tries are recorded.
             method: that answers.
             worker: that runs it.
             tell_try: called with every answer.
         """
-        self._bench, self.stream, self._method, self._worker = bench, stream, method, worker
+        self._workspace, self.stream, self._method, self._worker = workspace, stream, method, worker
         self._tell_try = tell_try
         self._newest: tuple[int, Observation] | None = None
         self._ready = False
@@ -77,7 +77,7 @@ class Answers:
 
     def get_ready(self) -> None:
         """Let the networks see the frame once, unasked: the first look at a size of picture takes twice as long."""
-        method, frame, start = self._method, self._bench.frame, self._bench.extrinsic
+        method, frame, start = self._method, self._workspace.frame, self._workspace.extrinsic
         if self._ready or not isinstance(method, StagedCalibrator):
             return
         self._ready = True
@@ -103,7 +103,7 @@ class Answers:
             if not isinstance(method, StagedCalibrator):
                 raise ConfigError("This method has no stages to run one at a time.")
             method = method.only(number)
-        frame, start, reference = self._bench.frame, self._bench.extrinsic, self._bench.reference
+        frame, start, reference = self._workspace.frame, self._workspace.extrinsic, self._workspace.reference
 
         def compute(_: Progress) -> tuple[CascadeTrace, float]:
             began = time.perf_counter()
@@ -112,7 +112,7 @@ class Answers:
 
         async def finish(result: tuple[CascadeTrace, float]) -> None:
             trace, milliseconds = result
-            made = self._bench.keep(lambda number: Try.of_trace(number, frame.index, trace, milliseconds))
+            made = self._workspace.keep(lambda number: Try.of_trace(number, frame.index, trace, milliseconds))
             await self._tell_try(made)
             self._record(made, method, frame, Observation(frame, trace, reference))
 
@@ -143,7 +143,7 @@ class Answers:
         Raises:
             ConfigError: the method solves no drives.
         """
-        frames, start, index = self._bench.frames, self._bench.extrinsic, self._bench.frame.index
+        frames, start, index = self._workspace.frames, self._workspace.extrinsic, self._workspace.frame.index
         method = self._method
         if not isinstance(method, DriveCalibrator):
             raise ConfigError("This method calibrates single frames and solves no drive.")
@@ -154,14 +154,14 @@ class Answers:
 
         async def finish(result: tuple[DriveEstimate, float]) -> None:
             estimate, milliseconds = result
-            made = self._bench.keep(lambda number: Try.of_drive(number, index, start, estimate, milliseconds))
+            made = self._workspace.keep(lambda number: Try.of_drive(number, index, start, estimate, milliseconds))
             await self._tell_try(made)
 
         self._worker.ask(Job("solving the drive", compute, finish))
 
     def worst(self, shown: Callable[[], Awaitable[None]]) -> None:
         """Show the frame, of some from all over the drive, that the method leaves worst from this pose."""
-        bench, frames, pose = self._bench, self._bench.frames, self._bench.pose
+        workspace, frames, pose = self._workspace, self._workspace.frames, self._workspace.pose
 
         def compute(tell: Progress) -> tuple[int, Frame]:
             positions, worst = spread(len(frames), MOST_SEARCHED), (-math.inf, 0)
@@ -169,15 +169,15 @@ class Answers:
                 tell(done, len(positions))
                 try:
                     frame = frames[position]
-                    trace = self._method.calibrate(frame, pose.applied_to(bench.guess_of(frame)), detail=False)
-                    badness = _badness(trace, bench.reference_of(frame))
+                    trace = self._method.calibrate(frame, pose.applied_to(workspace.guess_of(frame)), detail=False)
+                    badness = _badness(trace, workspace.reference_of(frame))
                 except (CalibrationError, DatasetError):
                     badness = math.inf
                 worst = max(worst, (badness, position))
             return worst[1], frames[worst[1]]
 
         async def finish(found: tuple[int, Frame]) -> None:
-            bench.show(*found)
+            workspace.show(*found)
             await shown()
 
         self._worker.ask(Job("looking for the worst frame", compute, finish))
@@ -197,7 +197,7 @@ class Answers:
             ConfigError: it is not the newest one of this frame, or no point lies there.
         """
         number, observation = self._newest or (-1, None)
-        if observation is None or number != made.number or observation.frame is not self._bench.frame:
+        if observation is None or number != made.number or observation.frame is not self._workspace.frame:
             raise ConfigError("Only the newest try on this frame still has its cost volumes; run again from there.")
         point = point_at(observation.projected(under), pixel, REACH_PX)
         if point is None:

@@ -56,7 +56,7 @@ class LiveApp:
         """Answer about the current frame; the page adds its position to the address, so that no old answer is shown."""
 
         async def answer(_: Request) -> Response:
-            content = await asyncio.to_thread(make, self._session.bench.frame)
+            content = await asyncio.to_thread(make, self._session.workspace.frame)
             return Response(content, media_type=media_type, headers={"cache-control": "no-store"})
 
         return answer

@@ -14,12 +14,12 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
 from inspector.live.accept import Target, doubts, verdict_on
 from inspector.live.answers import Answers
-from inspector.live.bench import Bench
 from inspector.live.payload import palettes
 from inspector.live.pose import Pose
 from inspector.live.stream import TryRecording, TryStream
 from inspector.live.tries import Try
 from inspector.live.worker import Worker
+from inspector.live.workspace import Workspace
 
 Tell = Callable[[dict[str, Any]], Awaitable[None]]
 
@@ -28,13 +28,13 @@ class LiveSession:
     """Acts on messages; everything but `Job.compute` runs in the server's thread.
 
     Attributes:
-        bench: what is tried.
+        workspace: what is tried.
         stream: the recording of it.
     """
 
     def __init__(
         self,
-        bench: Bench,
+        workspace: Workspace,
         method: Calibrator,
         target: Target,
         range_: MiscalibrationRange,
@@ -44,17 +44,17 @@ class LiveSession:
         """Begin without a try.
 
         Args:
-            bench: with its first frame.
+            workspace: with its first frame.
             method: that answers: the cascade, or another one.
             target: where an accepted calibration goes.
             range_: of the sliders, and of random poses.
             stream: that tries are recorded in; `TryStream`, if not given.
             known: what the method knows of the pose that it starts from, in words.
         """
-        self.bench, self.stream = bench, stream or TryStream()
+        self.workspace, self.stream = workspace, stream or TryStream()
         self._target, self._range, self._known = target, range_, known
         self._worker = Worker(self._tell_state, self._tell_problem)
-        self._answers = Answers(bench, self.stream, method, self._worker, self._tell_try)
+        self._answers = Answers(workspace, self.stream, method, self._worker, self._tell_try)
         self.tell: Tell = _nobody
         self._actions: dict[str, Callable[[dict[str, Any]], Awaitable[None]]] = {
             "pose": self._pose,
@@ -89,14 +89,14 @@ class LiveSession:
         """What a window needs that opens."""
         return {
             "is": "hello",
-            "name": self.bench.name,
+            "name": self.workspace.name,
             "known": self._known,
             "stages": self._answers.stages,
             "drives": self._answers.solves_drives,
             "range": [self._range.rotation_deg, self._range.translation_m],
             "target": str(self._target.file),
             "palettes": palettes(),
-            "tries": [self._as_dict(made) for made in self.bench.tries],
+            "tries": [self._as_dict(made) for made in self.workspace.tries],
             "state": self.state(),
         }
 
@@ -106,22 +106,22 @@ class LiveSession:
 
     def state(self) -> dict[str, Any]:
         """What changes with every message."""
-        bench, camera = self.bench, self.bench.frame.camera
-        reference = bench.reference
+        workspace, camera = self.workspace, self.workspace.frame.camera
+        reference = workspace.reference
         return {
             "is": "state",
             "frame": {
-                "index": bench.frame.index,
-                "position": bench.position,
-                "count": len(bench.frames),
+                "index": workspace.frame.index,
+                "position": workspace.position,
+                "count": len(workspace.frames),
                 "size": [camera.width, camera.height],
                 "camera": [*camera.focal, *camera.matrix[:2, 2].tolist()],
-                "guess": bench.guess.ravel().tolist(),
+                "guess": workspace.guess.ravel().tolist(),
                 "reference": None if reference is None else reference.ravel().tolist(),
             },
-            "pose": list(bench.pose),
-            "can_undo": bench.can_undo,
-            "can_redo": bench.can_redo,
+            "pose": list(workspace.pose),
+            "can_undo": workspace.can_undo,
+            "can_redo": workspace.can_redo,
             "busy": self._worker.busy,
             "progress": self._worker.progress,
         }
@@ -146,38 +146,38 @@ class LiveSession:
         pose = Pose(roll, pitch, yaw, x, y, z)
         if not pose.is_finite():
             raise ConfigError("Angles are within ±180° and offsets within ±100 m.")
-        self.bench.move(pose)
+        self.workspace.move(pose)
         await self._moved(message)
 
     async def _undo(self, message: dict[str, Any]) -> None:
-        self.bench.undo()
+        self.workspace.undo()
         await self._moved(message)
 
     async def _redo(self, message: dict[str, Any]) -> None:
-        self.bench.redo()
+        self.workspace.redo()
         await self._moved(message)
 
     async def _to_guess(self, message: dict[str, Any]) -> None:
-        self.bench.move(Pose())
+        self.workspace.move(Pose())
         await self._moved(message)
 
     async def _to_reference(self, message: dict[str, Any]) -> None:
-        if self.bench.reference is None:
+        if self.workspace.reference is None:
             raise ConfigError("No reference is known for these frames.")
-        self.bench.move_to(self.bench.reference)
+        self.workspace.move_to(self.workspace.reference)
         await self._moved(message)
 
     async def _to_random(self, message: dict[str, Any]) -> None:
-        self.bench.move_randomly(MiscalibrationRange.parse(str(message.get("range") or self._range)))
+        self.workspace.move_randomly(MiscalibrationRange.parse(str(message.get("range") or self._range)))
         await self._moved(message)
 
     async def _take(self, message: dict[str, Any]) -> None:
         """Make a step of a try the pose; nothing runs from it by itself."""
-        self.bench.move_to(self._step(message))
+        self.workspace.move_to(self._step(message))
         await self._tell_state()
 
     def _step(self, message: dict[str, Any]) -> Extrinsic:
-        return self.bench.tries[int(message["try"])].steps[int(message["step"])].camera_from_lidar
+        return self.workspace.tries[int(message["try"])].steps[int(message["step"])].camera_from_lidar
 
     async def _moved(self, message: dict[str, Any]) -> None:
         await self._tell_state()
@@ -197,8 +197,8 @@ class LiveSession:
         self._worker.stop()
 
     async def _frame(self, message: dict[str, Any]) -> None:
-        position = int(message["position"]) % len(self.bench.frames)
-        self.bench.show(position, await asyncio.to_thread(self.bench.frames.__getitem__, position))
+        position = int(message["position"]) % len(self.workspace.frames)
+        self.workspace.show(position, await asyncio.to_thread(self.workspace.frames.__getitem__, position))
         await self._moved(message)
 
     async def _worst(self, message: dict[str, Any]) -> None:
@@ -215,29 +215,29 @@ class LiveSession:
         async def found(metres: float) -> None:
             await self.tell({"is": "said", "text": f"Search windows moved to a point {metres:.1f} m away."})
 
-        self._answers.look(self.bench.tries[int(message["try"])], under, pixel, found)
+        self._answers.look(self.workspace.tries[int(message["try"])], under, pixel, found)
 
     # ---- keeping ------------------------------------------------------------------------------------------------
 
     async def _accept(self, message: dict[str, Any]) -> None:
         """Write an extrinsic as calibration; one that is not accepted only when that is confirmed."""
         by_hand = message.get("try") is None
-        extrinsic = self.bench.extrinsic if by_hand else self._step(message)
-        verdict = verdict_on(extrinsic, self.bench.tries)
+        extrinsic = self.workspace.extrinsic if by_hand else self._step(message)
+        verdict = verdict_on(extrinsic, self.workspace.tries)
         doubt = doubts(verdict)
         if doubt and not message.get("sure"):
             await self.tell(
                 {"is": "sure?", "text": f"{doubt[0].upper()}{doubt[1:]}", "again": {**message, "sure": True}}
             )
             return
-        origin = f"{self.bench.name}, frame {self.bench.frame.index}, accepted in calib-inspect live"
-        text = self._target.write(self.bench.frame, np.array(extrinsic), origin, verdict)
+        origin = f"{self.workspace.name}, frame {self.workspace.frame.index}, accepted in calib-inspect live"
+        text = self._target.write(self.workspace.frame, np.array(extrinsic), origin, verdict)
         await self.tell({"is": "said", "text": text})
 
     # ---- telling ------------------------------------------------------------------------------------------------
 
     def _as_dict(self, made: Try) -> dict[str, Any]:
-        return made.as_dict(self.bench.reference)
+        return made.as_dict(self.workspace.reference)
 
     async def _tell_try(self, made: Try) -> None:
         await self.tell({"is": "try", **self._as_dict(made)})

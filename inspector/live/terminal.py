@@ -70,7 +70,7 @@ class Terminal:
             say: prints a line.
         """
         self._session, self._window, self._say = session, window, say
-        self._bench = session.bench
+        self._workspace = session.workspace
         self._steps, self._on_release = "coarse", True
         self._moved_at: float | None = None
         self._asked: dict[str, Any] | None = None
@@ -109,7 +109,7 @@ class Terminal:
             await self._session.act({**MESSAGES[key], **({"run": self._on_release} if moves else {})})
         elif key in (*LEFT, *RIGHT, "n", "p"):
             by = 1 if key in (*RIGHT, "n") else -1
-            await self._session.act({"do": "frame", "position": self._bench.position + by, "run": self._on_release})
+            await self._session.act({"do": "frame", "position": self._workspace.position + by, "run": self._on_release})
         elif key in ("l", "k"):
             await self._last("take" if key == "l" else "accept")
         elif key == "v":
@@ -128,8 +128,8 @@ class Terminal:
         for keys, axis in AXES.items():
             if key.lower() in keys:
                 step = STEPS[self._steps][axis in ("x", "y", "z")] * (0.1 if key.isupper() else 1.0)
-                value = getattr(self._bench.pose, axis) + (step if key.lower() == keys[0] else -step)
-                return self._bench.pose._replace(**{axis: value})
+                value = getattr(self._workspace.pose, axis) + (step if key.lower() == keys[0] else -step)
+                return self._workspace.pose._replace(**{axis: value})
         return None
 
     async def _release(self) -> None:
@@ -139,19 +139,21 @@ class Terminal:
 
     async def _last(self, what: str) -> None:
         """Take or keep the last answer; without one, what is kept is the pose."""
-        if self._bench.tries:
-            made = self._bench.tries[-1]
+        if self._workspace.tries:
+            made = self._workspace.tries[-1]
             await self._session.act({"do": what, "try": made.number, "step": len(made.steps) - 1})
         elif what == "accept":
             await self._session.act({"do": what})
 
     async def _hold(self) -> None:
         """Let the window follow, where the pose or the frame is another one."""
-        bench = self._bench
-        now = (bench.frame, bench.pose)
+        workspace = self._workspace
+        now = (workspace.frame, workspace.pose)
         if self._held is None or now != self._held:
             self._held = now
-            await asyncio.to_thread(self._window.hold, len(bench.tries), bench.frame, bench.extrinsic, bench.reference)
+            await asyncio.to_thread(
+                self._window.hold, len(workspace.tries), workspace.frame, workspace.extrinsic, workspace.reference
+            )
 
     async def _hear(self, message: dict[str, Any]) -> None:
         kind = message["is"]

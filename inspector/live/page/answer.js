@@ -1,5 +1,5 @@
 // What the cascade answered: the verdict, the stages of the shown try, and every try so far.
-import { at, live, shownTry } from "./bench.js";
+import { at, live, shownTry } from "./workspace.js";
 import { redraw } from "./picture.js";
 import { figures } from "./poses.js";
 

@@ -1,7 +1,7 @@
 // The page of `calib-inspect live`: what its buttons and keys ask for, and what is done with the answers, which come
 // over a websocket.
 import { show, showSteps, walk } from "./answer.js";
-import { at, live, shownTry } from "./bench.js";
+import { at, live, shownTry } from "./workspace.js";
 import { legend } from "./colours.js";
 import { fit, forgetFrame, pixelUnder, redraw, showFrame } from "./picture.js";
 import { extrinsicOf } from "./poses.js";

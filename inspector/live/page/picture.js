@@ -1,5 +1,5 @@
 // The picture with the points of the scan over it, drawn here so that they follow the hand at once.
-import { at, live, shownTry } from "./bench.js";
+import { at, live, shownTry } from "./workspace.js";
 import { colours } from "./colours.js";
 import { extrinsicOf, figures, off } from "./poses.js";
 

@@ -1,6 +1,6 @@
 // Six sliders, their fields and their keys.
 import { showSteps, stopWalking } from "./answer.js";
-import { at, live } from "./bench.js";
+import { at, live } from "./workspace.js";
 import { redraw } from "./picture.js";
 import { send } from "./wire.js";
 

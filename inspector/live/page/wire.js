@@ -1,5 +1,5 @@
 // Talking with calib-inspect, and telling people.
-import { at } from "./bench.js";
+import { at } from "./workspace.js";
 
 const SOON = 2000; // milliseconds until a lost connection is tried again
 let socket = null;

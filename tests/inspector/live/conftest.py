@@ -11,8 +11,8 @@ import pytest
 
 from calibnet.geometry import MiscalibrationRange
 from inspector.live.accept import Target
-from inspector.live.bench import Bench
 from inspector.live.session import LiveSession
+from inspector.live.workspace import Workspace
 from inspector.run.start import Start
 from tests.support.fakes import FakeCascade, FakeSequence
 
@@ -34,9 +34,9 @@ def make(tmp_path: Path) -> Iterator[Make]:
     made: list[LiveSession] = []
 
     def session(length: int = 3, as_is: bool = False, cascade: Any = None, **given: Any) -> LiveSession:
-        bench = Bench(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
+        workspace = Workspace(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
         target = Target(tmp_path / "out" / "calibration.corrected.yaml")
-        made.append(LiveSession(bench, cascade or FakeCascade(), target, RANGE, **given))
+        made.append(LiveSession(workspace, cascade or FakeCascade(), target, RANGE, **given))
         return made[-1]
 
     yield session

@@ -126,15 +126,15 @@ def test_drag_let_go_and_see_the_answer(browser: Browser, make: Callable[..., Li
     drag(page, "yaw", 0.3, let_go=False)
     page.wait_for_function(f"document.getElementById('caption').textContent !== {before!r}")
     redrawn(page, picture, "the points follow before anybody lets go")
-    assert session.bench.tries == []
+    assert session.workspace.tries == []
     page.mouse.up()
     answered(page)
     says(page, "#word", "Accepted")
-    assert session.bench.pose.yaw == pytest.approx(float(page.locator("#number-yaw").input_value()), abs=1e-3)
+    assert session.workspace.pose.yaw == pytest.approx(float(page.locator("#number-yaw").input_value()), abs=1e-3)
     # what the page draws is what was asked: its own arithmetic and ours say the same error
     shown = [re.findall(r"[\d.]+", text)[-2:] for text in page.locator("#steps tr td:nth-child(2)").all_inner_texts()]
     assert len(shown) == 4
-    made = session.bench.tries[0].as_dict(session.bench.reference)
+    made = session.workspace.tries[0].as_dict(session.workspace.reference)
     expected = [[f"{step['error'][0]:.2f}", f"{step['error'][1]:.1f}"] for step in made["steps"]]
     assert shown == expected
     counts(page, "#answer.past", 0)
@@ -155,7 +155,7 @@ def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession]
     press = "new KeyboardEvent('keydown', {key, bubbles: true})"
     page.evaluate(f"[...'qqafyh'].forEach((key) => document.body.dispatchEvent({press}))")
     page.wait_for_function("!document.getElementById('undo').disabled")
-    assert tuple(session.bench.pose) == pytest.approx((0.25, 0, 0, -0.02, 0, 0))
+    assert tuple(session.workspace.pose) == pytest.approx((0.25, 0, 0, -0.02, 0, 0))
     page.locator("#number-z").fill("0.123")
     page.keyboard.press("Tab")
     page.wait_for_function("live.pose[5] === 0.123")
@@ -168,7 +168,7 @@ def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession]
     page.wait_for_function("live.pose[0] === 0.25")
     page.get_by_role("button", name="To the reference").click()
     says(page, "#caption", "mine: 0.00°, 0.0 cm off")
-    assert session.bench.tries == []
+    assert session.workspace.tries == []
     page.locator("#caption").click()
     page.keyboard.press("Enter")
     answered(page)
@@ -183,7 +183,7 @@ def test_two_windows_show_the_same_and_one_may_close(
     drag(one, "roll", 0.2)
     for page in (one, two):
         answered(page)
-    two.wait_for_function(f"live.pose[0] === {session.bench.pose.roll!r}")
+    two.wait_for_function(f"live.pose[0] === {session.workspace.pose.roll!r}")
     assert two.locator("#number-roll").input_value() == one.locator("#number-roll").input_value()
     one.close()
     drag(two, "pitch", -0.2)
@@ -226,7 +226,7 @@ def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., L
     answered(page)
     frame = next(frame for frame in page.frames if "viewer" in frame.url)
     frame.wait_for_function("window.given.length === 1")
-    seen = session._answers._newest[1].projected(session.bench.tries[0].found)
+    seen = session._answers._newest[1].projected(session.workspace.tries[0].found)
     u, v = seen.pixels[int(np.argmin(seen.depth))].tolist()
     box, (width, height) = page.locator("#canvas").bounding_box(), (400, 120)
     assert box is not None

@@ -31,7 +31,7 @@ def test_a_release_is_answered_stage_by_stage(make: Make, heard_after: HeardAfte
     session = make()
     (answer,) = told(heard_after(session, MOVE), "try")
     assert [step["name"] for step in answer["steps"]] == ["mine", "stage 3", "stage 4", "stage 5"]
-    np.testing.assert_allclose(np.reshape(answer["steps"][0]["extrinsic"], (4, 4)), session.bench.extrinsic)
+    np.testing.assert_allclose(np.reshape(answer["steps"][0]["extrinsic"], (4, 4)), session.workspace.extrinsic)
     errors = [step["error"][0] for step in answer["steps"]]
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.05 * errors[0]
     assert answer["verdict"]["word"] == "accepted"
@@ -61,7 +61,7 @@ def test_networks_see_the_frame_once_before_anybody_asks(make: Make) -> None:
             await session.idle()
 
     asyncio.run(look())
-    assert (cascade.runs, problems, session.bench.tries) == (1, [], [])
+    assert (cascade.runs, problems, session.workspace.tries) == (1, [], [])
 
 
 def test_without_run_the_pose_alone_moves(make: Make, heard_after: HeardAfter) -> None:
@@ -91,8 +91,8 @@ def test_the_drive_is_solved_and_tells_how_far_it_is(make: Make, heard_after: He
 def test_a_taken_step_becomes_the_pose(make: Make, heard_after: HeardAfter) -> None:
     session = make()
     heard_after(session, MOVE, {"do": "take", "try": 0, "step": 3})
-    np.testing.assert_allclose(session.bench.extrinsic, session.bench.tries[0].found, atol=1e-12)
-    assert session.bench.can_undo
+    np.testing.assert_allclose(session.workspace.extrinsic, session.workspace.tries[0].found, atol=1e-12)
+    assert session.workspace.can_undo
 
 
 def test_frames_go_round_and_the_worst_is_found(make: Make, heard_after: HeardAfter) -> None:
@@ -103,15 +103,15 @@ def test_frames_go_round_and_the_worst_is_found(make: Make, heard_after: HeardAf
 
     session = make(cascade=Uneven())
     heard_after(session, {"do": "frame", "position": -1})
-    assert session.bench.frame.index == 6
+    assert session.workspace.frame.index == 6
     (answer,) = told(heard_after(session, {"do": "worst"}), "try")
-    assert session.bench.frame.index == 5 and answer["frame"] == 5
+    assert session.workspace.frame.index == 5 and answer["frame"] == 5
 
 
 def test_a_click_moves_the_windows_to_that_point(make: Make, heard_after: HeardAfter) -> None:
     session = make()
     heard_after(session, MOVE)
-    seen = session._answers._newest[1].projected(session.bench.tries[0].found)
+    seen = session._answers._newest[1].projected(session.workspace.tries[0].found)
     nearest = int(np.argmin(seen.depth))
     pixel = seen.pixels[nearest].tolist()
     heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": pixel})
@@ -130,8 +130,8 @@ def test_what_is_accepted_is_written_as_a_calibration(make: Make, heard_after: H
     file = tmp_path / "out" / "calibration.corrected.yaml"
     assert told(heard, "said")[0]["text"] == f"Wrote {file}."
     path, camera, written = read_calibration_of(file.parent)
-    assert path == file and camera.width == session.bench.frame.camera.width
-    np.testing.assert_allclose(written, session.bench.tries[0].found, atol=1e-12)
+    assert path == file and camera.width == session.workspace.frame.camera.width
+    np.testing.assert_allclose(written, session.workspace.tries[0].found, atol=1e-12)
     assert told(heard_after(session, {"do": "accept", "try": 0, "step": 3}), "said")[0]["text"].startswith("Replaced")
 
 
@@ -214,7 +214,7 @@ def test_without_reference_there_are_no_errors(make: Make, heard_after: HeardAft
     heard = heard_after(session, MOVE, {"do": "reference"})
     assert all(step["error"] is None for step in told(heard, "try")[0]["steps"])
     assert told(heard, "problem")[0]["text"] == "No reference is known for these frames."
-    np.testing.assert_allclose(session.bench.guess, REFERENCE)
+    np.testing.assert_allclose(session.workspace.guess, REFERENCE)
 
 
 def test_details_are_those_of_a_whole_run_and_make_room_between_two_stages() -> None:

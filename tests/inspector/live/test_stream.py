@@ -9,9 +9,9 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 from calibnet.geometry import MiscalibrationRange
-from inspector.live.bench import Bench
 from inspector.live.stream import TIMELINE, TryStream
 from inspector.live.tries import Try
+from inspector.live.workspace import Workspace
 from inspector.record.observation import Observation
 from inspector.run.start import Start
 from tests.support.fakes import FakeCascade, FakeSequence
@@ -28,9 +28,9 @@ def rows(file: Path, entity: str, component: str) -> list[tuple[int, Any]]:
 
 
 def test_tries_lie_one_after_the_other_with_their_stages(tmp_path: Path) -> None:
-    bench = Bench(FakeSequence(2), [0, 1], Start(MiscalibrationRange(5, 0.5)))
-    trace = FakeCascade().calibrate(bench.frame, bench.extrinsic)
-    observation, stream = Observation(bench.frame, trace, bench.reference), TryStream()
+    workspace = Workspace(FakeSequence(2), [0, 1], Start(MiscalibrationRange(5, 0.5)))
+    trace = FakeCascade().calibrate(workspace.frame, workspace.extrinsic)
+    observation, stream = Observation(workspace.frame, trace, workspace.reference), TryStream()
     tries = [Try.of_trace(number, 0, trace, 5.0) for number in (0, 1)]
     for made in tries:
         stream.log(made, observation)

@@ -16,11 +16,11 @@ import rerun as rr
 from PIL import Image
 
 from calibnet.geometry import pose_error
-from inspector.live.bench import Bench
 from inspector.live.keys import END, keyboard, split_keys
 from inspector.live.session import LiveSession
 from inspector.live.terminal import Terminal, help_text
 from inspector.live.window import WindowRecording
+from inspector.live.workspace import Workspace
 from tests.support.fakes import FakeCascade
 
 Read = Callable[..., list[tuple[Any, Any]]]
@@ -36,8 +36,8 @@ class Window:
         self.said: list[str] = []
 
     @property
-    def bench(self) -> Bench:
-        return self.session.bench
+    def workspace(self) -> Workspace:
+        return self.session.workspace
 
     def press(self, *keys: str) -> list[str]:
         """Press keys, each when what came before is done, then end; what was said."""
@@ -73,24 +73,24 @@ def window(make: Callable[..., LiveSession], tmp_path: Path, monkeypatch: pytest
 def test_keys_turn_and_move_and_letting_go_asks(window: Callable[..., Window]) -> None:
     one = window()
     said = one.press("q", "q", "A", "f", "y")
-    assert tuple(one.bench.pose) == pytest.approx((0.475, 0, 0, -0.02, 0, 0.02))
-    (made,) = one.bench.tries
+    assert tuple(one.workspace.pose) == pytest.approx((0.475, 0, 0, -0.02, 0, 0.02))
+    (made,) = one.workspace.tries
     assert said[0] == "Running all stages ..."
     assert said[1].startswith("Try 0, frame 4: stages 3 to 5, ") and said[1].endswith(" ms: ACCEPTED.")
-    error = pose_error(made.found, one.bench.reference)
+    error = pose_error(made.found, one.workspace.reference)
     assert any(f"{error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off" in line for line in said)
     said = one.press("v", "e", "z", "Z", "o", "d")
-    assert one.bench.pose.yaw == pytest.approx(0.0)
+    assert one.workspace.pose.yaw == pytest.approx(0.0)
     assert "Steps of 0.02° and 0.2 cm." in said and "Runs with Enter only." in said
 
 
 def test_single_stages_frames_and_the_drive(window: Callable[..., Window]) -> None:
     one = window()
     one.press("4", "n", "\x1b[D", "p", "m", "9")
-    assert [made.title for made in one.bench.tries][:1] == ["stage 4"]
-    assert "drive of 3 frames" in [made.title for made in one.bench.tries]
-    assert one.bench.frame.index == 6  # forth, back, and back round to the last of 4, 5, 6
-    np.testing.assert_allclose(one.bench.extrinsic, one.bench.reference, atol=1e-9)
+    assert [made.title for made in one.workspace.tries][:1] == ["stage 4"]
+    assert "drive of 3 frames" in [made.title for made in one.workspace.tries]
+    assert one.workspace.frame.index == 6  # forth, back, and back round to the last of 4, 5, 6
+    np.testing.assert_allclose(one.workspace.extrinsic, one.workspace.reference, atol=1e-9)
     assert "There is no stage" not in "".join(one.said)
 
 

@@ -1,4 +1,4 @@
-"""What is on the bench: a frame, the guess that one began with, the pose that is tried, and what was tried before.
+"""The state of a live session: the frame, the guess it began with, the pose that is tried, and earlier tries.
 
 Only the server's own thread touches it; what takes long gets its input from here and brings its result back.
 """
@@ -38,7 +38,7 @@ class StagedCalibrator(DriveCalibrator, Protocol):
         ...
 
 
-class Bench:
+class Workspace:
     """The state of a live session.
 
     Attributes:
@@ -49,7 +49,7 @@ class Bench:
     """
 
     def __init__(self, sequence: Sequence, positions: Positions[int], start: Start, seed: int = 0) -> None:
-        """Put the first frame on the bench.
+        """Begin with the first frame.
 
         Args:
             sequence: where frames come from.
@@ -76,7 +76,7 @@ class Bench:
         return self._sequence.name
 
     def show(self, position: int, frame: Frame) -> None:
-        """Put another frame on the bench; the pose stays, for the mount is the same."""
+        """Put another frame on the workspace; the pose stays, for the mount is the same."""
         self.position, self.frame = position, frame
 
     def guess_of(self, frame: Frame) -> Extrinsic:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import MiscalibrationRange, miscalibration, pose_error
-from inspector.live.bench import Bench
 from inspector.live.pose import Pose
+from inspector.live.workspace import Workspace
 from inspector.run.start import Start
 from tests.support.fakes import REFERENCE, FakeSequence
 
 
-def bench(as_is: bool = False) -> Bench:
-    return Bench(FakeSequence(2), [0, 1], Start(MiscalibrationRange(5, 0.5), 3, as_is=as_is))
+def workspace(as_is: bool = False) -> Workspace:
+    return Workspace(FakeSequence(2), [0, 1], Start(MiscalibrationRange(5, 0.5), 3, as_is=as_is))
 
 
 def test_a_pose_is_the_change_that_a_miscalibration_is() -> None:
@@ -32,7 +32,7 @@ def test_what_is_no_pose_is_known(pose: Pose) -> None:
 
 
 def test_every_move_can_be_undone_and_redone() -> None:
-    one = bench()
+    one = workspace()
     poses = [Pose(roll=1.0), Pose(roll=2.0), Pose(roll=2.0), Pose(yaw=1.0)]
     for pose in poses:
         one.move(pose)
@@ -50,7 +50,7 @@ def test_every_move_can_be_undone_and_redone() -> None:
 
 
 def test_the_reference_is_arrived_at_exactly() -> None:
-    one = bench()
+    one = workspace()
     assert one.reference is not None
     assert pose_error(one.extrinsic, one.reference).rotation_deg > 1.0
     one.move_to(one.reference)
@@ -59,7 +59,7 @@ def test_the_reference_is_arrived_at_exactly() -> None:
 
 @pytest.mark.parametrize("as_is", [False, True])
 def test_random_poses_lie_around_the_truth_or_the_guess(as_is: bool) -> None:
-    one = bench(as_is)
+    one = workspace(as_is)
     assert (one.reference is None) == as_is
     around = one.guess if one.reference is None else one.reference
     range_ = MiscalibrationRange(2, 0.2)
@@ -72,7 +72,7 @@ def test_random_poses_lie_around_the_truth_or_the_guess(as_is: bool) -> None:
 
 
 def test_another_frame_keeps_the_pose() -> None:
-    one = bench()
+    one = workspace()
     one.move(Pose(roll=1.0))
     one.show(1, one.frames[1])
     assert (one.frame.index, one.position, one.pose) == (1, 1, Pose(roll=1.0))
