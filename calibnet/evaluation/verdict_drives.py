@@ -29,7 +29,7 @@ MOST = 16
 ENOUGH = 8
 """Frames from which on a sequence is drawn as often as any: half as many, half as often."""
 VIRTUAL_SHARE = 0.5
-"""Of the drives: those that `calibnet.evaluation.virtual` shows through another lens, turned, half of them thinned."""
+"""Share of drives that `calibnet.evaluation.virtual` shows through another lens, turned, half of them thinned."""
 
 
 class DriveStream:

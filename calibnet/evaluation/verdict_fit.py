@@ -19,9 +19,9 @@ from calibnet.judging.doubt import Doubt
 from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
-"""Of the last stage, and of the first one."""
+"""The ranges of the last stage and of the first one."""
 RIDGE = 3.0
-"""Times the squares of the coefficients of standardised witnesses: what is added to the negative log likelihood."""
+"""Weight of the squared coefficients of standardised witnesses, added to the negative log likelihood."""
 FALSE_ACCEPTS = 0.01
 """Share of all runs that may be accepted and wrong, left out by sequence. Half of these runs have no fault; where every
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
@@ -237,7 +237,7 @@ def rounded(value: float) -> float:
 
 
 def probability(odds: float) -> float:
-    """Of the logarithm of the odds."""
+    """Probability of the logarithm of the odds."""
     return float(1 / (1 + np.exp(-np.clip(odds, -50, 50))))
 
 

@@ -28,7 +28,7 @@ BATCH = 8
 LARGEST = 256 * MEGABYTE
 """Bytes of a log of runs, of 2 kB each."""
 SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
-"""Of the first synthetic drive; training draws its scenes from other seeds."""
+"""Seed of the first synthetic drive, and frames of each; training draws its scenes from other seeds."""
 
 
 @dataclass(frozen=True)

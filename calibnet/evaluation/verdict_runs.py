@@ -30,11 +30,11 @@ from calibnet.judging.witnesses import witnesses
 from calibnet.verdict import ACCEPTED, FRAME_LIMITS
 
 FRAMES = 8
-"""Of a sequence, spread over it: neighbours of a drive say the same."""
+"""Frames of a sequence, spread over it: neighbours of a drive say the same."""
 KEPT = 16
 """Frames in memory, of some 10 MB each."""
 PLAIN_SHARE = 0.5
-"""Of the runs: those without a fault tell how many good results are accepted."""
+"""Share of runs without a fault, which tell how many good results are accepted."""
 
 
 @dataclass(frozen=True)

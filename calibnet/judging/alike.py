@@ -15,7 +15,7 @@ from calibnet.judging.lens import INDEPENDENT, LEAST_SCALE_PX, view
 from calibnet.trace import Matches
 
 DEGREE = 3
-"""Of the polynomial; place is counted in halves of the picture's width from its principal point."""
+"""Degree of the polynomial; place is counted in halves of the picture's width from its principal point."""
 SIGMA_PX = 1.0
 """Standard deviation of each of its coefficients, pixels of the stage's camera."""
 

@@ -29,7 +29,7 @@ FEWEST_POINTS = 500
 STANDING_M = 0.1
 """Motion below which a lag makes no difference."""
 SHARES = (1.0, 0.5)
-"""Of the time between two scans: lags that are tried."""
+"""Lags that are tried, as shares of the time between two scans."""
 SHARE, MOST = 0.5, 1.0
 """See `calibnet.judging.causes.Search`: the result then lies in the range searched, half as far from the guess."""
 

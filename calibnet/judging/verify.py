@@ -55,8 +55,8 @@ class Standard:
 
 FRAME = Standard((Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0)))
 DRIVE = Standard((Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0)), Tolerance(1.6, 40.0))
-"""Of a single frame, which may end anywhere as long as it is not accepted, and of a drive: half as far again as the
-farthest of those that the verdict was fitted to (1.1°, 26 cm)."""
+"""Standards of a single frame, for which no farthest is known, and of a drive: half as far again as the farthest of the
+drives that the verdict was fitted to (1.1°, 26 cm)."""
 
 
 def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:

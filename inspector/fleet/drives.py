@@ -84,7 +84,7 @@ class Drive:
 
     @property
     def folder(self) -> str:
-        """Of its results, below the fleet's; foreign names are quoted."""
+        """Folder of its results, below the fleet's; foreign names are quoted."""
         last = f"{self.drive}@{self.camera}" if self.camera else self.drive
         return f"drives/{file_name(self.car)}/{file_name(last)}"
 

@@ -28,7 +28,7 @@ Work = TypeVar("Work")
 Done = TypeVar("Done")
 
 TRIES = 2
-"""Of a drive that fails, and of one whose worker dies."""
+"""Tries of a drive that fails, and of one whose worker dies."""
 FULL = 0.6
 """Share of a worker's memory beyond which another process takes its place."""
 POLL_S = 0.1
@@ -67,7 +67,7 @@ class Engine:
 
     @property
     def threads(self) -> int:
-        """Of each worker on this machine."""
+        """Threads of each worker on this machine."""
         return max(1, (os.cpu_count() or 1) // max(1, self.workers))
 
 

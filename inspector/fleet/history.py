@@ -75,7 +75,7 @@ class History:
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """Of the mount, in their order."""
+        """Moves of the mount, in their order."""
         return tuple(self._moves())
 
     @property

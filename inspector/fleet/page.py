@@ -26,7 +26,7 @@ PICTURES = tuple(
     for result in ("whole-drive-as-one", "corrected")
     for name in ("median", "best", "worst")
 )
-"""Of a drive's report: the result on its middle frame or, where there are few, on another one."""
+"""Pictures of a drive's report, of which the first is shown: the result on its middle frame, or on another one."""
 
 
 def write_page(rows: Sequence[Row], folder: Path) -> Path:

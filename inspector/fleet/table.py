@@ -24,12 +24,12 @@ from inspector.fleet.drives import Drive
 TABLE = "fleet.parquet"
 FAILED = "failed"
 WORDS = (FAILED, "rejected", "cannot tell", "accepted")
-"""Of a drive by itself, worst first."""
+"""Words for a drive by itself, worst first."""
 ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
 APART: ByCar = "apart"
-"""Of a drive that says something else than the others of its car."""
+"""Word for a drive that says something else than the others of its car."""
 ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
-"""Of what is known of a drive, worst first."""
+"""Words for a drive by all that is known of it, worst first."""
 RECORDING, VERDICT, PAGE, METRICS = "recording.rrd", "verdict.json", "index.html", "metrics.json"
 """Files of a drive, in its folder."""
 LARGEST = 1 << 30

@@ -13,7 +13,7 @@ from typing import Any
 from calibnet.errors import DatasetError
 
 POINT_TYPES = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
-"""Of a field of points: those of PointCloud2, which has signed numbers before unsigned ones."""
+"""Types of fields of points as PointCloud2 numbers them, which has signed numbers before unsigned ones."""
 
 
 def seconds_of(time: Any) -> float:

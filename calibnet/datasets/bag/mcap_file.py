@@ -126,7 +126,7 @@ def _channel(channel: Any, schema: Any) -> Channel:
 
 
 def _decoder(encoding: str, schema: Any) -> Decode | None:
-    """Of a message that is not of ROS; None where it is of an encoding that is not read here."""
+    """The decoder of a message that is not of ROS; None where its encoding is not read here."""
     if encoding == "json":
         return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
     if encoding == "protobuf":
@@ -137,7 +137,7 @@ def _decoder(encoding: str, schema: Any) -> Decode | None:
 
 
 def _ros(kind: str, old: bool, definition: str) -> Decode:
-    """Of a message of ROS, by the definition that came with it or, without one, by what ROS calls so."""
+    """The decoder of a message of ROS, by the definition that came with it or, without one, by ROS's own."""
     store = _store(kind, old, definition)
     if old:
         return lambda data: store.deserialize_ros1(data, kind)
