@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -97,72 +98,34 @@ def solve_rig(
     some = [spread(len(camera.frames), FRAMES_UNTIL_LAST_LOOK) for camera in cameras]
     everything = [list(range(len(camera.frames))) for camera in cameras]
     total, number = LOOKS * len(stages) * sum(map(len, some)) + sum(map(len, everything)), itertools.count()
-    skipped, terms, looks = list[BadFrame](), list[Term](), list[DriveLook]()
-    of_camera: dict[str, list[DriveLook]] = {camera.name: [] for camera in cameras}
-    rig = initial
-    places = {camera.name: camera.camera_from_rig for camera in cameras}
 
-    def look(stage: DriveStage, positions: list[list[int]], last: bool) -> list[CameraConsensus]:
-        """What the frames of each camera agree on, without cameras of which no frame can be used."""
-        found = list[CameraConsensus]()
-        failure: CalibnetError | None = None
-        for camera, chosen in zip(cameras, positions, strict=True):
-            place = places[camera.name]
+    def read(camera: RigCamera, position: int) -> Frame:
+        if observer is not None:
+            observer(next(number), total)
+        return camera.frames[position]
 
-            def read(position: int, camera: RigCamera = camera) -> Frame:
-                if observer is not None:
-                    observer(next(number), total)
-                return camera.frames[position]
-
-            to_align = Due(spread(len(camera.frames), max(1, FRAMES_ALIGNED // len(cameras))))
-
-            def taken_in(
-                position: int,
-                frame: Frame,
-                trace: StageTrace,
-                consensus: Consensus,
-                camera: RigCamera = camera,
-                place: Transform = place,
-                due: Due = to_align,
-            ) -> None:
-                one = drive_look(frame, position, trace)
-                of_camera[camera.name].append(one)
-                looks.append(in_rig(one, place))
-                if aligns and due.reached(position):
-                    terms.append(InRig(gather(frame, consensus.before), place))
-
-            try:
-                consensus = agree(
-                    stage, read, chosen, place @ rig, taken_in if last else None, skipped if last else None
-                )
-            except (CalibrationError, DatasetError) as error:
-                failure = error
-                continue
-            found.append(CameraConsensus.of(camera, consensus, common_error))
-        if failure is not None and not found:
-            raise failure
-        return found
-
-    aligns = is_finest(stages[-1].range)
+    rig, places = initial, {camera.name: camera.camera_from_rig for camera in cameras}
     for stage in stages:
         for _ in range(LOOKS):
-            agreed = look(stage, some, last=False)
+            agreed = _look(stage, cameras, some, places, rig, common_error, read)
             rig = pose_from_vector(rig_correction(agreed, rig, pose_prior, tolerance)[0]) @ rig
             places |= {one.camera.name: one.placed(rig, tolerance) for one in agreed}
-    agreed = look(stages[-1], everything, last=True)
+    aligns = is_finest(stages[-1].range)
+    last = _LastLook(cameras, aligns)
+    agreed = _look(stages[-1], cameras, everything, places, rig, common_error, read, last)
     mean, covariance = rig_correction(agreed, rig, pose_prior, tolerance)
-    of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
+    of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(last.looks))
     opened = None
     if pose_prior is not None:
         free, spread_of_free = rig_correction(agreed, rig, None, tolerance)
-        opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(looks))
+        opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(last.looks))
     if aligns:
         too_far = (
             of_networks.rotation_deg > FARTHEST_ROTATION_DEG
             or of_networks.translation_cm > 100 * FARTHEST_TRANSLATION_M
         )
-        mean, covariance = align(() if too_far else [Evidence((term,)) for term in terms], mean, covariance)
-    found = Estimate(pose_from_vector(mean) @ rig, covariance, len(looks))
+        mean, covariance = align(() if too_far else [Evidence((term,)) for term in last.terms], mean, covariance)
+    found = Estimate(pose_from_vector(mean) @ rig, covariance, len(last.looks))
     if observer is not None:
         observer(total, total)
     return RigEstimate(
@@ -170,13 +133,81 @@ def solve_rig(
         found.covariance,
         found.frames,
         ((found.frames, found),),
-        skipped=tuple(skipped),
+        skipped=tuple(last.skipped),
         networks=of_networks if aligns else None,
-        looks=tuple(looks),
+        looks=tuple(last.looks),
         looked_from=rig,
         free=opened,
-        cameras=tuple(_of_cameras(cameras, agreed, found, of_camera, tolerance)),
+        cameras=tuple(_of_cameras(cameras, agreed, found, last.of_camera, tolerance)),
     )
+
+
+class _LastLook:
+    """What the last look, at all frames, leaves behind.
+
+    Attributes:
+        skipped: frames that could not be read or calibrated.
+        looks: of all cameras, as looks of the rig.
+        of_camera: the looks of each camera by its name, in its own frame.
+        terms: edges and reflectance of the frames to align, as terms of the rig's pose.
+    """
+
+    def __init__(self, cameras: Sequence[RigCamera], aligns: bool) -> None:
+        """Collect from these cameras; with ``aligns``, what is to be aligned as well."""
+        self.skipped, self.looks, self.terms = list[BadFrame](), list[DriveLook](), list[Term]()
+        self.of_camera: dict[str, list[DriveLook]] = {camera.name: [] for camera in cameras}
+        self._aligned = max(1, FRAMES_ALIGNED // len(cameras)) if aligns else 0
+
+    def of(self, camera: RigCamera, place: Transform) -> Callable[[int, Frame, StageTrace, Consensus], None]:
+        """What takes in the frames of a camera, which is at ``place`` on the rig (``camera_from_rig``)."""
+        due = Due(spread(len(camera.frames), self._aligned) if self._aligned else [])
+
+        def taken_in(position: int, frame: Frame, trace: StageTrace, consensus: Consensus) -> None:
+            look = drive_look(frame, position, trace)
+            self.of_camera[camera.name].append(look)
+            self.looks.append(in_rig(look, place))
+            if due.reached(position):
+                self.terms.append(InRig(gather(frame, consensus.before), place))
+
+        return taken_in
+
+
+def _look(
+    stage: DriveStage,
+    cameras: Sequence[RigCamera],
+    positions: Sequence[list[int]],
+    places: dict[str, Transform],
+    rig: Extrinsic,
+    common_error: Matrix6,
+    read: Callable[[RigCamera, int], Frame],
+    last: _LastLook | None = None,
+) -> list[CameraConsensus]:
+    """What the frames of each camera agree on in one look, without cameras of which no frame can be used.
+
+    Args:
+        stage: that looks.
+        cameras: of the rig.
+        positions: of the frames of each.
+        places: ``camera_from_rig`` by the camera's name.
+        rig: ``rig_from_lidar`` under which it looks.
+        common_error: see `solve_rig`.
+        read: gives the frame of a camera at a position.
+        last: takes in the frames of the last look.
+    """
+    found = list[CameraConsensus]()
+    failure: CalibnetError | None = None
+    for camera, chosen in zip(cameras, positions, strict=True):
+        place = places[camera.name]
+        taken_in, skipped = (None, None) if last is None else (last.of(camera, place), last.skipped)
+        try:
+            consensus = agree(stage, partial(read, camera), chosen, place @ rig, taken_in, skipped)
+        except (CalibrationError, DatasetError) as error:
+            failure = error
+            continue
+        found.append(CameraConsensus.of(camera, consensus, common_error))
+    if failure is not None and not found:
+        raise failure
+    return found
 
 
 def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:
