@@ -38,7 +38,8 @@ PATIENCE_S = 15.0
 SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,  # a worker has what it does and no more: that is all it can lose
     "distributed.scheduler.allowed-failures": TRIES - 1,
-    "distributed.admin.tick.limit": "1h",  # a busy machine is no news
+    "distributed.admin.tick.limit": "1h",  # a busy machine is no news, and not looked for fifty times a second
+    "distributed.admin.tick.interval": "1s",
     "distributed.worker.memory.terminate": 0.95,
     "distributed.worker.profile.enabled": False,  # samples of the stack, kept for an hour: up to some 600 MB a worker
     "distributed.deploy.lost-worker-timeout": "1000h",  # or one that takes long to come back is given up for ever
