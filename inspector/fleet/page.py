@@ -21,6 +21,8 @@ MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
+LONGEST_REASON = 300
+"""Characters; the whole of it is in the table and in the drive's log."""
 PICTURES = tuple(
     f"pictures/{name}_{result}.jpg"
     for result in ("whole-drive-as-one", "corrected")
@@ -120,7 +122,7 @@ def _row(row: Row, folder: Path) -> str:
 
 def _reasons(row: Row) -> str:
     """Why: first what the word is for, then what else there is."""
-    alone, together = (escape(one_line(text, 600)) for text in (row.reason, row.by_car_reason))
+    alone, together = (escape(one_line(text, LONGEST_REASON)) for text in (row.reason, row.by_car_reason))
     if row.word != row.verdict:
         return f'{together}<br><span class="about">Alone: {alone}</span>'
     return alone + (f'<br><span class="about">By its car: {together}</span>' if together else "")
