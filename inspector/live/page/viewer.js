@@ -16,12 +16,18 @@ async function start() {
     persist: false,
     theme: matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark",
     panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden" },
-    on_viewer_event: (event) => parent.postMessage({ viewer: typeof event === "string" ? JSON.parse(event) : event }, page),
+    on_viewer_event: (event) => heard(typeof event === "string" ? JSON.parse(event) : event),
   });
   canvas.hidden = false;
   await viewer.start(canvas);
   viewer.open_channel(CHANNEL, "live");
-  hint.hidden = true;
+  hint.textContent = "The viewer takes the try in. Without a graphics card, on a busy machine, that is minutes.";
+}
+
+// The viewer says a time as soon as it has something to show: until then its canvas is blank.
+function heard(event) {
+  if (event.type.startsWith("time")) hint.hidden = true;
+  parent.postMessage({ viewer: event }, page);
 }
 
 const waiting = [];

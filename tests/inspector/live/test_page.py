@@ -238,8 +238,11 @@ def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., L
         "type": "selection_change",
         "items": [{"entity_path": "/overlay/stage_5", "position": [u + 0.5, v + 0.5, 0]}],
     }
+    assert frame.locator("#hint").is_visible(), "until the viewer shows a time, it is blank"
     frame.evaluate("event => window.options.on_viewer_event(event)", event)
     frame.wait_for_function("window.given.length === 3")
+    frame.evaluate("window.options.on_viewer_event({type: 'time_update', time: 0})")
+    assert frame.locator("#hint").is_hidden()
 
 
 def test_what_is_rejected_is_asked_about_before_it_is_written(
