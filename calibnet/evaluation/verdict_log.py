@@ -12,13 +12,15 @@ from multiprocessing import get_context, parent_process
 from pathlib import Path
 from signal import SIG_IGN, SIGINT, signal
 from threading import Thread
-from typing import Any
+from typing import Any, Literal
 
 from calibnet.datasets.frame import Sequence
 from calibnet.errors import ConfigError
+from calibnet.evaluation.lens_fit import LensStream
 from calibnet.evaluation.verdict_drives import DriveStream
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
 from calibnet.judging.drive_witnesses import DriveWitnesses
+from calibnet.judging.lens_witnesses import LensWitnesses
 from calibnet.judging.witnesses import Witnesses
 from calibnet.runtime.reading import MEGABYTE, read_text
 from calibnet.runtime.writing import check_output
@@ -27,6 +29,8 @@ BATCH = 8
 """Runs a process that are asked for at once: time is looked at between batches."""
 LARGEST = 256 * MEGABYTE
 """Bytes of a log of runs, of 2 kB each."""
+Kind = Literal["frames", "lenses", "drives"]
+STREAMS: dict[Kind, type[RunStream | DriveStream]] = {"frames": RunStream, "lenses": LensStream, "drives": DriveStream}
 SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
 """Seed of the first synthetic drive, and frames of each; training draws its scenes from other seeds."""
 
@@ -40,7 +44,7 @@ class Source:
         data: as `calibnet.training.data.open_data` takes them.
         synthetic: drives of the synthetic world besides.
         seed: of everything random.
-        drives: whether whole drives are run instead of single frames.
+        kind: of the runs: on single frames with any fault, on those with one of the lens, or on whole drives.
     """
 
     preset: str
@@ -49,7 +53,7 @@ class Source:
     data: tuple[str, ...]
     synthetic: int
     seed: int
-    drives: bool = False
+    kind: Kind = "frames"
 
     def sequences(self) -> list[Sequence]:
         """Open all data.
@@ -74,8 +78,7 @@ class Source:
         from calibnet.cascade import Cascade
 
         torch.set_num_threads(1)
-        kind = DriveStream if self.drives else RunStream
-        return kind(Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
+        return STREAMS[self.kind](Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
 
 
 class RunLog:
@@ -116,7 +119,7 @@ def whole(run: VerdictRun) -> VerdictRun:
     Raises:
         KeyError: it has others.
     """
-    known = [{one.name for one in fields(kind)} for kind in (Witnesses, DriveWitnesses)]
+    known = [{one.name for one in fields(kind)} for kind in (Witnesses, LensWitnesses, DriveWitnesses)]
     if run.witnesses is not None and run.witnesses.keys() not in known:
         raise KeyError(f"run {run.number} was made with other witnesses")
     return run

@@ -6,7 +6,7 @@ a shorter one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 
@@ -27,6 +27,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.doubt import Doubt
 from calibnet.judging.witnesses import witnesses
+from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, FRAME_LIMITS
 
 FRAMES = 8
@@ -107,9 +108,18 @@ class RunStream:
     def run(self, number: int) -> VerdictRun | None:
         """The run of this number; None where its frame cannot be read or has too few points in the picture."""
         try:
-            return measured(self.cascade, self.drawn(number), number)
+            return measured(self.cascade, self.drawn(number), number, self.told)
         except CalibnetError:
             return None
+
+    def told(self, trace: CascadeTrace) -> dict[str, float] | None:
+        """What witnesses say of a run; None where the verdict does not ask them."""
+        asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
+        return asdict(witnesses(trace)) if asked else None
+
+    def has(self, fault: Corruption) -> bool:
+        """Whether a fault is one of those of this stream."""
+        return True
 
     def drawn(self, number: int) -> Drawn:
         """What is run under this number.
@@ -132,14 +142,22 @@ class RunStream:
         others = [other for other in range(len(self.sequences)) if other != which]
         donors = [self.read(int(generator.choice(others)), 0)] if others else []
         named: dict[str, list[Corruption]] = {}
-        for fault in corruptions(self.sequences[which], position, donors):
+        for fault in filter(self.has, corruptions(self.sequences[which], position, donors)):
             named.setdefault(fault.name, []).append(fault)
         strengths = named[str(generator.choice(list(named)))]
         return strengths[int(generator.integers(len(strengths)))]
 
 
-def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
+def measured(
+    cascade: Cascade, drawn: Drawn, number: int, told: Callable[[CascadeTrace], dict[str, float] | None]
+) -> VerdictRun:
     """Calibrate a frame, and note what witnesses say of it.
+
+    Args:
+        cascade: what calibrates.
+        drawn: what it starts with.
+        number: in the stream.
+        told: what witnesses say of the run.
 
     Raises:
         CalibrationError: too few points fall into the picture.
@@ -149,7 +167,6 @@ def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
     trace = cascade.calibrate(frame, start)
     last, truth = trace.stages[-1], frame.camera_from_lidar
     error = pose_error(last.after, truth)
-    asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
     return VerdictRun(
         number,
         drawn.sequence,
@@ -159,7 +176,7 @@ def measured(cascade: Cascade, drawn: Drawn, number: int) -> VerdictRun:
         error.rotation_deg,
         error.translation_cm,
         within(error, FRAME_LIMITS),
-        asdict(witnesses(trace)) if asked else None,
+        told(trace),
         pose_vector(last.after @ invert(truth)).tolist(),
         None if last.information is None else last.information.tolist(),
         last.match_error_px,

@@ -16,6 +16,8 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.judging.covariance import Spread
 from calibnet.judging.doubt import Doubt
 from calibnet.judging.drive_witnesses import DriveWitnesses
+from calibnet.judging.lens_causes import FAULTS, LensOdds
+from calibnet.judging.lens_witnesses import LensWitnesses
 from calibnet.judging.witnesses import Witnesses
 from calibnet.runtime.reading import parse_toml, read_text
 from calibnet.runtime.writing import write_whole
@@ -35,6 +37,7 @@ class Coefficients:
     Attributes:
         doubt: how witnesses of a frame are summed up; None where nothing was fitted.
         spread: how far results of frames lie from the truth.
+        lens: how likely faults of the lens are; None where that was not fitted, and then none is named.
         drive: how witnesses of a drive are summed up; None where that was not fitted.
         widening: by what a drive's stated covariance is multiplied, to be as large as its errors are.
         weights: fingerprints of the stages that were run, by range; the finest of them ends a run that can be judged.
@@ -44,6 +47,7 @@ class Coefficients:
 
     doubt: Doubt | None = None
     spread: Spread = field(default_factory=Spread)
+    lens: LensOdds | None = None
     drive: Doubt | None = None
     widening: float = 1.0
     weights: Mapping[MiscalibrationRange, str] = field(default_factory=dict)
@@ -78,6 +82,7 @@ class Coefficients:
             "weights": {str(range_): of for range_, of in self.weights.items()},
             "doubt": asdict(self.doubt),
             "spread": asdict(self.spread),
+            **({} if self.lens is None else {"lens": asdict(self.lens)}),
             **({} if self.drive is None else {"drive": asdict(self.drive) | {"widening": self.widening}}),
             "fitted": dict(self.fitted),
         }
@@ -124,11 +129,22 @@ def _read(path: Path) -> Coefficients:
         drive = content.get("drive", {})
         widening = drive.pop("widening", 1.0)
         of_drive = _doubt(drive, DriveWitnesses) if drive else None
+        lens = _lens(content["lens"]) if "lens" in content else None
         weights = {MiscalibrationRange.parse(range_): of for range_, of in content["weights"].items()}
         spread, fitted = Spread(**content["spread"]), content.get("fitted", {})
-        return Coefficients(doubt, spread, of_drive, widening, weights, "", fitted)
+        return Coefficients(doubt, spread, lens, of_drive, widening, weights, "", fitted)
     except (TypeError, KeyError, ValueError, AttributeError) as error:
         raise WeightsError(f"{path} holds no coefficients of a verdict ({error}); {remedy}.") from None
+
+
+def _lens(content: dict[str, Any]) -> LensOdds:
+    odds = LensOdds(**content)
+    known = {field.name for field in fields(LensWitnesses)}
+    if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
+        raise KeyError(f"faults of the lens are {', '.join(FAULTS)}")
+    if unknown := {name for weights in odds.weights.values() for name in weights} - known:
+        raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
+    return odds
 
 
 def _doubt(content: dict[str, Any], witnesses: type[Witnesses | DriveWitnesses]) -> Doubt:

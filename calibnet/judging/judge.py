@@ -58,7 +58,7 @@ def judge(
         return suspects or (() if measure is None else cause(search, frame, guess, measure))
 
     def why_lens() -> tuple[Cause, ...]:
-        return suspects or (() if match_error is None or trace is None else lens_causes(trace))
+        return suspects or (() if match_error is None or trace is None else lens_causes(trace, coefficients.lens))
 
     if trace is None or not trace.stages:
         causes = why(PICTURE_AND_SCAN, match_error)

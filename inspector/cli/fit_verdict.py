@@ -15,6 +15,7 @@ from inspector.cli.options import FOLDER, STAGES
 from inspector.cli.output import make_console, say
 
 if TYPE_CHECKING:
+    from calibnet.evaluation.lens_fit import LensFigures
     from calibnet.evaluation.verdict_fit import FitFigures
     from calibnet.evaluation.verdict_runs import VerdictRun
 
@@ -46,6 +47,9 @@ MOST_WORKERS = 8
     help="Drives of the synthetic world besides, each with sensors of its own.",
 )
 @click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Frames to calibrate and fit to.")
+@click.option(
+    "--lenses", type=click.IntRange(0), default=400, show_default=True, help="Frames to fit faults of the lens to."
+)
 @click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Drives to solve and fit to.")
 @click.option(
     "--minutes",
@@ -66,6 +70,7 @@ def fit_verdict(
     drive_data: tuple[str, ...],
     synthetic: int,
     runs: int,
+    lenses: int,
     drives: int,
     minutes: float | None,
     seed: int,
@@ -85,6 +90,7 @@ def fit_verdict(
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from calibnet.errors import CalibrationError
+    from calibnet.evaluation.lens_fit import fit_lens
     from calibnet.evaluation.verdict_fit import fit_drives, fit_frames
     from calibnet.evaluation.verdict_log import RunLog, Source, collect, runner
     from calibnet.geometry import RANGES
@@ -93,7 +99,7 @@ def fit_verdict(
 
     ranges = [RANGES[number - 1] for number in stages]
     source = Source(preset, weights, stages, data, synthetic, seed)
-    of_drive = replace(source, data=data + drive_data, drives=True)
+    of_drive = replace(source, data=data + drive_data, kind="drives")
     of_drive.sequences()  # what is wrong with them is said before anything is started
     marks = fingerprints(preset, weights, ranges)
     path = coefficients_path(preset, weights)
@@ -119,7 +125,6 @@ def fit_verdict(
 
     of_frames = made(source, runs, "frames")
     doubt, spread, figures = fit_frames(of_frames, (min(ranges), max(ranges)))
-    of_drives = made(of_drive, drives, "drives") if drives else []
     fitted = {
         "data": [short(spec) for spec in of_drive.data],
         "synthetic": synthetic,
@@ -129,6 +134,17 @@ def fit_verdict(
     coefficients = Coefficients(doubt, spread, weights=marks, missing="", fitted=fitted)
     for line in told(figures):
         console.print(line, soft_wrap=True)
+    of_lenses = made(replace(source, kind="lenses"), lenses, "lenses") if lenses else []
+    try:
+        lens, lens_figures = fit_lens(of_lenses)
+    except CalibrationError as error:
+        console.print(f"Faults of the lens will not be named. {error}", style="yellow", markup=False, soft_wrap=True)
+    else:
+        fitted = {**fitted, "lenses": asdict(lens_figures)}
+        coefficients = replace(coefficients, lens=lens, fitted=fitted)
+        for line in told_of_lenses(lens_figures):
+            console.print(line, soft_wrap=True)
+    of_drives = made(of_drive, drives, "drives") if drives else []
     try:
         drive, widening, figures = fit_drives(of_drives)
     except CalibrationError as error:
@@ -160,3 +176,11 @@ def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
         points = (f"{point[name]:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
         yield f"  accepted of the good at other shares of false accepts{kept}: {', '.join(points)}"
     yield f"  squared error by the stated covariance, a degree of freedom: {figures.spread:.2f}"
+
+
+def told_of_lenses(figures: LensFigures) -> Iterator[str]:
+    """The figures of faults of the lens in sentences."""
+    yield f"{figures.runs} runs on {figures.sequences} sequences, {figures.faulty} of them with a fault of the lens."
+    yield "With each sequence left out of the fit in turn:"
+    yield f"  named rightly: {figures.right:.0%} of them, wrongly: {figures.wrong:.1%}"
+    yield f"  named without a fault: {figures.named_without:.1%} of the others"

@@ -41,7 +41,7 @@ SETTINGS = {
     "distributed.admin.tick.limit": "1h",  # a busy machine is no news, and not looked for fifty times a second
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.worker.profile.enabled": False,  # samples of the stack, kept for an hour: up to some 600 MB a worker
+    "distributed.worker.profile.enabled": False,  # samples of the stack, kept for an hour: 3 MB a drive
     "distributed.deploy.lost-worker-timeout": "1000h",  # or one that takes long to come back is given up for ever
 }
 

@@ -9,10 +9,14 @@ from numpy.typing import NDArray
 
 from calibnet.geometry import RANGES, PinholeCamera, transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
+from calibnet.judging.lens_causes import FAULTS, LensOdds
 from calibnet.trace import CascadeTrace, Matches, StageTrace
 
 CAMERA = PinholeCamera(1024, 320, np.array([[580.0, 0, 511.5], [0, 580.0, 159.5], [0, 0, 1]]))
 """Of the stage that looked."""
+GAINS = {"focal-length": "fine_focal_gain", "principal-point": "fine_center_gain", "distortion": "fine_radial_gain"}
+LENS_ODDS = LensOdds(0.6, dict.fromkeys(FAULTS, -2.0), {name: {gain: 20.0} for name, gain in GAINS.items()})
+"""Each fault by what its own lens saves of the finest look's cost."""
 
 
 def scene(count: int = 1500) -> NDArray[np.float32]:

@@ -13,6 +13,7 @@ from calibnet.geometry import RANGES
 from calibnet.judging.coefficients import Coefficients, coefficients_path, load_coefficients
 from calibnet.judging.covariance import Spread
 from calibnet.judging.doubt import Doubt
+from calibnet.judging.lens_causes import FAULTS, LensOdds
 from calibnet.weights.fingerprint import fingerprints
 from calibnet.weights.manifest import PACKAGE, Manifest, StageEntry, StageSettings, load_manifest
 
@@ -20,6 +21,7 @@ MANIFEST = Manifest("mine", stages=(StageEntry(RANGES[3], "four"), StageEntry(RA
 DOUBT = Doubt(-1.5, {"match_error": 2.0, "reach": 0.25}, 0.25, 0.75)
 
 DRIVE = Doubt(0.5, {"halves": 1.5}, 0.1, 0.9)
+LENS = LensOdds(0.7, dict.fromkeys(FAULTS, -1.0), {name: {"fine_focal_gain": 2.5} for name in FAULTS})
 
 
 @pytest.fixture
@@ -28,7 +30,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "five").write_bytes(b"of stage 5")
     MANIFEST.write(tmp_path / "mine.toml")
     marks = fingerprints("mine", tmp_path, [RANGES[3], RANGES[4]])
-    whole = Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), DRIVE, 1.25, marks, "", {"runs": 90})
+    whole = Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), LENS, DRIVE, 1.25, marks, "", {"runs": 90})
     whole.write(coefficients_path("mine", tmp_path))
     return tmp_path
 
@@ -38,6 +40,7 @@ def test_they_are_read_as_they_were_written(folder: Path) -> None:
     assert coefficients.doubt_of(RANGES[4]) == DOUBT and coefficients.missing == ""
     assert coefficients.spread == Spread(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
     assert coefficients.drive_doubt_of(RANGES[4]) == DRIVE and coefficients.widening == 1.25
+    assert coefficients.lens == LENS
     without = replace(coefficients, drive=None).drive_doubt_of(RANGES[4])
     assert without == "To drives the verdict has not been fitted."
     other = coefficients.doubt_of(RANGES[3])
@@ -70,7 +73,12 @@ def test_own_weights_without_any_are_told_how_to_get_them_and_a_copy_needs_none(
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
-    [("match_error", "matcherror", "no witness is called matcherror"), ("[spread]", "[sprawl]", "'spread'")],
+    [
+        ("match_error", "matcherror", "no witness is called matcherror"),
+        ("[spread]", "[sprawl]", "'spread'"),
+        ("fine_focal_gain", "fine_focal_loss", "no witness is called fine_focal_loss"),
+        ("distortion = -1.0", "astigmatism = -1.0", "faults of the lens are focal-length, principal-point, distortion"),
+    ],
 )
 def test_a_malformed_file_is_a_sentence(folder: Path, old: str, new: str, said: str) -> None:
     path = coefficients_path("mine", folder)

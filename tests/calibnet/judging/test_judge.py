@@ -15,7 +15,7 @@ from calibnet.judging.judge import judge
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from tests.support.boxes import REFERENCE, boxes
-from tests.support.matches import matches, run
+from tests.support.matches import LENS_ODDS, matches, run
 
 FRAME = boxes()
 GUESS = miscalibration([1, 2, 3], [0.1, 0.2, -0.25]) @ REFERENCE
@@ -23,7 +23,7 @@ FITS = matches(np.eye(4), noise=0.3)
 
 
 def fitted(doubt: Doubt) -> Coefficients:
-    return Coefficients(doubt, weights={RANGES[4]: "0123"}, missing="")
+    return Coefficients(doubt, lens=LENS_ODDS, weights={RANGES[4]: "0123"}, missing="")
 
 
 DOUBT = fitted(Doubt(0.0, {"match_error": 1.0}, accepted_below=0.6, rejected_above=0.8))

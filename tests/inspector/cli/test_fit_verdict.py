@@ -17,6 +17,7 @@ from calibnet.judging.drive_witnesses import DriveWitnesses
 from calibnet.weights.manifest import load_manifest
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from tests.calibnet.evaluation.test_lens_fit import lens_runs
 from tests.calibnet.evaluation.test_verdict_fit import runs
 
 
@@ -25,13 +26,14 @@ class Known:
 
     made = 0
 
-    def __init__(self, drives: bool) -> None:
-        self.drives, self.runs = drives, runs(300, Spread(), seed=1)
+    def __init__(self, kind: verdict_log.Kind) -> None:
+        self.kind = kind
+        self.runs = lens_runs(120, 6.0) if kind == "lenses" else runs(300, Spread(), seed=1)
 
     def run(self, number: int) -> VerdictRun:
         Known.made += 1
         made = self.runs[number]
-        if not self.drives:
+        if self.kind != "drives":
             return made
         assert made.witnesses is not None
         said = {one.name: 0.0 for one in fields(DriveWitnesses)} | {"match_error": made.witnesses["match_error"]}
@@ -43,12 +45,12 @@ def weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Files that stand for the stages' weights, and runs in no time."""
     for stage in load_manifest("compact").stages:
         (tmp_path / stage.file).write_bytes(stage.file.encode())
-    monkeypatch.setattr(verdict_log.Source, "open", lambda source: Known(source.drives))
+    monkeypatch.setattr(verdict_log.Source, "open", lambda source: Known(source.kind))
     return tmp_path
 
 
 def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights: Path) -> None:
-    arguments = ["fit-verdict", "--weights", str(weights), "--runs", "300", "--workers", "0"]
+    arguments = ["fit-verdict", "--weights", str(weights), "--runs", "300", "--lenses", "120", "--workers", "0"]
     Known.made = 0
     result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
     assert result.exit_code == 0 and result.stdout.strip() == str(weights / "compact-verdict.toml")
@@ -57,10 +59,12 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
     assert coefficients.missing == "" and coefficients.fitted["seed"] == 0
     assert set(coefficients.weights) == set(RANGES[2:]) and coefficients.fitted["frames"]["false_accept_rate"] == 0.01
     assert coefficients.drive is not None and coefficients.drive.weights["match_error"] > 1
+    assert coefficients.lens is not None and coefficients.fitted["lenses"]["runs"] == 120
+    assert "120 runs on 5 sequences, 60 of them with a fault of the lens." in result.stderr
     assert "80 runs of drives on 7 sequences." in result.stderr
     before = (weights / "compact-verdict.toml").read_bytes()
     assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
-    assert Known.made == 300 + 80 and (weights / "compact-verdict.toml").read_bytes() == before
+    assert Known.made == 300 + 120 + 80 and (weights / "compact-verdict.toml").read_bytes() == before
     (weights / load_manifest("compact").file(RANGES[4])).write_bytes(b"trained on")
     assert load_coefficients(load_manifest("compact", weights), weights).doubt is None
 

@@ -1,0 +1,148 @@
+"""From frames with a known fault of the lens to the odds by which such a fault is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.corruptions import Corruption
+from calibnet.evaluation.verdict_fit import rounded
+from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
+from calibnet.geometry.types import Floats
+from calibnet.judging.lens_causes import BENT, CENTER, FAULTS, FOCAL, LensOdds
+from calibnet.judging.lens_witnesses import lens_witnesses
+from calibnet.trace import CascadeTrace
+
+CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
+"""What a fault of the battery is to be called; any other run has none."""
+TOO_WEAK = (
+    ("focal-length", "+2 %"),
+    ("focal-length", "-2 %"),
+    ("principal-point", "+20, +0 px"),
+    ("principal-point", "-20, +0 px"),
+    ("principal-point", "+0, +60 px"),
+    ("distorted", "k1 -0.1"),
+    ("distorted", "k1 0.1"),
+)
+"""Not fitted to: what a frame can hardly show, and a principal point moved down, which looks like a pitch."""
+RIDGE = 1.0
+"""Times the squares of the coefficients of standardised witnesses: what is added to the negative log likelihood."""
+WRONG_NAMES = 0.05
+"""Share of the runs that may be given a wrong name, left out by sequence; those without a fault any name."""
+FEWEST = 10
+"""Runs of each fault, and without one, below which nothing can be fitted."""
+
+
+class LensStream(RunStream):
+    """Runs of which half have a fault of the lens, by number, as `RunStream` has them with any fault."""
+
+    def told(self, trace: CascadeTrace) -> dict[str, float] | None:
+        """What two looks say of the lens, whatever the verdict."""
+        found = lens_witnesses(trace)
+        return None if found is None else asdict(found)
+
+    def has(self, fault: Corruption) -> bool:
+        """Whether a fault is one of the lens, and strong enough to be told."""
+        return fault.name in CLASSES and (fault.name, fault.strength) not in TOO_WEAK
+
+
+@dataclass(frozen=True)
+class LensFigures:
+    """How well faults of the lens are named on sequences that were left out of the fit in turn.
+
+    Attributes:
+        runs, sequences: how many.
+        faulty: runs with a fault.
+        right: share of these that are named rightly.
+        wrong: share of these that are named wrongly.
+        named_without: share of the runs without a fault that are given one.
+    """
+
+    runs: int
+    sequences: int
+    faulty: int
+    right: float
+    wrong: float
+    named_without: float
+
+
+def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
+    """Fit the odds to runs of `LensStream`.
+
+    Raises:
+        CalibrationError: too few of them have a fault, or none.
+    """
+    asked = [run for run in runs if run.witnesses is not None and np.isfinite(list(run.witnesses.values())).all()]
+    kinds = np.array([1 + FAULTS.index(CLASSES[run.fault]) if run.fault in CLASSES else 0 for run in asked], np.intp)
+    counts = np.bincount(kinds, minlength=len(FAULTS) + 1)
+    if counts.min() < FEWEST:
+        told = ", ".join(f"{count} {name}" for name, count in zip(("none", *FAULTS), counts, strict=True))
+        raise CalibrationError(
+            f"Too few runs tell faults of the lens apart ({told}); {FEWEST} of each are needed. Make more runs."
+        )
+    names = list(asked[0].witnesses or {})
+    values = np.array([[run.witnesses[name] for name in names] for run in asked if run.witnesses is not None])
+    likely = _left_out(values, kinds, [run.sequence for run in asked])
+    best, sure = 1 + likely[:, 1:].argmax(axis=1), likely[:, 1:].max(axis=1)
+    wrong = np.sort(sure[best != kinds])[::-1]
+    allowed = int(WRONG_NAMES * len(asked))
+    named_from = float(wrong[allowed]) if allowed < len(wrong) else 0.5
+    named = sure > named_from
+    intercepts, weights = _regression(values, kinds)
+    odds = LensOdds(
+        rounded(named_from),
+        dict(zip(FAULTS, map(rounded, intercepts), strict=True)),
+        {fault: dict(zip(names, map(rounded, of), strict=True)) for fault, of in zip(FAULTS, weights, strict=True)},
+    )
+    faulty = kinds > 0
+    return odds, LensFigures(
+        runs=len(asked),
+        sequences=len({run.sequence for run in asked}),
+        faulty=int(faulty.sum()),
+        right=float((named & (best == kinds))[faulty].mean()),
+        wrong=float((named & (best != kinds))[faulty].mean()),
+        named_without=float(named[~faulty].mean()),
+    )
+
+
+def _left_out(values: Floats, kinds: NDArray[np.intp], sequences: Sequence[str]) -> Floats:
+    """Probabilities ``[N, F + 1]`` of none and of each fault, each from a fit without the runs of its own sequence."""
+    likely, names = np.zeros((len(values), len(FAULTS) + 1)), np.array(sequences)
+    for name in dict.fromkeys(sequences):
+        own = names == name
+        others = ~own if len(set(sequences)) > 1 else own
+        intercepts, weights = _regression(values[others], kinds[others])
+        odds = np.column_stack([np.zeros(own.sum()), values[own] @ weights.T + intercepts])
+        likely[own] = _softmax(odds)
+    return likely
+
+
+def _regression(values: Floats, kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Multinomial logistic regression: intercepts ``[F]`` and weights ``[F, W]`` relative to no fault."""
+    mean, deviation = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-9)
+    design = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
+    shape = (len(FAULTS) + 1, design.shape[1])
+    target = np.eye(shape[0])[kinds]
+
+    def cost(flat: Floats) -> tuple[float, Floats]:
+        beta = flat.reshape(shape)
+        likely = _softmax(design @ beta.T)
+        penalty = np.where(np.arange(shape[1]) > 0, beta, 0.0)
+        likelihood = -np.log(np.maximum(likely[np.arange(len(kinds)), kinds], 1e-300)).sum()
+        gradient = (likely - target).T @ design + 2 * RIDGE * penalty
+        return float(likelihood + RIDGE * (penalty**2).sum()), gradient.ravel()
+
+    beta = minimize(cost, np.zeros(shape[0] * shape[1]), jac=True, method="L-BFGS-B").x.reshape(shape)
+    beta = beta[1:] - beta[0]
+    weights = beta[:, 1:] / deviation
+    return beta[:, 0] - weights @ mean, weights
+
+
+def _softmax(odds: Floats) -> Floats:
+    likely = np.exp(odds - odds.max(axis=1, keepdims=True))
+    return np.asarray(likely / likely.sum(axis=1, keepdims=True), np.float64)

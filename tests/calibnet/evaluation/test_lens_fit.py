@@ -1,0 +1,77 @@
+"""From frames with a known fault of the lens to the odds by which it is named."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields, replace
+
+import numpy as np
+import pytest
+
+from calibnet.cascade import Cascade, Stage
+from calibnet.errors import CalibrationError
+from calibnet.evaluation.corruptions import camera_faults
+from calibnet.evaluation.lens_fit import CLASSES, TOO_WEAK, WRONG_NAMES, LensStream, fit_lens
+from calibnet.evaluation.verdict_runs import VerdictRun
+from calibnet.geometry import RANGES
+from calibnet.judging.lens_causes import BENT, CENTER, FOCAL
+from calibnet.judging.lens_witnesses import LensWitnesses
+from tests.support.scene import Scenes
+from tests.support.tiny import tiny_network
+
+NAMES = [one.name for one in fields(LensWitnesses)]
+SHOWS = {"focal-length": "fine_focal_gain", "principal-point": "fine_center_gain", "distorted": "coarse_radial_gain"}
+"""The witness of each fault that `lens_runs` raises; all others are noise."""
+
+
+def lens_runs(count: int, shown: float, seed: int = 0) -> list[VerdictRun]:
+    """Runs of which half have a fault that one witness shows, by so many deviations of its noise."""
+    generator, made = np.random.default_rng(seed), []
+    for number in range(count):
+        fault = "none" if number % 2 else list(SHOWS)[number // 2 % 3]
+        said = {name: float(generator.normal()) for name in NAMES}
+        if fault in SHOWS:
+            said[SHOWS[fault]] += shown
+        made.append(
+            VerdictRun(number, f"drive {number % 5}", number, fault, "", 1.0, 9.0, True, said, [0.0] * 6, None, 1.0)
+        )
+    return made
+
+
+def test_each_fault_is_told_by_the_witness_that_shows_it() -> None:
+    odds, figures = fit_lens(lens_runs(600, 6.0))
+    for fault, witness in SHOWS.items():
+        weights = odds.weights[CLASSES[fault]]
+        assert max(weights, key=lambda name: weights[name]) == witness
+        numbers = dict.fromkeys(NAMES, 0.0) | {witness: 6.0}
+        assert odds(LensWitnesses(**numbers))[CLASSES[fault]] > 0.9
+    assert sum(odds(LensWitnesses(**dict.fromkeys(NAMES, 0.0))).values()) < 0.2
+    assert (figures.runs, figures.sequences, figures.faulty) == (600, 5, 300)
+    assert figures.right > 0.9 and figures.wrong < 0.05
+
+
+def test_so_many_are_named_that_few_are_named_wrongly() -> None:
+    odds, figures = fit_lens(lens_runs(600, 2.0))
+    wrong = figures.wrong * figures.faulty + figures.named_without * (figures.runs - figures.faulty)
+    assert wrong == int(WRONG_NAMES * figures.runs), "as many as may be, and no more"
+    assert 0.2 < figures.right < 0.9 and 0 < odds.named_from < 1
+
+
+def test_too_few_runs_of_a_fault_are_a_sentence_and_runs_that_tell_nothing_do_not_count() -> None:
+    runs = [run if run.fault != "distorted" else replace(run, witnesses=None) for run in lens_runs(120, 3.0)]
+    with pytest.raises(CalibrationError, match=r"\(60 none, 20 focal-length, 20 principal-point, 0 distortion\)"):
+        fit_lens(runs)
+    with pytest.raises(CalibrationError, match="Make more runs"):
+        fit_lens([])
+
+
+def test_the_faults_of_the_stream_are_of_the_lens_and_strong_enough() -> None:
+    stages = [Stage(number, RANGES[number - 1], tiny_network(seed=number, stage=number)) for number in (3, 4, 5)]
+    stream = LensStream(Cascade(stages), [Scenes(2)], 0)
+    kept = [fault for fault in camera_faults() if stream.has(fault)]
+    assert {CLASSES[fault.name] for fault in kept} == {FOCAL, CENTER, BENT}
+    dropped = {(fault.name, fault.strength) for fault in camera_faults() if not stream.has(fault)}
+    assert dropped == set(TOO_WEAK) | {("other-size", f"x{factor:g}") for factor in (0.75, 0.5, 2.0)}
+    made = [run for number in range(8) if (run := stream.run(number)) is not None]
+    assert {run.fault for run in made} > {"none"} and {run.fault for run in made} <= {"none", *CLASSES}
+    assert all(run.witnesses is None or list(run.witnesses) == NAMES for run in made)
+    assert any(run.witnesses for run in made) and asdict(stream.run(3) or made[0]) == asdict(stream.run(3) or made[0])
