@@ -10,16 +10,32 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from calibnet.datasets.bag.mcap_file import McapFile, is_foreign
-from calibnet.datasets.bag.messages import stamp_of
+from calibnet.datasets.bag.messages import IMAGES, INFOS, POINTS, stamp_of
 from calibnet.datasets.bag.unpacking import bound_unpacking
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import MEGABYTE, require_file
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
+    from rosbags.interfaces.typing import Typesdict
 
 METADATA_BYTES = 16 * MEGABYTE
 """Largest metadata.yaml of a ROS 2 bag."""
+DEFINED = {
+    *IMAGES,
+    *POINTS,
+    *INFOS,
+    "tf2_msgs/msg/TFMessage",
+    "sensor_msgs/msg/PointField",
+    "sensor_msgs/msg/RegionOfInterest",
+    "std_msgs/msg/Header",
+    "builtin_interfaces/msg/Time",
+    "geometry_msgs/msg/TransformStamped",
+    "geometry_msgs/msg/Transform",
+    "geometry_msgs/msg/Vector3",
+    "geometry_msgs/msg/Quaternion",
+}
+"""Messages that are read, and those within them; a bag brings definitions of its own."""
 
 
 class Topic(NamedTuple):
@@ -73,10 +89,12 @@ class BagRecording:
             if len(self.paths) == 1 and is_foreign(self.paths[0]):
                 self._reader = McapFile(self.paths[0])
             else:
-                self._reader = AnyReader(
-                    self.paths, default_typestore=get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
-                )
+                ros2 = get_typestore(Stores.ROS2_HUMBLE)
+                standard = get_typestore(Stores.ROS1_NOETIC) if old else ros2
+                self._reader = AnyReader(self.paths, default_typestore=standard)
                 self._reader.open()
+                # the stored messages of ROS 1 lack TFMessage, which is the same in both
+                self._check_definitions(self._reader.typestore.fielddefs, ros2.fielddefs | standard.fielddefs)
         weakref.finalize(self, _close, self._reader)
 
     @property
@@ -137,6 +155,21 @@ class BagRecording:
                 f"Bag {self} cannot be read ({why}); reindex it (`rosbag reindex`, `ros2 bag reindex`, `mcap "
                 "recover`), or copy it again."
             ) from None
+
+    def _check_definitions(self, own: Typesdict, standard: Typesdict) -> None:
+        """Hold what a bag says of the messages that are read from it against what they are.
+
+        Raises:
+            DatasetError: a field is missing there, or of another type.
+        """
+        for name in sorted(own.keys() & DEFINED):
+            fields = dict(own[name][1])
+            wrong = [field for field, kind in standard[name][1] if fields.get(field) != kind]
+            if wrong:
+                raise DatasetError(
+                    f"Bag {self} defines {name} without {', '.join(wrong)}, or otherwise than ROS does; it is damaged, "
+                    "or was recorded with messages of your own under that name."
+                )
 
     def __str__(self) -> str:
         """Its first file."""

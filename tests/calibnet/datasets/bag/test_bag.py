@@ -171,6 +171,16 @@ def test_a_truncated_bag_is_one_sentence(path: Path, tmp_path: Path) -> None:
         list(Bag([cut]))
 
 
+@pytest.mark.parametrize("other", [b"uint32 point_stop", b"string point_step"])
+def test_a_bag_that_defines_messages_otherwise_is_one_sentence(other: bytes, tmp_path: Path) -> None:
+    (file,) = write_bag(tmp_path / "drive", "mcap", FRAMES[:1]).glob("*.mcap")
+    content = file.read_bytes()
+    assert b"uint32 point_step" in content
+    file.write_bytes(content.replace(b"uint32 point_step", other))
+    with pytest.raises(DatasetError, match=r"defines sensor_msgs/msg/PointCloud2 without point_step, or otherwise"):
+        Bag([file])
+
+
 RGB = FRAMES[1].image
 
 
