@@ -16,8 +16,9 @@ LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
 """Bytes of the header of LAS 1.2 and of 1.4, and of a point's position and intensity."""
 COMPRESSED = 128
 """Formats of points from here on are compressed: LAZ."""
-LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 8, 60, 2048
-"""Limits of unpacking a scan: seconds of computing, seconds in all on a busy machine, and memory besides its points."""
+LEAST_SECONDS, LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 3, 8, 60, 2048
+"""Limits of unpacking a scan: seconds of computing, of a small one and with one more for each megabyte at most; seconds
+in all on a busy machine; and memory besides its points. A megabyte of a good scan takes a tenth of a second."""
 UNPACK = """
 import io, resource, sys
 most, seconds = int(sys.argv[1]), int(sys.argv[2])
@@ -85,7 +86,8 @@ def unpacked(data: bytes, most: int) -> bytes:
     Raises:
         CloudError: it is damaged.
     """
-    limits = [str(most + MEGABYTES_BESIDE * MEGABYTE), str(LONGEST_SECONDS)]
+    seconds = min(LEAST_SECONDS + len(data) // MEGABYTE, LONGEST_SECONDS)
+    limits = [str(most + MEGABYTES_BESIDE * MEGABYTE), str(seconds)]
     try:
         command = [sys.executable, "-c", UNPACK, *limits]
         done = subprocess.run(command, input=data, capture_output=True, check=False, timeout=LONGEST_WAIT)
