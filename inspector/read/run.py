@@ -166,8 +166,8 @@ class RecordedRun:
     def scalars(self, path: str) -> list[float]:
         """A curve's values, of every frame that has one, in their order."""
         batches = (chunk.to_record_batch() for chunk in self.chunks(path))
-        known = ((row[entities.FRAME], row.get("Scalars:scalars")) for row in rows(batches))
-        return [float(value[0]) for _, value in sorted((frame, value) for frame, value in known if value)]
+        valued = [row for row in rows(batches) if row.get("Scalars:scalars")]  # the curve's style has no frame
+        return [float(row["Scalars:scalars"][0]) for row in sorted(valued, key=lambda row: row[entities.FRAME])]
 
     def chunks(self, *paths: str) -> Iterator[Chunk]:
         """The recording's own chunks of some entities, see `RecordingFile.chunks`."""
