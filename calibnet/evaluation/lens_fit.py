@@ -15,7 +15,7 @@ from calibnet.evaluation.verdict_fit import rounded
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
 from calibnet.geometry.types import Floats
 from calibnet.judging.lens_causes import BENT, CENTER, FAULTS, FOCAL, LensOdds
-from calibnet.judging.lens_witnesses import lens_witnesses
+from calibnet.judging.lens_witnesses import lens_fits, lens_witnesses
 from calibnet.trace import CascadeTrace
 
 CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
@@ -43,8 +43,8 @@ class LensStream(RunStream):
 
     def told(self, trace: CascadeTrace) -> dict[str, float] | None:
         """What two looks say of the lens, whatever the verdict."""
-        found = lens_witnesses(trace)
-        return None if found is None else asdict(found)
+        looks = lens_fits(trace)
+        return None if looks is None else asdict(lens_witnesses(looks))
 
     def has(self, fault: Corruption) -> bool:
         """Whether a fault is one of the lens, and strong enough to be told."""

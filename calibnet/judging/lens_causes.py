@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-from calibnet.judging.lens_witnesses import LensFits, LensWitnesses, finest_look, lens_witnesses
+from calibnet.judging.lens_witnesses import LensFits, LensWitnesses, lens_fits, lens_witnesses
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import Cause
 
@@ -53,11 +53,10 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
         trace: of the run.
         odds: as they were fitted; without them nothing is named.
     """
-    witnesses = lens_witnesses(trace) if odds else None
-    fits = LensFits.of(finest_look(trace)) if witnesses else None
-    if odds is None or witnesses is None or fits is None:
+    looks = lens_fits(trace) if odds else None
+    if odds is None or looks is None:
         return ()
-    found = odds(witnesses)
+    found, fits = odds(lens_witnesses(looks)), looks[0]
     name = max(found, key=lambda one: found[one])
     if found[name] < odds.named_from:
         return ()

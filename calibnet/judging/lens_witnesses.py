@@ -104,14 +104,14 @@ class LensFits:
         )
 
 
-def finest_look(trace: CascadeTrace) -> StageTrace:
-    """The last look of all: that from where the run arrived, if there is one."""
-    return trace.again or trace.stages[-1]
-
-
-def lens_witnesses(trace: CascadeTrace) -> LensWitnesses | None:
-    """The witnesses of a run; None where it has too few stages, or no matches."""
+def lens_fits(trace: CascadeTrace) -> tuple[LensFits, LensFits] | None:
+    """The finest look and the coarse one of a run, fitted; None where it has too few stages, or no matches."""
     if len(trace.stages) < COARSE:
         return None
-    looks = [LensFits.of(look) for look in (finest_look(trace), trace.stages[-COARSE])]
-    return LensWitnesses(*(number for look in looks if look for number in look.numbers)) if all(looks) else None
+    fine, coarse = LensFits.of(trace.again or trace.stages[-1]), LensFits.of(trace.stages[-COARSE])
+    return (fine, coarse) if fine and coarse else None
+
+
+def lens_witnesses(looks: tuple[LensFits, LensFits]) -> LensWitnesses:
+    """The witnesses of a run, of its looks as `lens_fits` has them."""
+    return LensWitnesses(*(number for look in looks for number in look.numbers))

@@ -8,6 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -163,3 +164,14 @@ def write_frames(bag: BagWriter, frames: Sequence[Frame], period: float = 1.0, l
         bag.write("/points", bag.cloud(frame.points, now + late), now + late)
         bag.write("/points", bag.cloud(frame.points, now + late + 0.1), now + late + 0.1)
     return bag.close()
+
+
+def assert_holds(bag: Sequence[Frame], frames: Sequence[Frame]) -> None:
+    """A bag has these frames, a second apart."""
+    assert len(bag) == len(frames)
+    for frame, expected in zip(bag, frames, strict=True):
+        assert_array_equal(frame.image, expected.image)
+        assert_allclose(frame.points, expected.points, atol=1e-6)
+        assert_allclose(frame.camera.matrix, expected.camera.matrix)
+        assert_allclose(frame.camera_from_lidar, expected.camera_from_lidar, atol=1e-9)
+    assert_allclose([frame.timestamp for frame in bag], range(len(frames)), atol=1e-6)

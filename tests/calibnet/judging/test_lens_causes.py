@@ -12,7 +12,7 @@ import pytest
 from calibnet.geometry import miscalibration
 from calibnet.geometry.types import Floats
 from calibnet.judging.lens_causes import lens_causes
-from calibnet.judging.lens_witnesses import LensWitnesses, lens_witnesses
+from calibnet.judging.lens_witnesses import LensWitnesses, lens_fits, lens_witnesses
 from calibnet.trace import CascadeTrace
 from tests.support.drive import REFERENCE
 from tests.support.matches import LENS_ODDS, matches, run
@@ -31,9 +31,9 @@ def seen(bend: Callable[[Floats], Floats]) -> CascadeTrace:
 
 
 def said(trace: CascadeTrace) -> LensWitnesses:
-    found = lens_witnesses(trace)
-    assert found is not None
-    return found
+    looks = lens_fits(trace)
+    assert looks is not None
+    return lens_witnesses(looks)
 
 
 def test_the_witnesses_are_how_other_lenses_fit_the_finest_look_and_a_coarse_one() -> None:

@@ -16,7 +16,7 @@ from calibnet.datasets.bag.moments import change
 from calibnet.datasets.calibration_files import FrameChoice
 from calibnet.datasets.development import Development
 from calibnet.errors import DatasetError
-from tests.support.bags import BagWriter, write_bag
+from tests.support.bags import BagWriter, assert_holds, write_bag
 from tests.support.fakes import make_frame
 
 KINDS = ("ros1", "sqlite3", "mcap")
@@ -37,13 +37,7 @@ def test_a_bag_is_a_dataset_like_every_other(path: Path) -> None:
 def test_frames_of_a_bag_are_those_that_were_recorded(path: Path) -> None:
     bag = Bag([path])
     assert (bag.image, bag.points) == ("/cam/image_raw/compressed", "/points")
-    assert len(bag) == 3
-    for frame, expected in zip(bag, FRAMES, strict=True):
-        assert_array_equal(frame.image, expected.image)
-        assert_allclose(frame.points, expected.points, atol=1e-6)
-        assert_allclose(frame.camera.matrix, expected.camera.matrix)
-        assert_allclose(frame.camera_from_lidar, expected.camera_from_lidar, atol=1e-9)
-    assert_allclose([frame.timestamp for frame in bag], [0, 1, 2], atol=1e-6)
+    assert_holds(bag, FRAMES)
     (note,) = bag.notes
     assert note.startswith("/cam/image_raw/compressed (3) and /points (6): 3 frames, 3 of them at a standstill")
 
