@@ -55,13 +55,13 @@ class Target:
 
 
 def _scan(suffix: str, data: bytes) -> object:
-    from calibnet.datasets.scans import read_scan
+    from calibnet.datasets.clouds.scans import read_scan
 
     return _as_file(f"scan{suffix}", data, read_scan)
 
 
 def _image(data: bytes) -> object:
-    from calibnet.datasets.images import read_image
+    from calibnet.datasets.images.files import read_image
 
     return _as_file("image.png", data, read_image)
 
@@ -73,13 +73,13 @@ def _calibration(data: bytes) -> object:
 
 
 def _kitti(data: bytes) -> object:
-    from calibnet.datasets.kitti import read_calibration_file
+    from calibnet.datasets.kitti.calibration import read_calibration_file
 
     return _as_file("calib.txt", data, partial(read_calibration_file, sizes={"P2": 12, "Tr": 12}))
 
 
 def _times(data: bytes) -> object:
-    from calibnet.datasets.kitti import read_times
+    from calibnet.datasets.kitti.calibration import read_times
 
     return _as_file("times.txt", data, partial(read_times, seconds=float))
 
@@ -197,7 +197,7 @@ def _stamps(data: bytes) -> object:
 
 
 def _nuscenes_sensors(data: bytes) -> object:
-    from calibnet.datasets.nuscenes_tables import read_sensors
+    from calibnet.datasets.nuscenes.tables import read_sensors
 
     _as_file("sensor.json", b'[{"token": "s", "channel": "LIDAR_TOP"}]', Path.exists)
     return _as_file("calibrated_sensor.json", data, lambda path: read_sensors(path.parent))
@@ -210,7 +210,7 @@ SENSOR = (
 
 
 def _nuscenes(data: bytes) -> object:
-    from calibnet.datasets.nuscenes_tables import records
+    from calibnet.datasets.nuscenes.tables import records
 
     return _as_file("scene.json", data, lambda path: list(records(path.parent, "scene")))
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from calibnet.alignment.pull import Map
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.geometry import PinholeCamera, invert, project, transform
 from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector6

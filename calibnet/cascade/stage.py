@@ -15,7 +15,7 @@ from torch import Tensor
 from calibnet.cascade.faces import joined, seen_by_camera
 from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform

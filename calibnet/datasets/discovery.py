@@ -66,7 +66,7 @@ def _kitti_360(root: Path, name: str) -> Iterator[Sequence]:
 
 def _nuscenes(root: Path, name: str) -> Iterator[Sequence]:
     """``CAM_FRONT`` of every scene; ``SCENE/CAMERA`` names another camera."""
-    from calibnet.datasets.nuscenes_tables import find_tables, scene_names
+    from calibnet.datasets.nuscenes.tables import find_tables, scene_names
 
     scene, _, camera = name.partition("/")
     for one in [scene] if scene else scene_names(find_tables(root)):

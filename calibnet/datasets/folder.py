@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
-from calibnet.datasets.development import Development, Levels
-from calibnet.datasets.images import BY_ITSELF, read_image, read_levels
-from calibnet.datasets.lens import LOOKED_AT, Lens, Picture
+from calibnet.datasets.clouds.scans import SCAN_SUFFIXES
+from calibnet.datasets.images.development import Development, Levels
+from calibnet.datasets.images.files import BY_ITSELF, read_image, read_levels
+from calibnet.datasets.images.lens import LOOKED_AT, Lens, Picture
 from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
-from calibnet.datasets.scans import SCAN_SUFFIXES
 from calibnet.datasets.selection import spread
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry.camera_model import CameraModel

@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.bin_clouds import KITTI
 from calibnet.datasets.calibration import Calibration
+from calibnet.datasets.clouds.bin import KITTI
+from calibnet.datasets.clouds.scans import ending, full_scale_of, read_raw, read_scan
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import read_image
-from calibnet.datasets.lens import Picture
+from calibnet.datasets.images.files import read_image
+from calibnet.datasets.images.lens import Picture
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
-from calibnet.datasets.scans import ending, full_scale_of, read_raw, read_scan
 from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera

@@ -18,12 +18,12 @@ DATASETS = Registry(
     "datasets",
     "dataset",
     {
-        "kitti-odometry": "calibnet.datasets.kitti_odometry:KittiOdometry",
-        "kitti-raw": "calibnet.datasets.kitti_raw:KittiRaw",
-        "kitti-object": "calibnet.datasets.kitti_object:KittiObject",
-        "kitti-tracking": "calibnet.datasets.kitti_tracking:KittiTracking",
-        "kitti-360": "calibnet.datasets.kitti360:Kitti360",
-        "nuscenes": "calibnet.datasets.nuscenes:NuScenes",
+        "kitti-odometry": "calibnet.datasets.kitti.odometry:KittiOdometry",
+        "kitti-raw": "calibnet.datasets.kitti.raw:KittiRaw",
+        "kitti-object": "calibnet.datasets.kitti.object:KittiObject",
+        "kitti-tracking": "calibnet.datasets.kitti.tracking:KittiTracking",
+        "kitti-360": "calibnet.datasets.kitti.kitti360:Kitti360",
+        "nuscenes": "calibnet.datasets.nuscenes.scene:NuScenes",
         "folder": "calibnet.datasets.folder:Folder",
     },
 )

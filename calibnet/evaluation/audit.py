@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from calibnet.datasets import Frame, Sequence
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 
 RING_DEG = 0.8
 """Degrees of elevation of a kept and a dropped band together: of 64 beams about 32 are left."""

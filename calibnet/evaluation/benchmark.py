@@ -17,7 +17,7 @@ import torch
 
 from calibnet.cascade import Cascade, Stage
 from calibnet.datasets import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.evaluation import reference
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.network.batch import lidar_input, make_batch

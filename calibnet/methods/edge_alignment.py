@@ -14,7 +14,7 @@ import torch
 from calibnet.alignment import align, gather, picture_camera
 from calibnet.alignment.evidence import picture_edges
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.exhibit import Exhibit
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.se3 import pose_from_vector

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.geometry import transform
 from calibnet.training.augmentation_draws import Exposure, Scanner, View, mirrored
 from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe

@@ -23,7 +23,7 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import decode_image
+from calibnet.datasets.images.files import decode_image
 from calibnet.errors import DatasetError
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Transform

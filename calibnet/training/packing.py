@@ -17,7 +17,7 @@ from torch import Tensor
 
 from calibnet.cascade.loading import load_stage
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.errors import ConfigError
 from calibnet.geometry import RANGES, transform_points
 from calibnet.geometry.types import Transform

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from calibnet.datasets import Frame, Sequence
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.errors import CalibrationError
 from calibnet.geometry import pose_error, sample_miscalibration
 from calibnet.geometry.types import Extrinsic

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 from annotated_types import Interval, Len
 
-from calibnet.datasets.images import MOST_PIXELS
+from calibnet.datasets.images.files import MOST_PIXELS
 from calibnet.errors import CalibnetError
 from calibnet.geometry import CameraModel
 from calibnet.geometry.camera_model import LensModel

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.development import ImageError
-from calibnet.datasets.images import decode_image
+from calibnet.datasets.images.development import ImageError
+from calibnet.datasets.images.files import decode_image
 from calibnet.errors import CalibnetError
 from inspector.colors import FAR_M, NEAR_M, depth_colors
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.lens import Lens
+from calibnet.datasets.images.lens import Lens
 from calibnet.geometry import CameraModel, invert, rotation_from_vector, transform
 from calibnet.geometry.se3 import transform_points
 from calibnet.geometry.types import Transform

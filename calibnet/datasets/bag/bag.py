@@ -24,14 +24,14 @@ from calibnet.datasets.bag.recording import BagRecording, Stamped
 from calibnet.datasets.bag.topics import found_topic, info_of
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
 from calibnet.datasets.calibration_files.frames import Link, camera_from_lidar
-from calibnet.datasets.cloud_table import CloudError, points_of
-from calibnet.datasets.development import Development, ImageError, Levels
+from calibnet.datasets.clouds.columns import CloudError, points_of
+from calibnet.datasets.clouds.scans import clean_points, full_scale_of
 from calibnet.datasets.folder import DEPTHS_LOOKED_AT
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.lens import Lens
+from calibnet.datasets.images.development import Development, ImageError, Levels
+from calibnet.datasets.images.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
-from calibnet.datasets.scans import clean_points, full_scale_of
 from calibnet.datasets.selection import spread
 from calibnet.errors import DatasetError
 from calibnet.geometry.rectification import central

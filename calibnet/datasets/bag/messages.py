@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration_files.frames import Link
-from calibnet.datasets.cloud_table import MOST_POINTS, CloudError, Columns
-from calibnet.datasets.development import ImageError, Levels
-from calibnet.datasets.images import decode_levels
+from calibnet.datasets.clouds.columns import MOST_POINTS, CloudError, Columns
+from calibnet.datasets.images.development import ImageError, Levels
+from calibnet.datasets.images.files import decode_levels
 from calibnet.geometry import transform
 from calibnet.geometry.types import Rotation
 

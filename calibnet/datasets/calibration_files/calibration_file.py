@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from calibnet.datasets.images import read_image
+from calibnet.datasets.images.files import read_image
 from calibnet.errors import DatasetError
 from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Extrinsic, Transform
@@ -57,7 +57,7 @@ class CalibrationFile:
         camera_from_lidar: 4x4; None where the file knows no LiDAR.
         rig_from_camera: 4x4, where the camera sits on a rig of several; None where it does not say.
         cloud_columns: names of the columns of ``.bin`` clouds; None where it does not say.
-        bayer: pattern of a sensor whose pictures are not demosaiced, of `calibnet.datasets.development.BAYER`.
+        bayer: pattern of a sensor whose pictures are not demosaiced, of `calibnet.datasets.images.development.BAYER`.
         prior: what is fixed or known beforehand of the extrinsic, as the options of the same names say it.
     """
 

@@ -62,7 +62,7 @@ def _camera(content: Mapping[Any, Any], path: Path) -> CameraModel | None:
 
 
 def _bayer(pattern: Any, path: Path) -> str:
-    from calibnet.datasets.development import BAYER  # loads OpenCV
+    from calibnet.datasets.images.development import BAYER  # loads OpenCV
 
     name = str(pattern).lower()
     if name not in BAYER:

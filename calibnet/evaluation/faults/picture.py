@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.evaluation.faults.alteration import NATIVE_WIDTH, Alteration
 from calibnet.geometry import rotation_from_euler_xyz, transform
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import read_image, resize_image
+from calibnet.datasets.images.files import read_image, resize_image
 from calibnet.errors import ConfigError
 from calibnet.geometry import PinholeCamera
 

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from calibnet.cascade.stage import FEWEST_CELLS, View
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
 from calibnet.exhibit import Exhibit

@@ -13,8 +13,8 @@ from calibnet.errors import DatasetError
 ON_FILES = list(DATASETS.own)
 """The datasets that read images and scans from files."""
 NOT_PAIRED_BY_FOLDER = {
-    "kitti-360": "what has no partner is counted and left out, see test_kitti360.py",
-    "nuscenes": "its tables say what belongs together, see test_nuscenes.py",
+    "kitti-360": "what has no partner is counted and left out, see kitti/test_kitti360.py",
+    "nuscenes": "its tables say what belongs together, see nuscenes/test_scene.py",
 }
 
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calibnet.datasets.images import read_image
+from calibnet.datasets.images.files import read_image
 from calibnet.datasets.plausibility import (
     Implausible,
     bit_depth,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.geometry import PinholeCamera, project, transform
 from calibnet.network.batch import Cut, lidar_input, make_batch
 

@@ -12,7 +12,7 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.images import decode_image
+from calibnet.datasets.images.files import decode_image
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry import RANGES, miscalibration, project
 from calibnet.training import packed as packed_module

@@ -16,7 +16,7 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from calibnet.datasets.images import resize_image
+from calibnet.datasets.images.files import resize_image
 from calibnet.errors import CalibnetError, ConfigError, DatasetError, WeightsError
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.network.efficientnet import load_weights

@@ -14,7 +14,7 @@ from calibnet.datasets.bag import Bag, BagOptions
 from calibnet.datasets.bag.messages import columns_of, levels_of
 from calibnet.datasets.bag.moments import change
 from calibnet.datasets.calibration_files import FrameChoice
-from calibnet.datasets.development import Development
+from calibnet.datasets.images.development import Development
 from calibnet.errors import DatasetError
 from tests.support.bags import BagWriter, assert_holds, write_bag
 from tests.support.fakes import make_frame

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from calibnet.datasets.cloud_table import LONGEST_ROW, MOST_POINTS, CloudError, Columns
+from calibnet.datasets.clouds.columns import LONGEST_ROW, MOST_POINTS, CloudError, Columns
 from calibnet.runtime.reading import MEGABYTE
 
 LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.kitti import (
+from calibnet.datasets.kitti.calibration import (
     IMAGE_SUFFIXES,
     NOMINAL_PERIOD,
     camera_folder,

@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from calibnet.datasets.cloud_table import (
+from calibnet.datasets.clouds.columns import (
     MOST_BYTES,
     CloudError,
     Column,

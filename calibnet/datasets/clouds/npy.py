@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from calibnet.datasets.cloud_table import MOST_BYTES, MOST_COLUMNS, CloudError, Columns, joined, points_of
+from calibnet.datasets.clouds.columns import MOST_BYTES, MOST_COLUMNS, CloudError, Columns, joined, points_of
 
 
 def read_npy(data: bytes) -> NDArray[np.float32]:

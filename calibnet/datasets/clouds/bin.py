@@ -7,7 +7,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.cloud_table import CloudError, Columns
+from calibnet.datasets.clouds.columns import CloudError, Columns
 
 KITTI = ("x", "y", "z", "intensity")
 LAYOUTS: tuple[tuple[str, ...], ...] = (

@@ -16,8 +16,9 @@ import numpy as np
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import read_calibration
 from calibnet.datasets.folder import looked_at
-from calibnet.datasets.images import read_image
-from calibnet.datasets.kitti import (
+from calibnet.datasets.images.files import read_image
+from calibnet.datasets.images.lens import Lens, Picture
+from calibnet.datasets.kitti.calibration import (
     IMAGE_SUFFIXES,
     frame_files,
     read_calibration_file,
@@ -25,7 +26,6 @@ from calibnet.datasets.kitti import (
     read_times,
     times_of,
 )
-from calibnet.datasets.lens import Lens, Picture
 from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
 from calibnet.errors import DatasetError

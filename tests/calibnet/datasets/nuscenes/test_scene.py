@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from calibnet.datasets import open_sequence
 from calibnet.datasets.discovery import find_sequences
-from calibnet.datasets.nuscenes_tables import records
+from calibnet.datasets.nuscenes.tables import records
 from calibnet.errors import DatasetError
 from tests.calibnet.datasets.conftest import small_turn
 from tests.calibnet.datasets.published import CAR_FROM_LIDAR, THEIRS_FROM_OURS, rigid, write_nuscenes

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from calibnet.datasets.development import BAYER, Development, white_of
-from calibnet.datasets.images import decode_image, read_image
+from calibnet.datasets.images.development import BAYER, Development, white_of
+from calibnet.datasets.images.files import decode_image, read_image
 from calibnet.errors import DatasetError
 
 RAMP = np.linspace(0, 1, 64 * 48).reshape(48, 64)

@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.kitti import (
+from calibnet.datasets.kitti.calibration import (
     DATE_OF_FOCAL_LENGTH,
     IMAGE_SUFFIXES,
     camera_folder,

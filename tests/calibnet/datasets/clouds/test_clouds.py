@@ -14,8 +14,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 
-from calibnet.datasets.bin_clouds import KITTI, LAYOUTS, read_bin, recognised
-from calibnet.datasets.cloud_table import CloudError
+from calibnet.datasets.clouds.bin import KITTI, LAYOUTS, read_bin, recognised
+from calibnet.datasets.clouds.columns import CloudError
 from calibnet.errors import DatasetError
 from tests.support.clouds import with_fields
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.images import read_image
-from calibnet.datasets.lens import Picture
-from calibnet.datasets.nuscenes_tables import (
+from calibnet.datasets.images.files import read_image
+from calibnet.datasets.images.lens import Picture
+from calibnet.datasets.nuscenes.tables import (
     LIDAR,
     Pair,
     Sensor,

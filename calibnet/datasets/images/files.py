@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, TiffImagePlugin
 
-from calibnet.datasets.development import Development, ImageError, Levels
+from calibnet.datasets.images.development import Development, ImageError, Levels
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import MEGABYTE, read_file

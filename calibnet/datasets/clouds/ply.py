@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from calibnet.datasets.cloud_table import CloudError, Column, Columns, from_rows, from_text, whole_number
+from calibnet.datasets.clouds.columns import CloudError, Column, Columns, from_rows, from_text, whole_number
 
 HEADER_BYTES = 64 * 1024
 TYPES = {

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.bin_clouds import read_bin
-from calibnet.datasets.cloud_table import MOST_BYTES, CloudError, Columns, points_of
-from calibnet.datasets.npy_clouds import read_npy, read_npz
-from calibnet.datasets.pcd import read_pcd
-from calibnet.datasets.ply import read_ply
-from calibnet.datasets.table_clouds import read_feather, read_las, read_parquet
+from calibnet.datasets.clouds.bin import read_bin
+from calibnet.datasets.clouds.columns import MOST_BYTES, CloudError, Columns, points_of
+from calibnet.datasets.clouds.npy import read_npy, read_npz
+from calibnet.datasets.clouds.pcd import read_pcd
+from calibnet.datasets.clouds.ply import read_ply
+from calibnet.datasets.clouds.tables import read_feather, read_las, read_parquet
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import read_file
 
@@ -33,7 +33,7 @@ def read_scan(
 
     Args:
         path: the file.
-        columns: of a ``.bin``, see `calibnet.datasets.bin_clouds.read_bin`; None to recognise them.
+        columns: of a ``.bin``, see `calibnet.datasets.clouds.bin.read_bin`; None to recognise them.
         full_scale: intensity that counts as 1, see `full_scale_of`; None to judge by this scan alone.
 
     Returns:

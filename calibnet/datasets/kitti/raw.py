@@ -15,7 +15,7 @@ from typing import Any
 import pykitti
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.kitti import (
+from calibnet.datasets.kitti.calibration import (
     IMAGE_SUFFIXES,
     camera_folder,
     frame_files,

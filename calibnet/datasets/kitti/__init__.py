@@ -1,0 +1,1 @@
+"""The KITTI datasets, one module per layout; `calibration` has what they share."""

@@ -1,0 +1,1 @@
+"""nuScenes by its published tables: one camera and the LiDAR of one scene."""
