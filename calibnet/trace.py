@@ -228,7 +228,7 @@ class DriveLook:
         offset: ``[6]``, ``(translation m, rotation rad)`` from there to where it believes the extrinsic to be.
         information: ``[6, 6]`` of it as the network states it, or None.
         match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
-        misfit: mean cost of their residuals, see `calibnet.judging.witnesses.misfit`.
+        misfit: mean cost of their residuals, see `calibnet.judging.predictors.misfit`.
         bent_misfit: the same with whichever other lens explains them best.
     """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import torch
 
@@ -31,6 +32,8 @@ from calibnet.runtime.precision import autocast
 from calibnet.trace import MARGIN, CascadeTrace, DriveEstimate, StageTrace
 from calibnet.verdict import ACCEPTED, Verdict
 from calibnet.weights.manifest import PACKAGE, Manifest, load_manifest
+
+AnyEstimate = TypeVar("AnyEstimate", bound=DriveEstimate)
 
 
 class Cascade:
@@ -100,8 +103,8 @@ class Cascade:
     @property
     def unjudged(self) -> str:
         """Why none of its results can be accepted; empty where they can."""
-        doubt = self.coefficients.doubt_of(self.stages[-1].range)
-        return doubt if isinstance(doubt, str) else ""
+        classifier = self.coefficients.for_frame(self.stages[-1].range)
+        return classifier if isinstance(classifier, str) else ""
 
     @property
     def numbers(self) -> tuple[int, ...]:
@@ -172,15 +175,9 @@ class Cascade:
             trace = None
         verdict = None if trace is None else trace.verdict
         if verdict is None or verdict.word != ACCEPTED:
-            verdict = judge(
-                frame,
-                start,
-                trace,
-                self.coefficients,
-                match_error_of(self.stages[0]),
-                None if lags is None else (lags, reach_of(self.calibrate)),
-                self.prior.words,
-            )
+            match_error = match_error_of(self.stages[0])
+            lag = None if lags is None else (lags, reach_of(self.calibrate))
+            verdict = judge(frame, start, trace, self.coefficients, match_error, lag, self.prior.words)
         return upright.undo_verdict(verdict)
 
     def calibrate_drive(
@@ -200,13 +197,11 @@ class Cascade:
         upright = Upright.of(initial, self.stages[0].range)
         start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
         pose_prior = self._pose_prior(initial, upright)
-        estimate = solve_drive(self.stages, frames, start, self.common_error, observer, pose_prior)
-        if wider := self._covering(estimate.camera_from_lidar @ invert(start)):
-            estimate = solve_drive([*wider, *self.stages], frames, start, self.common_error, observer, pose_prior)
-        estimate = replace(estimate, covariance=self.coefficients.widening * estimate.covariance)
-        doubt = self.coefficients.drive_doubt_of(self.stages[-1].range)
-        verdict = judge_drive(estimate, start, self.stages[0].range, doubt)
-        return upright.undo_drive(replace(estimate, verdict=verdict))
+
+        def solve(stages: Sequence[Stage]) -> DriveEstimate:
+            return solve_drive(stages, frames, start, self.common_error, observer, pose_prior)
+
+        return upright.undo_drive(self._solved(solve, start))
 
     def calibrate_rig(
         self,
@@ -233,25 +228,30 @@ class Cascade:
             CalibrationError: no frame of any camera could be calibrated.
             DatasetError: none could be read.
         """
-        searched = self.stages[0].range
-        upright = [Upright.of(camera.camera_from_rig @ initial, searched) for camera in cameras]
+        upright = [Upright.of(camera.camera_from_rig @ initial, self.stages[0].range) for camera in cameras]
         turned = [
             RigCamera(one.name, PreparedFrames(one.frames, turn), turn.extrinsic(one.camera_from_rig))
             for one, turn in zip(cameras, upright, strict=True)
         ]
         pose_prior = self.prior.about(initial) if self.prior else None
-        estimate = solve_rig(self.stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
+
+        def solve(stages: Sequence[Stage]) -> RigEstimate:
+            return solve_rig(stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
+
+        estimate = self._solved(solve, initial)
+        inflation = self.coefficients.inflation
+        inflated = (replace(one, covariance=inflation * one.covariance) for one in estimate.cameras)
+        found = tuple(turn.undo_camera(one) for one, turn in zip(inflated, upright, strict=True))
+        return replace(estimate, cameras=found)
+
+    def _solved(self, solve: Callable[[Sequence[Stage]], AnyEstimate], initial: Extrinsic) -> AnyEstimate:
+        """A drive or a rig solved with the stages, and where it leaves their range with the wider ones too; judged."""
+        estimate = solve(self.stages)
         if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
-            stages = [*wider, *self.stages]
-            estimate = solve_rig(stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
-        widening = self.coefficients.widening
-        found = tuple(
-            turn.undo_camera(replace(one, covariance=widening * one.covariance))
-            for one, turn in zip(estimate.cameras, upright, strict=True)
-        )
-        estimate = replace(estimate, covariance=widening * estimate.covariance, cameras=found)
-        verdict = judge_drive(estimate, initial, searched, self.coefficients.drive_doubt_of(self.stages[-1].range))
-        return replace(estimate, verdict=verdict)
+            estimate = solve([*wider, *self.stages])
+        estimate = replace(estimate, covariance=self.coefficients.inflation * estimate.covariance)
+        classifier = self.coefficients.for_drive(self.stages[-1].range)
+        return replace(estimate, verdict=judge_drive(estimate, initial, self.stages[0].range, classifier))
 
     def _run(
         self,

@@ -15,7 +15,7 @@ from calibnet.geometry import transform
 from calibnet.geometry.prior import inverse
 from calibnet.geometry.se3 import pose_from_vector, pose_vector
 from calibnet.geometry.types import Rotation
-from calibnet.judging.covariance import Spread
+from calibnet.judging.covariance import CovarianceModel
 from calibnet.trace import StageTrace
 
 
@@ -70,4 +70,4 @@ def _firmness(look: StageTrace) -> np.ndarray:
     """Information ``[6, 6]`` of a look, by the covariance that such results were measured to have."""
     if look.information is None:
         return np.eye(6)
-    return inverse(Spread().covariance(look.information, look.range, look.range, look.match_error_px))
+    return inverse(CovarianceModel().covariance(look.information, look.range, look.range, look.match_error_px))

@@ -21,7 +21,7 @@ from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform
 from calibnet.geometry.prior import PosePrior, inverse
 from calibnet.geometry.types import Extrinsic, Transform
-from calibnet.judging.covariance import Spread
+from calibnet.judging.covariance import CovarianceModel
 from calibnet.network.batch import Cut, lidar_input, make_batch
 from calibnet.network.displacement import DisplacementField, expected_error
 from calibnet.network.network import CalibrationNetwork, NetworkOutput
@@ -209,12 +209,12 @@ class Stage:
 def with_prior(look: StageTrace, pose_prior: PosePrior) -> StageTrace:
     """A look whose correction is fused with the user's prior; its information stays what the network states.
 
-    The network's correction is weighted by the covariance that its results were measured to have (`Spread`), which is
-    larger than the one it states.
+    The network's correction is weighted by the covariance that its results were measured to have, see
+    `CovarianceModel`, which is larger than the one it states.
     """
     firm = None
     if look.information is not None:
-        firm = inverse(Spread().covariance(look.information, look.range, look.range, look.match_error_px))
+        firm = inverse(CovarianceModel().covariance(look.information, look.range, look.range, look.match_error_px))
     correction = pose_prior.corrected(look.correction, firm, look.before)
     return replace(look, correction=correction, after=correction @ look.before)
 

@@ -18,7 +18,7 @@ from calibnet.datasets.images.lens import LOOKED_AT, Lens, Picture
 from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import ConfigError, DatasetError
 from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.prior import Prior, parse_angle, parse_axes, parse_length
@@ -96,7 +96,7 @@ class Folder(PairedSequence):
 def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -> Development:
     """How the pictures of a drive become eight bits; more than one is looked at where these have more."""
     pictures = list[Levels]()
-    for position in spread(len(images), DEPTHS_LOOKED_AT):
+    for position in evenly_spaced(len(images), DEPTHS_LOOKED_AT):
         with suppress(DatasetError):  # each frame says it of itself
             pictures.append(read_levels(images[position], (camera.width, camera.height)))
             if pictures[0].dtype == np.uint8:
@@ -107,7 +107,7 @@ def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -
 def looked_at(images: list[Path], camera: CameraModel, development: Development = BY_ITSELF) -> list[NDArray[np.uint8]]:
     """Some pictures from all over a drive, of those that can be read; none of a pinhole's."""
     pictures = list[NDArray[np.uint8]]()
-    for position in spread(len(images), 0 if camera.is_pinhole else LOOKED_AT):
+    for position in evenly_spaced(len(images), 0 if camera.is_pinhole else LOOKED_AT):
         with suppress(DatasetError):
             pictures.append(read_image(images[position], (camera.width, camera.height), development))
     return pictures

@@ -20,7 +20,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import read_image
 from calibnet.datasets.images.lens import Picture
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
@@ -124,7 +124,7 @@ class PairedSequence(ABC):
     def _full_scale(self) -> float:
         """The intensity that counts as 1 in the whole drive, by some scans from all over it."""
         intensities = [np.zeros(0, np.float32)]
-        for position in spread(len(self.files), SCANS_LOOKED_AT):
+        for position in evenly_spaced(len(self.files), SCANS_LOOKED_AT):
             with suppress(DatasetError):
                 intensities.append(read_raw(self.files[position].needed.scan, self.cloud_columns)[:, 3])
         return full_scale_of(np.concatenate(intensities))

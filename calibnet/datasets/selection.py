@@ -42,7 +42,7 @@ def select_frames(sequence: Sized, text: str = ":") -> list[int]:
     return selected
 
 
-def spread(count: int, most: int) -> list[int]:
+def evenly_spaced(count: int, most: int) -> list[int]:
     """At most ``most`` of the positions 0 to ``count - 1``, evenly spread, the last always among them."""
     chosen = min(count, most)
     return [(number + 1) * count // chosen - 1 for number in range(chosen)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.trace import Estimate
 
 POINTS = 12
@@ -35,7 +35,7 @@ class Convergence:
     def __init__(self, frames: int) -> None:
         """Begin the curve of a drive of ``frames`` frames."""
         self.points: list[tuple[int, Estimate]] = []
-        self._due = Due(spread(frames, POINTS)[:-1])
+        self._due = Due(evenly_spaced(frames, POINTS)[:-1])
         self._frame = 0
 
     @property

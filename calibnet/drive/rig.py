@@ -21,7 +21,7 @@ from calibnet.alignment.evidence import Evidence, InRig, Term
 from calibnet.alignment.solve import align
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.rig import RigCamera
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.drive.consensus import FARTHEST_ROTATION_DEG, FARTHEST_TRANSLATION_M, Consensus
 from calibnet.drive.convergence import Due
 from calibnet.drive.rig_pose import CameraConsensus, rig_correction
@@ -95,7 +95,7 @@ def solve_rig(
         CalibrationError: no frame of any camera could be calibrated.
         DatasetError: none could be read.
     """
-    some = [spread(len(camera.frames), FRAMES_UNTIL_LAST_LOOK) for camera in cameras]
+    some = [evenly_spaced(len(camera.frames), FRAMES_UNTIL_LAST_LOOK) for camera in cameras]
     everything = [list(range(len(camera.frames))) for camera in cameras]
     total, number = LOOKS * len(stages) * sum(map(len, some)) + sum(map(len, everything)), itertools.count()
 
@@ -160,7 +160,7 @@ class _LastLook:
 
     def of(self, camera: RigCamera, place: Transform) -> Callable[[int, Frame, StageTrace, Consensus], None]:
         """What takes in the frames of a camera, which is at ``place`` on the rig (``camera_from_rig``)."""
-        due = Due(spread(len(camera.frames), self._aligned) if self._aligned else [])
+        due = Due(evenly_spaced(len(camera.frames), self._aligned) if self._aligned else [])
 
         def taken_in(position: int, frame: Frame, trace: StageTrace, consensus: Consensus) -> None:
             look = drive_look(frame, position, trace)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from calibnet.alignment import Evidence, gather
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.datasets.plausibility import suspicion
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
@@ -17,7 +17,7 @@ from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.judging.witnesses import misfits
+from calibnet.judging.predictors import misfits
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
@@ -81,7 +81,7 @@ def solve_drive(
     """
     if not len(frames):
         raise ValueError("There are no frames to calibrate.")
-    some, everything = spread(len(frames), FRAMES_UNTIL_LAST_LOOK), list(range(len(frames)))
+    some, everything = evenly_spaced(len(frames), FRAMES_UNTIL_LAST_LOOK), list(range(len(frames)))
     total, number = LOOKS * len(stages) * len(some) + len(everything), itertools.count()
 
     def read(position: int) -> Frame:
@@ -100,7 +100,7 @@ def solve_drive(
 
     aligns = is_finest(stages[-1].range)
     evidence = list[Evidence]()
-    to_align, convergence = Due(spread(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
+    to_align, convergence = Due(evenly_spaced(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
 
     def estimate(consensus: Consensus, *starts: Estimate) -> Estimate:
         return consensus.aligned(evidence, common_error, starts) if aligns else consensus.estimate()

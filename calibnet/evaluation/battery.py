@@ -12,7 +12,7 @@ from calibnet.calibrator import Calibrator
 from calibnet.cascade import Cascade
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.audit import other_drive
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
@@ -247,7 +247,7 @@ def two_mount_runs(
         if len(sequence) < FEWEST_JUDGED or not shares_mount(sequence):
             continue
         for fault in (None, *two_mounts(second=True)):
-            drive = Faulty(sequence, spread(len(sequence), DRIVE_FRAMES), fault, [])
+            drive = Faulty(sequence, evenly_spaced(len(sequence), DRIVE_FRAMES), fault, [])
             for repeat in range(repeats):
                 guess = draw_miscalibration(range_, seed, 0, repeat) @ sequence[0].camera_from_lidar
                 try:

@@ -13,7 +13,7 @@ import numpy as np
 from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only
 from calibnet.datasets import Frame, PickedFrames
 from calibnet.datasets import Sequence as FrameSequence
-from calibnet.datasets.selection import by_rig, spread
+from calibnet.datasets.selection import by_rig, evenly_spaced
 from calibnet.errors import CalibnetError, CalibrationError, ConfigError
 from calibnet.evaluation.audit import Altered, alterations, other_drive
 from calibnet.evaluation.drives import shares_mount
@@ -197,7 +197,7 @@ def measure_row(
 
 def _frames(bench: Bench, range_: MiscalibrationRange, sequences: Sequence[FrameSequence]) -> Iterator[_Try]:
     for sequence in sequences:
-        for position in spread(len(sequence), bench.most):
+        for position in evenly_spaced(len(sequence), bench.most):
             frame = sequence[position]
             for repeat in range(bench.repeats):
                 delta = draw_miscalibration(range_, bench.seed, frame.index, repeat)
@@ -233,7 +233,7 @@ def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> fl
     sequence = bench.sequences[0]
     if drives_only(method):
         return None
-    positions = spread(len(sequence), TIMED)
+    positions = evenly_spaced(len(sequence), TIMED)
     times = []
     for count, position in enumerate([positions[0], *positions]):
         frame = sequence[position]

@@ -15,7 +15,7 @@ from calibnet.evaluation.verdict_fit import rounded
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
 from calibnet.geometry.types import Floats
 from calibnet.judging.lens_causes import BENT, CENTER, FAULTS, FOCAL, LensOdds
-from calibnet.judging.lens_witnesses import lens_fits, lens_witnesses
+from calibnet.judging.lens_predictors import lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
 
 CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
@@ -31,7 +31,7 @@ TOO_WEAK = (
 )
 """Not fitted to: what a frame can hardly show, and a principal point moved down, which looks like a pitch."""
 RIDGE = 1.0
-"""Times the squares of the coefficients of standardised witnesses: what is added to the negative log likelihood."""
+"""Times the squares of the coefficients of standardised predictors: what is added to the negative log likelihood."""
 WRONG_NAMES = 0.05
 """Share of the runs that may be given a wrong name, left out by sequence; those without a fault any name."""
 FEWEST = 10
@@ -44,7 +44,7 @@ class LensStream(RunStream):
     def told(self, trace: CascadeTrace) -> dict[str, float] | None:
         """What two looks say of the lens, whatever the verdict."""
         looks = lens_fits(trace)
-        return None if looks is None else asdict(lens_witnesses(looks))
+        return None if looks is None else asdict(lens_predictors(looks))
 
     def has(self, fault: Corruption) -> bool:
         """Whether a fault is one of the lens, and strong enough to be told."""
@@ -77,7 +77,7 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
     Raises:
         CalibrationError: too few of them have a fault, or none.
     """
-    asked = [run for run in runs if run.witnesses is not None and np.isfinite(list(run.witnesses.values())).all()]
+    asked = [run for run in runs if run.predictors is not None and np.isfinite(list(run.predictors.values())).all()]
     kinds = np.array([1 + FAULTS.index(CLASSES[run.fault]) if run.fault in CLASSES else 0 for run in asked], np.intp)
     counts = np.bincount(kinds, minlength=len(FAULTS) + 1)
     if counts.min() < FEWEST:
@@ -85,8 +85,8 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
         raise CalibrationError(
             f"Too few runs tell faults of the lens apart ({told}); {FEWEST} of each are needed. Make more runs."
         )
-    names = list(asked[0].witnesses or {})
-    values = np.array([[run.witnesses[name] for name in names] for run in asked if run.witnesses is not None])
+    names = list(asked[0].predictors or {})
+    values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])
     likely = _left_out(values, kinds, [run.sequence for run in asked])
     best, sure = 1 + likely[:, 1:].argmax(axis=1), likely[:, 1:].max(axis=1)
     wrong = np.sort(sure[best != kinds])[::-1]

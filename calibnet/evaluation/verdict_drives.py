@@ -10,7 +10,7 @@ import numpy as np
 
 from calibnet.cascade import Cascade
 from calibnet.datasets.frame import Sequence as FrameSequence
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibnetError
 from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
@@ -21,7 +21,7 @@ from calibnet.evaluation.virtual import Virtual
 from calibnet.geometry import invert, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.judging.drive import FEWEST_JUDGED
-from calibnet.judging.drive_witnesses import drive_witnesses
+from calibnet.judging.drive_predictors import drive_predictors
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
 MOST = 16
@@ -84,13 +84,13 @@ def part(length: int, generator: np.random.Generator) -> list[int]:
     count = min(length, round(float(np.exp(generator.uniform(np.log(FEWEST_JUDGED), np.log(MOST))))))
     stretch = int(generator.integers(count, length + 1))
     start = int(generator.integers(length - stretch + 1))
-    return [start + position for position in spread(stretch, count)]
+    return [start + position for position in evenly_spaced(stretch, count)]
 
 
 def measured(
     cascade: Cascade, drive: Faulty, guess: np.ndarray, number: int, sequence: str, fault: Corruption
 ) -> VerdictRun | None:
-    """Solve a drive, and note what witnesses say of it; its error is that against its farthest frame.
+    """Solve a drive, and note what predictors say of it; its error is that against its farthest frame.
 
     Raises:
         CalibrationError: no frame could be calibrated.
@@ -98,7 +98,7 @@ def measured(
     estimate = cascade.calibrate_drive(drive, guess)
     there = estimate.camera_from_lidar
     error = farthest(there, drive)
-    found = drive_witnesses(estimate, guess, cascade.stages[0].range)
+    found = drive_predictors(estimate, guess, cascade.stages[0].range)
     asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
     return VerdictRun(
         number,

@@ -14,25 +14,25 @@ from calibnet.errors import CalibrationError
 from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Floats
-from calibnet.judging.covariance import Spread
-from calibnet.judging.doubt import Doubt
+from calibnet.judging.classifier import Classifier
+from calibnet.judging.covariance import CovarianceModel
 from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """The ranges of the last stage and of the first one."""
 RIDGE = 3.0
-"""Weight of the squared coefficients of standardised witnesses, added to the negative log likelihood."""
+"""Weight of the squared coefficients of standardised predictors, added to the negative log likelihood."""
 FALSE_ACCEPTS = 0.01
 """Share of all runs that may be accepted and wrong, left out by sequence. Half of these runs have no fault; where every
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
-OF_FRAMES = ("match_error", "misfit", "lens", "alike")
-"""Witnesses of a frame that are fitted: on sequences left out, all nine accept fewer of the good ones, and so does the
+OF_FRAMES = ("match_error", "misfit", "lens", "correlated")
+"""Predictors of a frame that are fitted: on sequences left out, all nine accept fewer of the good ones, and so does the
 stated deviation in the place of, or beside, the one for matches that err alike. How far a run went counts apart, in the
 ranges it is held to."""
 OF_DRIVES = ("match_error", "aligned")
-"""Witnesses of a drive that are fitted: there are few drives, and on those left out more of them do no better. What
+"""Predictors of a drive that are fitted: there are few drives, and on those left out more of them do no better. What
 tells most is how far the alignment of edges goes from what the networks say: where they disagree, either may be
 wrong."""
 LEAST_DEG = 1e-3
@@ -40,7 +40,7 @@ LEAST_DEG = 1e-3
 FEWEST, FEWEST_DRIVES = 10, 6
 """Good and bad results, each, of frames and of drives, below which nothing can be fitted."""
 NEAR = 1.25
-"""Times a limit, or by which it is divided: errors in between are near the limit. No witness tells 24 from 26 cm."""
+"""Times a limit, or by which it is divided: errors in between are near the limit. No predictor tells 24 from 26 cm."""
 CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
 """Shares of accepted and wrong runs at which the operating curve is told."""
 
@@ -56,7 +56,7 @@ class FitFigures:
         false_accept_rate: share of all runs that are accepted and wrong.
         acceptance_of_good: share of the good plain runs that are accepted.
         wrong_rejected: share of the wrong runs that are rejected.
-        spread: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected;
+        nees: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected;
             of drives, of accepted ones.
         curve: acceptance of good plain runs at given shares of false accepts; beside it, the same where runs that end
             near a limit (`NEAR`) are set aside.
@@ -69,12 +69,12 @@ class FitFigures:
     false_accept_rate: float
     acceptance_of_good: float
     wrong_rejected: float
-    spread: float
+    nees: float
     curve: list[dict[str, float]] = field(default_factory=list)
 
 
-def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Spread, FitFigures]:
-    """Fit doubt and spread to runs on single frames.
+def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, CovarianceModel, FitFigures]:
+    """Fit the classifier and the covariance model to runs on single frames.
 
     Args:
         runs: of a known truth.
@@ -83,62 +83,64 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Doubt, Sprea
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    doubt, figures, kept = fit_doubt(runs, FRAME_LIMITS, names=OF_FRAMES)
-    spread = fit_spread(kept, ranges)
-    return doubt, spread, replace(figures, spread=mean_square(kept, ranges, spread))
+    classifier, figures, kept = fit_classifier(runs, FRAME_LIMITS, names=OF_FRAMES)
+    model = fit_covariance(kept, ranges)
+    return classifier, model, replace(figures, nees=nees_of(kept, ranges, model))
 
 
-def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Doubt, float, FitFigures]:
-    """Fit doubt to runs on drives, and the factor that makes their stated covariance as large as their errors.
+def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigures]:
+    """Fit the classifier to runs on drives, and the factor that makes their stated covariance as large as their errors.
 
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    doubt, figures, kept = fit_doubt(runs, DRIVE_LIMITS, FEWEST_DRIVES, OF_DRIVES)
-    accepted = [run for run in kept if doubt_of(run, doubt) < doubt.accepted_below]  # few others would widen them all
+    classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES, OF_DRIVES)
+    # only accepted runs count: a few gross errors would inflate the covariance of all
+    accepted = [run for run in kept if error_probability(run, classifier) < classifier.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
-    widening = rounded(max(float(np.mean(squares)), 1.0)) if squares else 1.0
-    return doubt, widening, replace(figures, spread=float(np.mean(squares)) / widening if squares else float("nan"))
+    nees = float(np.mean(squares)) if squares else float("nan")
+    inflation = rounded(max(nees, 1.0)) if squares else 1.0
+    return classifier, inflation, replace(figures, nees=nees / inflation)
 
 
-def doubt_of(run: VerdictRun, doubt: Doubt) -> float:
-    """How likely a run is wrong, by its witnesses."""
-    assert run.witnesses is not None
-    return doubt(SimpleNamespace(**run.witnesses))
+def error_probability(run: VerdictRun, classifier: Classifier) -> float:
+    """How likely a run is wrong, by its predictors."""
+    assert run.predictors is not None
+    return classifier(SimpleNamespace(**run.predictors))
 
 
-def fit_doubt(
+def fit_classifier(
     runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST, names: Sequence[str] = ()
-) -> tuple[Doubt, FitFigures, list[VerdictRun]]:
-    """Fit doubt to runs, and say how it does on sequences that are left out.
+) -> tuple[Classifier, FitFigures, list[VerdictRun]]:
+    """Fit a classifier to runs, and say how it does on sequences that are left out.
 
     Args:
         runs: of a known truth.
         limits: degrees and centimetres that they are held to.
         fewest: that have to end right, and wrong.
-        names: of the witnesses to fit; all by default.
+        names: of the predictors to fit; all by default.
 
     Returns:
-        The doubt, its figures, and the plain runs that it does not reject.
+        The classifier, its figures, and the plain runs that it does not reject.
 
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    asked = [run for run in runs if run.witnesses is not None and np.isfinite(list(run.witnesses.values())).all()]
+    asked = [run for run in runs if run.predictors is not None and np.isfinite(list(run.predictors.values())).all()]
     good = np.array([run.good for run in asked], bool)
     if min(int(good.sum()), int((~good).sum())) < fewest:
         raise CalibrationError(
             f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
             f"seem to fit; {fewest} of each at least are needed to tell them apart. Make more runs, or add other data."
         )
-    names = names or list(asked[0].witnesses or {})
-    values = np.array([[run.witnesses[name] for name in names] for run in asked if run.witnesses is not None])
+    names = names or list(asked[0].predictors or {})
+    values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])
     odds = left_out(values, ~good, [run.sequence for run in asked])
     plain = np.array([run.plain for run in asked], bool)
     accepted_below = threshold(odds, ~good, FALSE_ACCEPTS * len(runs))
     rejected_above = max(float(np.quantile(odds[good], 1 - GOOD_REJECTED)), accepted_below)
     intercept, weights = regression(values, ~good)
-    doubt = Doubt(
+    classifier = Classifier(
         rounded(intercept),
         {name: rounded(weight) for name, weight in zip(names, weights, strict=True)},
         rounded(probability(accepted_below)),
@@ -156,10 +158,10 @@ def fit_doubt(
         false_accept_rate=float((accepted & ~good).sum() / len(runs)),
         acceptance_of_good=_acceptance(accepted & good & plain, runs),
         wrong_rejected=told_wrong / max(len(wrong), 1),
-        spread=float("nan"),
+        nees=float("nan"),
         curve=_curve(asked, runs, odds, limits),
     )
-    return doubt, figures, kept
+    return classifier, figures, kept
 
 
 def _curve(
@@ -196,7 +198,7 @@ def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> floa
 
 
 def regression(values: Floats, wrong: NDArray[np.bool_]) -> tuple[float, Floats]:
-    """Logistic regression: intercept and coefficients ``[W]`` of the witnesses ``[N, W]``, in their own units."""
+    """Logistic regression: intercept and coefficients ``[W]`` of the predictors ``[N, W]``, in their own units."""
     mean, deviation = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-9)
     design = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
     target = wrong.astype(np.float64)
@@ -241,37 +243,37 @@ def probability(odds: float) -> float:
     return float(1 / (1 + np.exp(-np.clip(odds, -50, 50))))
 
 
-def fit_spread(runs: Sequence[VerdictRun], ranges: Ranges) -> Spread:
-    """The spread under which errors are likeliest, widened until their mean square is 1 a degree of freedom.
+def fit_covariance(runs: Sequence[VerdictRun], ranges: Ranges) -> CovarianceModel:
+    """The model under which errors are likeliest, widened until their mean square is 1 a degree of freedom.
 
     Where no stage states an information, or too few runs remain, the default.
     """
     known = [run for run in runs if run.information is not None]
     if len(known) < FEWEST:
-        return Spread()
+        return CovarianceModel()
 
-    def spread(logarithms: Floats, widened: float = 1.0) -> Spread:
+    def model(logarithms: Floats, widened: float = 1.0) -> CovarianceModel:
         share, translation, rotation = np.exp(logarithms) * np.array([1 / widened, widened**0.5, widened**0.5])
-        return Spread(rounded(share), rounded(translation), rounded(max(rotation, LEAST_DEG)))
+        return CovarianceModel(rounded(share), rounded(translation), rounded(max(rotation, LEAST_DEG)))
 
     def cost(logarithms: Floats) -> float:
-        squares, covariances = squared_errors(known, ranges, spread(logarithms))
+        squares, covariances = squared_errors(known, ranges, model(logarithms))
         # of Student's t with four degrees of freedom: a few gross errors must not widen all others
         return float((0.5 * np.linalg.slogdet(covariances)[1] + 5.0 * np.log1p(squares / 4.0)).sum())
 
-    start = np.log(list(asdict(Spread()).values()))
+    start = np.log(list(asdict(CovarianceModel()).values()))
     found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 400, "xatol": 0.01, "fatol": 0.01}).x
-    return spread(found, max(mean_square(known, ranges, spread(found)), 1e-3))
+    return model(found, max(nees_of(known, ranges, model(found)), 1e-3))
 
 
-def mean_square(runs: Sequence[VerdictRun], ranges: Ranges, spread: Spread) -> float:
+def nees_of(runs: Sequence[VerdictRun], ranges: Ranges, model: CovarianceModel) -> float:
     """Mean squared error by the covariance, a degree of freedom; 1 where it is right. Not a number without runs."""
     known = [run for run in runs if run.information is not None]
-    return float(squared_errors(known, ranges, spread)[0].mean() / 6) if known else float("nan")
+    return float(squared_errors(known, ranges, model)[0].mean() / 6) if known else float("nan")
 
 
-def squared_errors(runs: Sequence[VerdictRun], ranges: Ranges, spread: Spread) -> tuple[Floats, Floats]:
+def squared_errors(runs: Sequence[VerdictRun], ranges: Ranges, model: CovarianceModel) -> tuple[Floats, Floats]:
     """Squared errors ``[N]`` by the covariance, and the covariances ``[N, 6, 6]``."""
     informations, offsets = np.array([run.information for run in runs]), np.array([run.offset for run in runs])
-    covariances = spread.covariance(informations, *ranges, np.array([run.match_error_px for run in runs]))
+    covariances = model.covariance(informations, *ranges, np.array([run.match_error_px for run in runs]))
     return np.einsum("ni,nij,nj->n", offsets, np.linalg.inv(covariances), offsets), covariances

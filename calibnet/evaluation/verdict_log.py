@@ -19,9 +19,9 @@ from calibnet.errors import ConfigError
 from calibnet.evaluation.lens_fit import LensStream
 from calibnet.evaluation.verdict_drives import DriveStream
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
-from calibnet.judging.drive_witnesses import DriveWitnesses
-from calibnet.judging.lens_witnesses import LensWitnesses
-from calibnet.judging.witnesses import Witnesses
+from calibnet.judging.drive_predictors import DrivePredictors
+from calibnet.judging.lens_predictors import LensPredictors
+from calibnet.judging.predictors import Predictors
 from calibnet.runtime.reading import MEGABYTE, read_text
 from calibnet.runtime.writing import check_output
 
@@ -114,14 +114,14 @@ class RunLog:
 
 
 def whole(run: VerdictRun) -> VerdictRun:
-    """The run, if it has all witnesses that are asked today.
+    """The run, if it has all predictors that are asked today.
 
     Raises:
         KeyError: it has others.
     """
-    known = [{one.name for one in fields(kind)} for kind in (Witnesses, LensWitnesses, DriveWitnesses)]
-    if run.witnesses is not None and run.witnesses.keys() not in known:
-        raise KeyError(f"run {run.number} was made with other witnesses")
+    known = [{one.name for one in fields(kind)} for kind in (Predictors, LensPredictors, DrivePredictors)]
+    if run.predictors is not None and run.predictors.keys() not in known:
+        raise KeyError(f"run {run.number} was made with other predictors")
     return run
 
 

@@ -1,4 +1,4 @@
-"""Runs to fit the verdict to: plain frames and frames with the battery's faults, and what witnesses say of each.
+"""Runs to fit the verdict to: plain frames and frames with the battery's faults, and what predictors say of each.
 
 The stream of runs has no end, and each depends on the seed and its number alone: a longer one begins with
 a shorter one.
@@ -17,16 +17,16 @@ from calibnet.cascade.prepared import prepared
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.frame import Sequence as FrameSequence
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibnetError
 from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions
 from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import Coefficients
-from calibnet.judging.doubt import Doubt
-from calibnet.judging.witnesses import witnesses
+from calibnet.judging.predictors import predictors
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, FRAME_LIMITS
 
@@ -49,7 +49,7 @@ class VerdictRun:
         fault, strength: what was put into it, see `calibnet.evaluation.corruptions`.
         rotation_deg, translation_cm: how far off it ended.
         good: whether that is within the limits.
-        witnesses: by name; None where the verdict does not ask them, because picture and scan do not fit, for instance.
+        predictors: by name; None where the verdict needs none, for instance because picture and scan do not fit.
         offset: the result against the truth, ``(translation m, rotation rad)`` in the camera frame.
         information: ``[6, 6]`` that the last stage, or the drive, states; None without one.
         match_error_px: that the last stage expects; not a number for a drive.
@@ -63,7 +63,7 @@ class VerdictRun:
     rotation_deg: float
     translation_cm: float
     good: bool
-    witnesses: dict[str, float] | None
+    predictors: dict[str, float] | None
     offset: list[float]
     information: list[list[float]] | None
     match_error_px: float
@@ -98,7 +98,7 @@ class RunStream:
         """A run is a random frame of a random sequence, every sequence as often as the others.
 
         Args:
-            cascade: what calibrates; its verdict is set to accept whatever its witnesses would be asked for.
+            cascade: what calibrates; its verdict is set to accept whatever its predictors would be asked for.
             sequences: at least one; other pictures come from another one of them.
             seed: of everything random.
         """
@@ -113,9 +113,9 @@ class RunStream:
             return None
 
     def told(self, trace: CascadeTrace) -> dict[str, float] | None:
-        """What witnesses say of a run; None where the verdict does not ask them."""
+        """What predictors say of a run; None where the verdict does not ask them."""
         asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
-        return asdict(witnesses(trace)) if asked else None
+        return asdict(predictors(trace)) if asked else None
 
     def has(self, fault: Corruption) -> bool:
         """Whether a fault is one of those of this stream."""
@@ -130,7 +130,7 @@ class RunStream:
         generator = np.random.default_rng([self.seed, number])
         which = int(generator.integers(len(self.sequences)))
         sequence = self.sequences[which]
-        position = int(generator.choice(spread(len(sequence), FRAMES)))
+        position = int(generator.choice(evenly_spaced(len(sequence), FRAMES)))
         fault = PLAIN if generator.random() < PLAIN_SHARE else self._fault(which, position, generator)
         frame, first = self.read(which, position), self.cascade.stages[0].range
         range_ = MiscalibrationRange(fault.farther * first.rotation_deg, fault.farther * first.translation_m)
@@ -151,13 +151,13 @@ class RunStream:
 def measured(
     cascade: Cascade, drawn: Drawn, number: int, told: Callable[[CascadeTrace], dict[str, float] | None]
 ) -> VerdictRun:
-    """Calibrate a frame, and note what witnesses say of it.
+    """Calibrate a frame, and note what predictors say of it.
 
     Args:
         cascade: what calibrates.
         drawn: what it starts with.
         number: in the stream.
-        told: what witnesses say of the run.
+        told: what predictors say of the run.
 
     Raises:
         CalibrationError: too few points fall into the picture.
@@ -189,8 +189,8 @@ def within(error: PoseError, limits: tuple[float, float]) -> bool:
 
 
 def asking(cascade: Cascade) -> Cascade:
-    """The cascade with a verdict that accepts whatever its witnesses would be asked for."""
-    everything = Doubt(0.0, {}, accepted_below=1.0, rejected_above=1.0)
+    """The cascade with a verdict that accepts whatever its predictors would be asked for."""
+    everything = Classifier(0.0, {}, accepted_below=1.0, rejected_above=1.0)
     finest = cascade.stages[-1].range
     cascade.coefficients = Coefficients(everything, drive=everything, weights={finest: ""}, missing="")
     return cascade

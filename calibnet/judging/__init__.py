@@ -1,1 +1,1 @@
-"""Judging what was found: witnesses, causes, uncertainty, and from them a `calibnet.verdict.Verdict`."""
+"""Judging what was found: predictors, causes, uncertainty, and from them a `calibnet.verdict.Verdict`."""

@@ -18,7 +18,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
 from calibnet.geometry import transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
-from calibnet.judging.witnesses import reach
+from calibnet.judging.predictors import reach
 from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.verdict import Cause
 

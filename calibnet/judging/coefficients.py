@@ -13,12 +13,12 @@ from typing import Any
 
 from calibnet.errors import WeightsError
 from calibnet.geometry import MiscalibrationRange
-from calibnet.judging.covariance import Spread
-from calibnet.judging.doubt import Doubt
-from calibnet.judging.drive_witnesses import DriveWitnesses
+from calibnet.judging.classifier import Classifier
+from calibnet.judging.covariance import CovarianceModel
+from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.judging.lens_causes import FAULTS, LensOdds
-from calibnet.judging.lens_witnesses import LensWitnesses
-from calibnet.judging.witnesses import Witnesses
+from calibnet.judging.lens_predictors import LensPredictors
+from calibnet.judging.predictors import Predictors
 from calibnet.runtime.reading import parse_toml, read_text
 from calibnet.runtime.writing import write_whole
 from calibnet.weights.fingerprint import fingerprint
@@ -26,7 +26,7 @@ from calibnet.weights.manifest import PACKAGE, Manifest
 
 HEAD = (
     "# How verdicts on the weights beside this file are made; `calib-inspect fit-verdict` writes it.\n"
-    "# It holds for these weights alone. docs/decisions.md (Doubt) says how it is fitted.\n"
+    "# It holds for these weights alone. docs/decisions.md (Probability of an error) says how it is fitted.\n"
 )
 
 
@@ -35,41 +35,41 @@ class Coefficients:
     """Coefficients of the verdict.
 
     Attributes:
-        doubt: how witnesses of a frame are summed up; None where nothing was fitted.
-        spread: how far results of frames lie from the truth.
+        frame: how predictors of a frame are summed up; None where nothing was fitted.
+        covariance: how far results of frames lie from the truth.
         lens: how likely faults of the lens are; None where that was not fitted, and then none is named.
-        drive: how witnesses of a drive are summed up; None where that was not fitted.
-        widening: by what a drive's stated covariance is multiplied, to be as large as its errors are.
+        drive: how predictors of a drive are summed up; None where that was not fitted.
+        inflation: by what a drive's stated covariance is multiplied, to be as large as its errors are.
         weights: fingerprints of the stages that were run, by range; the finest of them ends a run that can be judged.
         missing: a sentence that says why there are none; empty where there are.
         fitted: what they were fitted to, and what came of it.
     """
 
-    doubt: Doubt | None = None
-    spread: Spread = field(default_factory=Spread)
+    frame: Classifier | None = None
+    covariance: CovarianceModel = field(default_factory=CovarianceModel)
     lens: LensOdds | None = None
-    drive: Doubt | None = None
-    widening: float = 1.0
+    drive: Classifier | None = None
+    inflation: float = 1.0
     weights: Mapping[MiscalibrationRange, str] = field(default_factory=dict)
     missing: str = "The verdict has not been fitted to these networks."
     fitted: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
-    def doubt_of(self, last: MiscalibrationRange) -> Doubt | str:
-        """How to sum up the witnesses of a run, or a sentence that says why nothing can be said of it.
+    def for_frame(self, last: MiscalibrationRange) -> Classifier | str:
+        """How to sum up the predictors of a run, or a sentence that says why nothing can be said of it.
 
         Args:
             last: range of the stage that ended it.
         """
-        return self._fitted_to(last) or self.doubt or self.missing
+        return self._fitted_to(last) or self.frame or self.missing
 
-    def drive_doubt_of(self, last: MiscalibrationRange) -> Doubt | str:
+    def for_drive(self, last: MiscalibrationRange) -> Classifier | str:
         """The same of a drive."""
         return self._fitted_to(last) or self.drive or "To drives the verdict has not been fitted."
 
     def _fitted_to(self, last: MiscalibrationRange) -> str:
         """Why a run that a stage ended cannot be judged; empty where it can."""
         finest = min(self.weights, default=last)
-        if self.doubt is not None and last != finest:
+        if self.frame is not None and last != finest:
             return f"The verdict was fitted to runs that end with the stage of {finest.label}, not with {last.label}."
         return self.missing
 
@@ -77,13 +77,13 @@ class Coefficients:
         """Write them as TOML."""
         import tomli_w
 
-        assert self.doubt is not None
+        assert self.frame is not None
         content = {
             "weights": {str(range_): of for range_, of in self.weights.items()},
-            "doubt": asdict(self.doubt),
-            "spread": asdict(self.spread),
+            "frame": asdict(self.frame),
+            "covariance": asdict(self.covariance),
             **({} if self.lens is None else {"lens": asdict(self.lens)}),
-            **({} if self.drive is None else {"drive": asdict(self.drive) | {"widening": self.widening}}),
+            **({} if self.drive is None else {"drive": asdict(self.drive) | {"inflation": self.inflation}}),
             "fitted": dict(self.fitted),
         }
         write_whole(path, (HEAD + tomli_w.dumps(content)).encode())
@@ -125,30 +125,30 @@ def _read(path: Path) -> Coefficients:
     text = read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy)
     try:
         content = parse_toml(text)
-        doubt = _doubt(content["doubt"], Witnesses)
+        frame = _classifier(content["frame"], Predictors)
         drive = content.get("drive", {})
-        widening = drive.pop("widening", 1.0)
-        of_drive = _doubt(drive, DriveWitnesses) if drive else None
+        inflation = drive.pop("inflation", 1.0)
+        of_drive = _classifier(drive, DrivePredictors) if drive else None
         lens = _lens(content["lens"]) if "lens" in content else None
         weights = {MiscalibrationRange.parse(range_): of for range_, of in content["weights"].items()}
-        spread, fitted = Spread(**content["spread"]), content.get("fitted", {})
-        return Coefficients(doubt, spread, lens, of_drive, widening, weights, "", fitted)
+        covariance, fitted = CovarianceModel(**content["covariance"]), content.get("fitted", {})
+        return Coefficients(frame, covariance, lens, of_drive, inflation, weights, "", fitted)
     except (TypeError, KeyError, ValueError, AttributeError) as error:
         raise WeightsError(f"{path} holds no coefficients of a verdict ({error}); {remedy}.") from None
 
 
 def _lens(content: dict[str, Any]) -> LensOdds:
     odds = LensOdds(**content)
-    known = {field.name for field in fields(LensWitnesses)}
+    known = {field.name for field in fields(LensPredictors)}
     if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
         raise KeyError(f"faults of the lens are {', '.join(FAULTS)}")
     if unknown := {name for weights in odds.weights.values() for name in weights} - known:
-        raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
+        raise KeyError(f"no predictor is called {', '.join(sorted(unknown))}")
     return odds
 
 
-def _doubt(content: dict[str, Any], witnesses: type[Witnesses | DriveWitnesses]) -> Doubt:
-    doubt = Doubt(**content)
-    if unknown := doubt.weights.keys() - {field.name for field in fields(witnesses)}:
-        raise KeyError(f"no witness is called {', '.join(sorted(unknown))}")
-    return doubt
+def _classifier(content: dict[str, Any], predictors: type[Predictors | DrivePredictors]) -> Classifier:
+    classifier = Classifier(**content)
+    if unknown := classifier.weights.keys() - {field.name for field in fields(predictors)}:
+        raise KeyError(f"no predictor is called {', '.join(sorted(unknown))}")
+    return classifier

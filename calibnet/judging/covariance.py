@@ -16,11 +16,11 @@ from calibnet.geometry.types import Floats, Matrix6
 from calibnet.trace import CascadeTrace
 
 PIXEL = 2.0
-"""Expected match error, in pixels, at which the common part is as large as `Spread` says; it grows in proportion."""
+"""Expected match error, in pixels, to which the common part of `CovarianceModel` refers; it grows in proportion."""
 
 
 @dataclass(frozen=True)
-class Spread:
+class CovarianceModel:
     """How far results lie from the truth.
 
     Attributes:
@@ -54,7 +54,7 @@ class Spread:
         return np.asarray(np.linalg.inv(matches + searched.information) + sigma[..., None] ** 2 * np.eye(6), np.float64)
 
 
-def covariance(trace: CascadeTrace, spread: Spread) -> Matrix6 | None:
+def covariance(trace: CascadeTrace, model: CovarianceModel) -> Matrix6 | None:
     """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` of a run on a frame; None where no stage states one.
 
     A perturbation of the result in the camera frame.
@@ -62,4 +62,4 @@ def covariance(trace: CascadeTrace, spread: Spread) -> Matrix6 | None:
     last = trace.stages[-1]
     if last.information is None:
         return None
-    return spread.covariance(last.information, last.range, trace.stages[0].range, last.match_error_px)
+    return model.covariance(last.information, last.range, trace.stages[0].range, last.match_error_px)

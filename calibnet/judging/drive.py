@@ -6,8 +6,8 @@ import math
 
 from calibnet.geometry import MiscalibrationRange, invert
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.doubt import Doubt
-from calibnet.judging.drive_witnesses import drive_witnesses
+from calibnet.judging.classifier import Classifier
+from calibnet.judging.drive_predictors import drive_predictors
 from calibnet.trace import MARGIN, DriveEstimate
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verdict, Word, moved
 
@@ -18,11 +18,11 @@ FEWEST_JUDGED = 4
 as within, and nothing tells which (docs/decisions.md, "Drives")."""
 HALVES_CM, ALIGNED_CM = 15.0, 7.0
 """Between the halves of a drive, and between what its networks and its edges say, from which on it is told; turns
-counted as `calibnet.judging.drive_witnesses` does."""
+counted as `calibnet.judging.drive_predictors` does."""
 
 
 def judge_drive(
-    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, doubt: Doubt | str
+    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
 ) -> Verdict:
     """Whether the extrinsic that was solved from a drive is good.
 
@@ -30,9 +30,9 @@ def judge_drive(
         estimate: of the drive.
         initial: ``camera_from_lidar`` that it started from.
         searched: the range that was to be searched around it.
-        doubt: as `calibnet.judging.coefficients.Coefficients.drive_doubt_of` has it; without one nothing is accepted.
+        classifier: as `calibnet.judging.coefficients.Coefficients.for_drive` has it; without one nothing is accepted.
     """
-    word, reason = _word(estimate, initial, searched, doubt)
+    word, reason = _word(estimate, initial, searched, classifier)
     there = estimate.camera_from_lidar
     return Verdict(
         word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped
@@ -40,7 +40,7 @@ def judge_drive(
 
 
 def _word(
-    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, doubt: Doubt | str
+    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
 ) -> tuple[Word, str]:
     used, skipped = estimate.frames, len(estimate.skipped)
     if 2 * skipped >= used + skipped:
@@ -57,19 +57,19 @@ def _word(
             f"The frames leave it open to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.0f} cm (one "
             "standard deviation); more frames of other places help."
         )
-    if isinstance(doubt, str):
-        return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {doubt}"
+    if isinstance(classifier, str):
+        return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {classifier}"
     if used < FEWEST_JUDGED:
         return CANNOT_TELL, f"{used} frames agree; to be sure of a drive takes {FEWEST_JUDGED}, better of other places."
-    witnesses = drive_witnesses(estimate, initial, searched)
-    if witnesses is None:
+    predictors = drive_predictors(estimate, initial, searched)
+    if predictors is None:
         return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
-    wrong = doubt(witnesses)
-    if wrong < doubt.accepted_below:
+    wrong = classifier(predictors)
+    if wrong < classifier.accepted_below:
         return ACCEPTED, f"{used} frames agree."
     if math.isnan(wrong):
         return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
-    halves, aligned = math.exp(witnesses.halves), math.exp(witnesses.aligned)
+    halves, aligned = math.exp(predictors.halves), math.exp(predictors.aligned)
     why = [f"its halves are {halves:.0f} cm apart"] if halves > HALVES_CM else []
     if aligned > ALIGNED_CM:
         why.append(f"edges lie {aligned:.0f} cm from what the networks say, and either may be right")

@@ -11,7 +11,7 @@ from calibnet.judging.causes import PICTURE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import covariance
 from calibnet.judging.lens_causes import lens_causes
-from calibnet.judging.witnesses import reach, witnesses
+from calibnet.judging.predictors import predictors, reach
 from calibnet.trace import MARGIN, CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
 
@@ -43,8 +43,9 @@ def judge(
             measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by the lens that the matches ask for.
         lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
             far a run goes.
-        prior: what was known of the extrinsic beforehand, as the user said it. The doubt is fitted to runs in which all
-            axes are open, which go wrong mostly in what may be known here: it accepts then, and never rejects.
+        prior: what the user knows of the extrinsic beforehand, in words. The classifier was fitted to runs in which all
+            six axes are free. Such runs err mostly along axes that a prior may fix, so with a prior it can accept a
+            result, but never reject it.
     """
     # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
     of_scan = ranges(frame.points), up(frame.points)
@@ -70,7 +71,7 @@ def judge(
     def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
         going = moved(trace.initial, last.after)
         return Verdict(
-            word, _because(reason, causes), last.after, going, causes, covariance(trace, coefficients.spread)
+            word, _because(reason, causes), last.after, going, causes, covariance(trace, coefficients.covariance)
         )
 
     if float(frame.image[::ROW_STEP].std()) < BLANK:
@@ -97,13 +98,13 @@ def judge(
         word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
         return verdict(word, f"The LiDAR {gone}.", why_lens() or (why(*lag) if lag else ()))
 
-    doubt = coefficients.doubt_of(last.range)
-    if isinstance(doubt, str):
+    classifier = coefficients.for_frame(last.range)
+    if isinstance(classifier, str):
         return verdict(
-            CANNOT_TELL, f"Picture and scan fit together, but how sure that is cannot be told. {doubt}", suspects
+            CANNOT_TELL, f"Picture and scan fit together, but how sure that is cannot be told. {classifier}", suspects
         )
-    wrong = doubt(witnesses(trace))
-    if wrong < doubt.accepted_below:
+    wrong = classifier(predictors(trace))
+    if wrong < classifier.accepted_below:
         return verdict(ACCEPTED, f"Picture and scan fit together (match error {last.match_error_px:.1f} px).")
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "What the network tells of its matches is not enough to judge them.", suspects)
@@ -114,7 +115,7 @@ def judge(
             f"{wrong:.0%} likely; with {prior} it is less so, how much cannot be told)."
         )
         return verdict(CANNOT_TELL, reason, why_lens())
-    return verdict(REJECTED if wrong > doubt.rejected_above else CANNOT_TELL, reason, why_lens())
+    return verdict(REJECTED if wrong > classifier.rejected_above else CANNOT_TELL, reason, why_lens())
 
 
 def _suspect(remark: Implausible) -> Cause:

@@ -1,8 +1,8 @@
 """Which fault of the lens a run's matches speak for, and how likely it is.
 
-No network is asked again: `calibnet.judging.lens_witnesses` fits the matches of two looks with other lenses besides the
-pose, and a multinomial logistic regression says which fault such numbers come from, or none. It is fitted to frames
-with such faults by `calib-inspect fit-verdict`.
+No network runs again: `calibnet.judging.lens_predictors` fits the matches of two looks with other lenses besides the
+pose, and a multinomial logistic regression turns these numbers into the probability of each fault, and of none. It is
+fitted to frames with such faults by `calib-inspect fit-verdict`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 
-from calibnet.judging.lens_witnesses import LensFits, LensWitnesses, lens_fits, lens_witnesses
+from calibnet.judging.lens_predictors import LensFits, LensPredictors, lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import Cause
 
@@ -27,16 +27,16 @@ class LensOdds:
     Attributes:
         named_from: probability from which on a fault is named.
         intercepts: of each fault.
-        weights: of each fault, by witness.
+        weights: of each fault, by predictor.
     """
 
     named_from: float
     intercepts: dict[str, float]
     weights: dict[str, dict[str, float]]
 
-    def __call__(self, witnesses: LensWitnesses) -> dict[str, float]:
+    def __call__(self, predictors: LensPredictors) -> dict[str, float]:
         """The probability of each fault; what is missing to 1 is that of none."""
-        numbers = asdict(witnesses)
+        numbers = asdict(predictors)
         odds = {
             name: intercept + sum(weight * numbers[of] for of, weight in self.weights[name].items())
             for name, intercept in self.intercepts.items()
@@ -56,7 +56,7 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
     looks = lens_fits(trace) if odds else None
     if odds is None or looks is None:
         return ()
-    found, fits = odds(lens_witnesses(looks)), looks[0]
+    found, fits = odds(lens_predictors(looks)), looks[0]
     name = max(found, key=lambda one: found[one])
     if found[name] < odds.named_from:
         return ()

@@ -25,7 +25,7 @@ USUAL_EXCESS, USUAL_STEPS = 2.0, 8
 drive that counts for against what they say themselves (docs/decisions.md, A mount over many drives)."""
 FALSE_ALARM = 1e-3
 """Probability, a mount, of a move where there is none, if errors were as they are modelled."""
-ALIKE_DEG, ALIKE_M = 0.12, 0.03
+COMMON_DEG, COMMON_M = 0.12, 0.03
 """Standard deviation, an axis, of what all drives of a car get wrong alike: it stays, however many there are. Measured
 on the eight drives of KITTI object/val as taken and through three virtual cameras; what eight drives do not average
 out is in it (docs/decisions.md, A mount over many drives)."""
@@ -157,7 +157,7 @@ class _Said:
         offsets = self.vectors[start:stop] - mean
         squares = float(np.einsum("ni,nij,nj->", offsets, self.informations[start:stop], offsets))
         scatter = max(1.0, squares / (6 * (stop - start - 1))) if stop - start > 1 else 1.0
-        alike = np.repeat([ALIKE_M, math.radians(ALIKE_DEG)], 3) ** 2
+        alike = np.repeat([COMMON_M, math.radians(COMMON_DEG)], 3) ** 2
         return Stay(
             tuple(range(start, stop)), pose_from_vector(mean) @ self.origin, covariance * scatter + np.diag(alike)
         )

@@ -124,14 +124,14 @@ def fit_verdict(
             )
 
     of_frames = made(source, runs, "frames")
-    doubt, spread, figures = fit_frames(of_frames, (min(ranges), max(ranges)))
+    classifier, covariance, figures = fit_frames(of_frames, (min(ranges), max(ranges)))
     fitted = {
         "data": [short(spec) for spec in of_drive.data],
         "synthetic": synthetic,
         "seed": seed,
         "frames": asdict(figures),
     }
-    coefficients = Coefficients(doubt, spread, weights=marks, missing="", fitted=fitted)
+    coefficients = Coefficients(classifier, covariance, weights=marks, missing="", fitted=fitted)
     for line in told(figures):
         console.print(line, soft_wrap=True)
     of_lenses = made(replace(source, kind="lenses"), lenses, "lenses") if lenses else []
@@ -146,12 +146,12 @@ def fit_verdict(
             console.print(line, soft_wrap=True)
     of_drives = made(of_drive, drives, "drives") if drives else []
     try:
-        drive, widening, figures = fit_drives(of_drives)
+        drive, inflation, figures = fit_drives(of_drives)
     except CalibrationError as error:
         console.print(f"Drives will not be accepted. {error}", style="yellow", markup=False, soft_wrap=True)
     else:
         fitted = {**fitted, "drives": asdict(figures)}
-        coefficients = replace(coefficients, drive=drive, widening=widening, fitted=fitted)
+        coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)
         for line in told(figures, "drives"):
             console.print(line, soft_wrap=True)
     coefficients.write(path)
@@ -175,7 +175,7 @@ def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
     for name, kept in (("acceptance_of_good", ""), ("acceptance_of_clear", ", runs near a limit set aside")):
         points = (f"{point[name]:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
         yield f"  accepted of the good at other shares of false accepts{kept}: {', '.join(points)}"
-    yield f"  squared error by the stated covariance, a degree of freedom: {figures.spread:.2f}"
+    yield f"  squared error by the stated covariance, a degree of freedom: {figures.nees:.2f}"
 
 
 def told_of_lenses(figures: LensFigures) -> Iterator[str]:

@@ -65,7 +65,7 @@ def import_folder(found: Recognised) -> None:
 
     from calibnet.cascade.cascade import Cascade
     from calibnet.datasets import open_sequence
-    from calibnet.datasets.selection import spread
+    from calibnet.datasets.selection import evenly_spaced
     from calibnet.geometry import MiscalibrationRange
     from inspector.record.contents import Contents, Detail
     from inspector.record.outputs import Outputs
@@ -74,7 +74,7 @@ def import_folder(found: Recognised) -> None:
     from inspector.run.start import Start
 
     sequence: Sequence = open_sequence(found.dataset, found.root, **found.options)
-    positions = spread(len(sequence), MOST_FRAMES)
+    positions = evenly_spaced(len(sequence), MOST_FRAMES)
     start = Start(MiscalibrationRange.parse(RANGE), as_is=found.as_is)
     cascade = Cascade.load(stages=start.stages, wider=True)
     title = f"{sequence.name}, {len(positions)} of {len(sequence)} frames"

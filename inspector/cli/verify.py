@@ -51,7 +51,7 @@ def verify_sequence(
         raise click.UsageError("verify judges one calibration; --per-frame draws another for every frame.")
     prepare_json(json_file)
     from calibnet.judging.verify import named_cause, unfit
-    from inspector.run.verification import UNKNOWN
+    from inspector.run.verify import UNKNOWN
 
     try:
         sequence = opening()
@@ -68,7 +68,7 @@ def verify_sequence(
 def verify_run(options: RunOptions, json_file: str | None, viewing: Viewing, report: Path | None) -> int:
     """Run what the verdict needs, record it where that was asked for, and say the verdict."""
     from inspector.record.outputs import Outputs
-    from inspector.run.verification import verify_session
+    from inspector.run.verify import verify_session
 
     record = bool(viewing.save or report or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, replace(viewing, headless=True), report) if record else Outputs()
@@ -82,7 +82,7 @@ def verify_run(options: RunOptions, json_file: str | None, viewing: Viewing, rep
 
 def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> ExitCode:
     """Write the JSON, say the verdict, and hand back the exit code."""
-    from inspector.run.verification import as_json
+    from inspector.run.verify import as_json
     from inspector.verdicts import line
 
     write_json(json_file, as_json(verdict))

@@ -90,9 +90,9 @@ def watch_session(session: Session) -> Watched:
     """
     from calibnet.drive.watching import watch_drive
     from calibnet.runtime.interruption import StopRequest
+    from inspector.run.precomputed_drive import first_readable
     from inspector.run.progress import drive_observer, frame_progress
     from inspector.run.session import STOPPING
-    from inspector.run.solved import first_readable
 
     initial = session.start.initial(first_readable(session.frames))
     with StopRequest(STOPPING) as stop, frame_progress(session.console) as progress:

@@ -16,7 +16,7 @@ import numpy as np
 
 from calibnet.calibrator import Calibrator, DriveCalibrator
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibrationError, ConfigError, DatasetError
 from calibnet.geometry import pose_error
 from calibnet.geometry.types import Extrinsic
@@ -164,7 +164,7 @@ class Answers:
         workspace, frames, pose = self._workspace, self._workspace.frames, self._workspace.pose
 
         def compute(tell: Progress) -> tuple[int, Frame]:
-            positions, worst = spread(len(frames), MOST_SEARCHED), (-math.inf, 0)
+            positions, worst = evenly_spaced(len(frames), MOST_SEARCHED), (-math.inf, 0)
             for done, position in enumerate(positions):
                 tell(done, len(positions))
                 try:

@@ -17,7 +17,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.trace import CascadeTrace
 from inspector import colors, entities
@@ -86,7 +86,7 @@ def record_rig(
         rec.log_once(TEXT, rr.TextDocument("\n".join(solved.markdown()), media_type=rr.MediaType.MARKDOWN))
         rec.log_once(WORLD, rr.ViewCoordinates.FLU)
         log_point_legend(rec, Coloring.DEPTH)
-        moments = spread(max(len(camera.frames) for camera in cameras), MOMENTS)
+        moments = evenly_spaced(max(len(camera.frames) for camera in cameras), MOMENTS)
         for done, position in enumerate(moments):
             observer(done, len(moments))
             _log_moment(stream.rec, cameras, position)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from calibnet.datasets.frame import Sequence
-from calibnet.datasets.selection import select_frames, spread
+from calibnet.datasets.selection import evenly_spaced, select_frames
 from calibnet.errors import ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.prior import Prior
@@ -147,7 +147,7 @@ class RunOptions:
             DatasetError: there are none.
         """
         if self.frames is None and self.is_long:
-            return spread(len(self.sequence), MANY_FRAMES)
+            return evenly_spaced(len(self.sequence), MANY_FRAMES)
         return select_frames(self.sequence, self.frames or ":")
 
     @property

@@ -28,9 +28,9 @@ from inspector.record.observation import Layout, Observation, Skipped
 from inspector.record.outputs import Outputs
 from inspector.record.recording import Recording, RunDescription
 from inspector.record.tabs.drive import drive_sentence
-from inspector.run.given import judge_given, suspected
+from inspector.run.initial_verdict import judge_initial, suspected
+from inspector.run.precomputed_drive import PrecomputedDrive, first_readable
 from inspector.run.progress import drive_observer, frame_progress
-from inspector.run.solved import SolvedDrive, first_readable
 from inspector.run.start import Start
 from inspector.run.summary import Summary
 
@@ -146,7 +146,7 @@ class Session:
         assert isinstance(self.cascade, DriveCalibrator)
         initial = self.start.initial(first_readable(self.frames))
         self._show()
-        return SolvedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
+        return PrecomputedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
 
     def _show(self) -> None:
         """Open the viewer or the page, and say where it is, once."""
@@ -222,7 +222,7 @@ class Session:
             summary.given_verdict = unfit(initial, str(error), suspected(self.cascade, self.frames, initial))
             return
         if self.verify and estimate.verdict is not None:
-            summary.given_verdict = judge_given(self.cascade, self.frames, initial, estimate.verdict, DRIVE)
+            summary.given_verdict = judge_initial(self.cascade, self.frames, initial, estimate.verdict, DRIVE)
         recording.log_drive(estimate, reference, summary.given_verdict, summary.of_frames())
         if self.watching is not None:
             recording.log_watch(self.watching(estimate))

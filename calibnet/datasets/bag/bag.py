@@ -32,7 +32,7 @@ from calibnet.datasets.images.development import Development, ImageError, Levels
 from calibnet.datasets.images.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
 from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
@@ -174,7 +174,7 @@ class Bag:
     def _some_levels(self, images: Sequence[Stamped]) -> list[Levels]:
         """Some pictures from all over the bag, as they are stored."""
         found = list[Levels]()
-        for position in spread(len(images), DEPTHS_LOOKED_AT):
+        for position in evenly_spaced(len(images), DEPTHS_LOOKED_AT):
             with suppress(ImageError):
                 found.append(levels_of(self._bag.message(self.image, images[position].recorded).content))
         return found
@@ -190,7 +190,7 @@ class Bag:
             raise DatasetError(f"The scan of {self._bag}, {self.points} at {at.seconds:.3f} s: {error}.") from None
 
     def _intensities(self, scans: list[Stamped]) -> NDArray[np.float32]:
-        return np.concatenate([self._raw(scans[position])[:, 3] for position in spread(len(scans), 4)])
+        return np.concatenate([self._raw(scans[position])[:, 3] for position in evenly_spaced(len(scans), 4)])
 
     def _of_transforms(self, frames: FrameChoice) -> Extrinsic:
         topics = self._bag.of_type(TRANSFORMS)

@@ -14,17 +14,17 @@ from calibnet.evaluation.lens_fit import CLASSES, TOO_WEAK, WRONG_NAMES, LensStr
 from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import RANGES
 from calibnet.judging.lens_causes import BENT, CENTER, FOCAL
-from calibnet.judging.lens_witnesses import LensWitnesses
+from calibnet.judging.lens_predictors import LensPredictors
 from tests.support.scene import Scenes
 from tests.support.tiny import tiny_network
 
-NAMES = [one.name for one in fields(LensWitnesses)]
+NAMES = [one.name for one in fields(LensPredictors)]
 SHOWS = {"focal-length": "fine_focal_gain", "principal-point": "fine_center_gain", "distorted": "coarse_radial_gain"}
-"""The witness of each fault that `lens_runs` raises; all others are noise."""
+"""The predictor of each fault that `lens_runs` raises; all others are noise."""
 
 
 def lens_runs(count: int, shown: float, seed: int = 0) -> list[VerdictRun]:
-    """Runs of which half have a fault that one witness shows, by so many deviations of its noise."""
+    """Runs of which half have a fault that one predictor shows, by so many deviations of its noise."""
     generator, made = np.random.default_rng(seed), []
     for number in range(count):
         fault = "none" if number % 2 else list(SHOWS)[number // 2 % 3]
@@ -37,14 +37,14 @@ def lens_runs(count: int, shown: float, seed: int = 0) -> list[VerdictRun]:
     return made
 
 
-def test_each_fault_is_told_by_the_witness_that_shows_it() -> None:
+def test_each_fault_is_told_by_the_predictor_that_shows_it() -> None:
     odds, figures = fit_lens(lens_runs(600, 6.0))
-    for fault, witness in SHOWS.items():
+    for fault, predictor in SHOWS.items():
         weights = odds.weights[CLASSES[fault]]
-        assert max(weights, key=lambda name: weights[name]) == witness
-        numbers = dict.fromkeys(NAMES, 0.0) | {witness: 6.0}
-        assert odds(LensWitnesses(**numbers))[CLASSES[fault]] > 0.9
-    assert sum(odds(LensWitnesses(**dict.fromkeys(NAMES, 0.0))).values()) < 0.2
+        assert max(weights, key=lambda name: weights[name]) == predictor
+        numbers = dict.fromkeys(NAMES, 0.0) | {predictor: 6.0}
+        assert odds(LensPredictors(**numbers))[CLASSES[fault]] > 0.9
+    assert sum(odds(LensPredictors(**dict.fromkeys(NAMES, 0.0))).values()) < 0.2
     assert (figures.runs, figures.sequences, figures.faulty) == (600, 5, 300)
     assert figures.right > 0.9 and figures.wrong < 0.05
 
@@ -57,7 +57,7 @@ def test_so_many_are_named_that_few_are_named_wrongly() -> None:
 
 
 def test_too_few_runs_of_a_fault_are_a_sentence_and_runs_that_tell_nothing_do_not_count() -> None:
-    runs = [run if run.fault != "distorted" else replace(run, witnesses=None) for run in lens_runs(120, 3.0)]
+    runs = [run if run.fault != "distorted" else replace(run, predictors=None) for run in lens_runs(120, 3.0)]
     with pytest.raises(CalibrationError, match=r"\(60 none, 20 focal-length, 20 principal-point, 0 distortion\)"):
         fit_lens(runs)
     with pytest.raises(CalibrationError, match="Make more runs"):
@@ -73,5 +73,5 @@ def test_the_faults_of_the_stream_are_of_the_lens_and_strong_enough() -> None:
     assert dropped == set(TOO_WEAK) | {("other-size", f"x{factor:g}") for factor in (0.75, 0.5, 2.0)}
     made = [run for number in range(8) if (run := stream.run(number)) is not None]
     assert {run.fault for run in made} > {"none"} and {run.fault for run in made} <= {"none", *CLASSES}
-    assert all(run.witnesses is None or list(run.witnesses) == NAMES for run in made)
-    assert any(run.witnesses for run in made) and asdict(stream.run(3) or made[0]) == asdict(stream.run(3) or made[0])
+    assert all(run.predictors is None or list(run.predictors) == NAMES for run in made)
+    assert any(run.predictors for run in made) and asdict(stream.run(3) or made[0]) == asdict(stream.run(3) or made[0])

@@ -10,17 +10,17 @@ import pytest
 
 from calibnet.errors import WeightsError
 from calibnet.geometry import RANGES
+from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import Coefficients, coefficients_path, load_coefficients
-from calibnet.judging.covariance import Spread
-from calibnet.judging.doubt import Doubt
+from calibnet.judging.covariance import CovarianceModel
 from calibnet.judging.lens_causes import FAULTS, LensOdds
 from calibnet.weights.fingerprint import fingerprints
 from calibnet.weights.manifest import PACKAGE, Manifest, StageEntry, StageSettings, load_manifest
 
 MANIFEST = Manifest("mine", stages=(StageEntry(RANGES[3], "four"), StageEntry(RANGES[4], "five")))
-DOUBT = Doubt(-1.5, {"match_error": 2.0, "reach": 0.25}, 0.25, 0.75)
+CLASSIFIER = Classifier(-1.5, {"match_error": 2.0, "reach": 0.25}, 0.25, 0.75)
 
-DRIVE = Doubt(0.5, {"halves": 1.5}, 0.1, 0.9)
+DRIVE = Classifier(0.5, {"halves": 1.5}, 0.1, 0.9)
 LENS = LensOdds(0.7, dict.fromkeys(FAULTS, -1.0), {name: {"fine_focal_gain": 2.5} for name in FAULTS})
 
 
@@ -30,20 +30,20 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "five").write_bytes(b"of stage 5")
     MANIFEST.write(tmp_path / "mine.toml")
     marks = fingerprints("mine", tmp_path, [RANGES[3], RANGES[4]])
-    whole = Coefficients(DOUBT, Spread(0.1, 0.05, 0.3), LENS, DRIVE, 1.25, marks, "", {"runs": 90})
+    whole = Coefficients(CLASSIFIER, CovarianceModel(0.1, 0.05, 0.3), LENS, DRIVE, 1.25, marks, "", {"runs": 90})
     whole.write(coefficients_path("mine", tmp_path))
     return tmp_path
 
 
 def test_they_are_read_as_they_were_written(folder: Path) -> None:
     coefficients = load_coefficients(MANIFEST, folder)
-    assert coefficients.doubt_of(RANGES[4]) == DOUBT and coefficients.missing == ""
-    assert coefficients.spread == Spread(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
-    assert coefficients.drive_doubt_of(RANGES[4]) == DRIVE and coefficients.widening == 1.25
+    assert coefficients.for_frame(RANGES[4]) == CLASSIFIER and coefficients.missing == ""
+    assert coefficients.covariance == CovarianceModel(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
+    assert coefficients.for_drive(RANGES[4]) == DRIVE and coefficients.inflation == 1.25
     assert coefficients.lens == LENS
-    without = replace(coefficients, drive=None).drive_doubt_of(RANGES[4])
+    without = replace(coefficients, drive=None).for_drive(RANGES[4])
     assert without == "To drives the verdict has not been fitted."
-    other = coefficients.doubt_of(RANGES[3])
+    other = coefficients.for_frame(RANGES[3])
     assert isinstance(other, str) and "end with the stage of ±1°/0.1 m" in other
 
 
@@ -52,14 +52,14 @@ def test_weights_that_were_trained_on_or_are_used_otherwise_have_none(folder: Pa
     for manifest in (MANIFEST.with_stage(used), MANIFEST):
         (folder / "five").write_bytes(b"of stage 5" if manifest is not MANIFEST else b"trained on")
         coefficients = load_coefficients(manifest, folder)
-        assert coefficients.doubt is None and coefficients.doubt_of(RANGES[4]) == coefficients.missing
+        assert coefficients.frame is None and coefficients.for_frame(RANGES[4]) == coefficients.missing
         assert "have changed: ±1°/0.1 m; `calib-inspect fit-verdict --weights" in coefficients.missing
 
 
 def test_own_weights_without_any_are_told_how_to_get_them_and_a_copy_needs_none(tmp_path: Path) -> None:
     manifest = load_manifest("compact")
     empty = load_coefficients(manifest, tmp_path)
-    assert empty.doubt is None
+    assert empty.frame is None
     assert empty.missing == (
         f"The verdict has not been fitted to the weights in {tmp_path}; "
         f"`calib-inspect fit-verdict --weights {tmp_path} --data …` fits it."
@@ -68,15 +68,15 @@ def test_own_weights_without_any_are_told_how_to_get_them_and_a_copy_needs_none(
         shutil.copy(PACKAGE / stage.file, tmp_path)
     assert load_coefficients(manifest, tmp_path) == load_coefficients(manifest)
     (tmp_path / manifest.file(RANGES[4])).write_bytes(b"trained on")
-    assert load_coefficients(manifest, tmp_path).doubt is None
+    assert load_coefficients(manifest, tmp_path).frame is None
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("match_error", "matcherror", "no witness is called matcherror"),
-        ("[spread]", "[sprawl]", "'spread'"),
-        ("fine_focal_gain", "fine_focal_loss", "no witness is called fine_focal_loss"),
+        ("match_error", "matcherror", "no predictor is called matcherror"),
+        ("[covariance]", "[sprawl]", "'covariance'"),
+        ("fine_focal_gain", "fine_focal_loss", "no predictor is called fine_focal_loss"),
         ("distortion = -1.0", "astigmatism = -1.0", "faults of the lens are focal-length, principal-point, distortion"),
     ],
 )

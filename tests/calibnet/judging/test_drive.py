@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, miscalibration
-from calibnet.judging.doubt import Doubt
+from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive import judge_drive
-from calibnet.judging.drive_witnesses import apart, drive_witnesses
+from calibnet.judging.drive_predictors import apart, drive_predictors
 from calibnet.trace import DriveEstimate, DriveLook
 from calibnet.verdict import BadFrame
 from tests.support.boxes import REFERENCE
 
-DOUBT = Doubt(-1.0, {"match_error": 2.0}, 0.6, 0.8)
+CLASSIFIER = Classifier(-1.0, {"match_error": 2.0}, 0.6, 0.8)
 """Accepts match errors of less than 2 px."""
 
 
@@ -56,7 +56,7 @@ def estimate(
     ],
 )
 def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -> None:
-    verdict = judge_drive(drive, REFERENCE, RANGES[2], DOUBT)
+    verdict = judge_drive(drive, REFERENCE, RANGES[2], CLASSIFIER)
     assert verdict.word == word and reason in verdict.reason
     assert verdict.used == drive.frames and verdict.skipped == drive.skipped
     np.testing.assert_array_equal(verdict.camera_from_lidar, drive.camera_from_lidar)
@@ -64,17 +64,17 @@ def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -
 
 
 def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
-    doubted = estimate(error=2.5)
-    networks = replace(doubted, camera_from_lidar=miscalibration([0, 0, 0], [0, 0.09, 0]) @ doubted.camera_from_lidar)
-    verdict = judge_drive(replace(doubted, networks=networks), REFERENCE, RANGES[2], DOUBT)
+    doubtful = estimate(error=2.5)
+    networks = replace(doubtful, camera_from_lidar=miscalibration([0, 0, 0], [0, 0.09, 0]) @ doubtful.camera_from_lidar)
+    verdict = judge_drive(replace(doubtful, networks=networks), REFERENCE, RANGES[2], CLASSIFIER)
     assert verdict.reason.endswith("; edges lie 9 cm from what the networks say, and either may be right.")
 
 
 def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
     few = replace(estimate(), frames=3, looks=estimate().looks[:3])
-    verdict = judge_drive(few, REFERENCE, RANGES[2], DOUBT)
+    verdict = judge_drive(few, REFERENCE, RANGES[2], CLASSIFIER)
     assert verdict.word == "cannot tell" and verdict.reason.startswith("3 frames agree; to be sure of a drive takes 4")
-    assert judge_drive(replace(few, frames=4), REFERENCE, RANGES[2], DOUBT).word == "accepted"
+    assert judge_drive(replace(few, frames=4), REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"
 
 
 def test_by_no_coefficients_no_drive_is_accepted() -> None:
@@ -84,8 +84,8 @@ def test_by_no_coefficients_no_drive_is_accepted() -> None:
     assert judge_drive(estimate(yaw=6.1), REFERENCE, RANGES[2], "Nothing was fitted.").word == "rejected"
 
 
-def test_witnesses_of_a_drive() -> None:
-    found = drive_witnesses(estimate(yaw=2.5, halves=24), REFERENCE, RANGES[2])
+def test_predictors_of_a_drive() -> None:
+    found = drive_predictors(estimate(yaw=2.5, halves=24), REFERENCE, RANGES[2])
     assert found is not None
     expected = {
         "match_error": np.log(1.5), "misfit": np.log(0.01), "lens": np.log(0.9), "stated": np.log(3 * np.sqrt(3)),
@@ -94,14 +94,14 @@ def test_witnesses_of_a_drive() -> None:
     assert vars(found) == pytest.approx(expected, abs=1e-6)
     assert apart(np.zeros(6), np.array([0, 0, 0, 0, np.radians(0.3), 0])) == pytest.approx(8.0)
     lone = replace(estimate(), looks=estimate().looks[:1])
-    assert drive_witnesses(lone, REFERENCE, RANGES[2]) is None
-    assert judge_drive(lone, REFERENCE, RANGES[2], DOUBT).word == "cannot tell"
+    assert drive_predictors(lone, REFERENCE, RANGES[2]) is None
+    assert judge_drive(lone, REFERENCE, RANGES[2], CLASSIFIER).word == "cannot tell"
 
 
 def test_what_is_known_beforehand_does_not_make_a_drive_look_sure() -> None:
-    """With its place fixed a drive states no deviation of it; what its frames would say alone is the witness."""
+    """With its place fixed a drive states no deviation of it; what its frames would say alone is the predictor."""
     free = estimate(centimetres=3.0)
     held = replace(estimate(centimetres=1e-4), free=free)
-    alone, fixed = (drive_witnesses(one, REFERENCE, RANGES[2]) for one in (free, held))
+    alone, fixed = (drive_predictors(one, REFERENCE, RANGES[2]) for one in (free, held))
     assert alone is not None and fixed is not None
     assert fixed.stated == pytest.approx(alone.stated)

@@ -8,9 +8,9 @@ import pytest
 from calibnet.evaluation import faults
 from calibnet.geometry import RANGES, miscalibration, pose_error
 from calibnet.geometry.types import Matrix6
+from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import Coefficients
-from calibnet.judging.covariance import Spread, covariance
-from calibnet.judging.doubt import Doubt
+from calibnet.judging.covariance import CovarianceModel, covariance
 from calibnet.judging.judge import judge
 from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
@@ -22,16 +22,16 @@ GUESS = miscalibration([1, 2, 3], [0.1, 0.2, -0.25]) @ REFERENCE
 FITS = matches(np.eye(4), noise=0.3)
 
 
-def fitted(doubt: Doubt) -> Coefficients:
-    return Coefficients(doubt, lens=LENS_ODDS, weights={RANGES[4]: "0123"}, missing="")
+def fitted(classifier: Classifier) -> Coefficients:
+    return Coefficients(classifier, lens=LENS_ODDS, weights={RANGES[4]: "0123"}, missing="")
 
 
-DOUBT = fitted(Doubt(0.0, {"match_error": 1.0}, accepted_below=0.6, rejected_above=0.8))
+CLASSIFIER = fitted(Classifier(0.0, {"match_error": 1.0}, accepted_below=0.6, rejected_above=0.8))
 """Of an error of less than 1.5 px and of more than 4 px."""
 
 
 def test_what_fits_is_accepted_with_what_was_found() -> None:
-    verdict = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=1.2), DOUBT)
+    verdict = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=1.2), CLASSIFIER)
     assert verdict.word == ACCEPTED and verdict.causes == ()
     assert verdict.reason == "Picture and scan fit together (match error 1.2 px)."
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
@@ -41,25 +41,25 @@ def test_what_fits_is_accepted_with_what_was_found() -> None:
 
 
 def test_what_fits_less_well_cannot_be_told_and_then_is_rejected() -> None:
-    words = [judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), DOUBT).word for error in (1.4, 2.0, 4.2)]
+    words = [judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), CLASSIFIER).word for error in (1.4, 2.0, 4.2)]
     assert words == [ACCEPTED, CANNOT_TELL, REJECTED]
 
 
-def test_what_is_known_beforehand_is_never_rejected_by_doubt_alone() -> None:
+def test_what_is_known_beforehand_is_never_rejected_by_the_classifier_alone() -> None:
     """It was fitted to runs whose axes are all open; what speaks against picture and scan does so as ever."""
     fixed = "x, y, z fixed"
     verdicts = [
-        judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), DOUBT, prior=fixed) for error in (1.4, 2.0, 4.2)
+        judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), CLASSIFIER, prior=fixed) for error in (1.4, 2.0, 4.2)
     ]
     assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, CANNOT_TELL]
     assert "81% likely; with x, y, z fixed it is less so" in verdicts[2].reason
-    lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), DOUBT, prior=fixed)
+    lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), CLASSIFIER, prior=fixed)
     assert lost.word == REJECTED
 
 
 def test_a_trace_without_matches_cannot_be_told() -> None:
     verdict = judge(
-        FRAME, GUESS, run(GUESS, REFERENCE, None, match_error=1.2), fitted(Doubt(0.0, {"misfit": 1.0}, 0.6, 0.8))
+        FRAME, GUESS, run(GUESS, REFERENCE, None, match_error=1.2), fitted(Classifier(0.0, {"misfit": 1.0}, 0.6, 0.8))
     )
     assert verdict.word == CANNOT_TELL and "not enough" in verdict.reason
 
@@ -68,7 +68,7 @@ def test_by_coefficients_of_no_or_of_other_stages_nothing_is_accepted() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=1.2)
     unfit = judge(FRAME, GUESS, trace, Coefficients(missing="They are of other weights; mend that."))
     assert unfit.word == CANNOT_TELL and unfit.reason.endswith("cannot be told. They are of other weights; mend that.")
-    short = judge(FRAME, GUESS, replace(trace, stages=trace.stages[:2]), DOUBT)
+    short = judge(FRAME, GUESS, replace(trace, stages=trace.stages[:2]), CLASSIFIER)
     assert short.word == CANNOT_TELL and "that end with the stage of ±1°/0.1 m, not with ±2°/0.2 m" in short.reason
     lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), Coefficients())
     assert lost.word == REJECTED, "that needs no coefficients"
@@ -76,24 +76,24 @@ def test_by_coefficients_of_no_or_of_other_stages_nothing_is_accepted() -> None:
 
 def test_a_look_again_is_what_counts() -> None:
     trace, again = run(GUESS, REFERENCE, FITS, 2.0), run(GUESS, REFERENCE, FITS, 1.2).stages[-1]
-    assert judge(FRAME, GUESS, replace(trace, again=again), DOUBT).word == ACCEPTED
+    assert judge(FRAME, GUESS, replace(trace, again=again), CLASSIFIER).word == ACCEPTED
 
 
 def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=9.0)
-    verdict = judge(FRAME, GUESS, trace, DOUBT)
+    verdict = judge(FRAME, GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and verdict.causes == ()
     assert verdict.reason.endswith("matches are expected to be 9.0 px off, at most 5.5 px are usual.")
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
 
-    upright = judge(FRAME, GUESS, trace, DOUBT, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)
+    upright = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)
     assert [cause.name for cause in upright.causes] == ["other-picture"]
     mirror = faults.mirrored(FRAME)
     known = judge(
         mirror,
         GUESS,
         trace,
-        DOUBT,
+        CLASSIFIER,
         match_error=lambda frame, guess: 8.0 if np.array_equal(frame.image, FRAME.image) else 30.0,
     )
     assert [cause.name for cause in known.causes] == ["mirrored", "left-handed"]
@@ -102,29 +102,29 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
 
 def test_who_goes_beyond_the_range_searched_is_rejected_and_by_how_much_is_said() -> None:
     far = miscalibration([0, 0, 0], [0, 0, 4.5]) @ REFERENCE
-    verdict = judge(FRAME, GUESS, run(REFERENCE, far, FITS, match_error=1.2), DOUBT)
+    verdict = judge(FRAME, GUESS, run(REFERENCE, far, FITS, match_error=1.2), CLASSIFIER)
     assert verdict.word == REJECTED
     assert verdict.reason == "The LiDAR moved 4.5 m along the view, farther than the ±0.5 m searched."
     near = miscalibration([0, 0, 0], [0, 0.7, 0]) @ REFERENCE
-    unsure = judge(FRAME, GUESS, run(REFERENCE, near, FITS, match_error=1.2), DOUBT)
+    unsure = judge(FRAME, GUESS, run(REFERENCE, near, FITS, match_error=1.2), CLASSIFIER)
     assert unsure.word == CANNOT_TELL and "0.7 m along the image's height" in unsure.reason
     bent = matches(np.eye(4), lambda places: 0.96 * places, noise=0.5)
     trace = run(REFERENCE, far, bent, match_error=1.2)
-    assert judge(FRAME, GUESS, trace, DOUBT).causes == (), "why is not asked"
-    named = judge(FRAME, GUESS, trace, DOUBT, match_error=lambda frame, guess: 1.0)
+    assert judge(FRAME, GUESS, trace, CLASSIFIER).causes == (), "why is not asked"
+    named = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 1.0)
     assert [cause.name for cause in named.causes] == ["focal-length"] and "shorter than camera_matrix" in named.reason
 
 
 def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=1.2)
-    verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, DOUBT)
+    verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
-    assert judge(blank, GUESS, trace, DOUBT).reason == "The picture shows nothing."
+    assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The picture shows nothing."
 
 
 def test_what_could_not_be_run_is_rejected_where_it_started() -> None:
-    verdict = judge(faults.scaled_scan(1000.0)(FRAME), GUESS, None, DOUBT)
+    verdict = judge(faults.scaled_scan(1000.0)(FRAME), GUESS, None, CLASSIFIER)
     assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["units"]
     assert np.array_equal(verdict.camera_from_lidar, GUESS) and verdict.moved == (0.0, 0.0)
     assert verdict.covariance is None
@@ -132,13 +132,15 @@ def test_what_could_not_be_run_is_rejected_where_it_started() -> None:
 
 def test_a_covariance_grows_with_the_match_error_and_with_fewer_matches() -> None:
     sharp, blunt = (run(GUESS, REFERENCE, FITS, error) for error in (1.0, 3.0))
-    variances = [np.diag(covariance(trace, Spread())) for trace in (sharp, blunt)]
+    variances = [np.diag(covariance(trace, CovarianceModel())) for trace in (sharp, blunt)]
     assert (variances[1] > variances[0]).all()
 
     def stating(information: Matrix6 | None) -> CascadeTrace:
         return replace(sharp, stages=(*sharp.stages[:2], replace(sharp.stages[2], information=information)))
 
     # without matches nothing is known but the range that was searched
-    few = covariance(stating(sharp.stages[2].range.information), Spread(common_translation_m=0, common_rotation_deg=0))
+    few = covariance(
+        stating(sharp.stages[2].range.information), CovarianceModel(common_translation_m=0, common_rotation_deg=0)
+    )
     np.testing.assert_allclose(few, np.linalg.inv(RANGES[2].information))
-    assert covariance(stating(None), Spread()) is None
+    assert covariance(stating(None), CovarianceModel()) is None

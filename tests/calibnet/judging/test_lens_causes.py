@@ -12,7 +12,7 @@ import pytest
 from calibnet.geometry import miscalibration
 from calibnet.geometry.types import Floats
 from calibnet.judging.lens_causes import lens_causes
-from calibnet.judging.lens_witnesses import LensWitnesses, lens_fits, lens_witnesses
+from calibnet.judging.lens_predictors import LensPredictors, lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
 from tests.support.drive import REFERENCE
 from tests.support.matches import LENS_ODDS, matches, run
@@ -30,13 +30,13 @@ def seen(bend: Callable[[Floats], Floats]) -> CascadeTrace:
     return run(GUESS, REFERENCE, matches(np.eye(4), bend, noise=0.5))
 
 
-def said(trace: CascadeTrace) -> LensWitnesses:
+def said(trace: CascadeTrace) -> LensPredictors:
     looks = lens_fits(trace)
     assert looks is not None
-    return lens_witnesses(looks)
+    return lens_predictors(looks)
 
 
-def test_the_witnesses_are_how_other_lenses_fit_the_finest_look_and_a_coarse_one() -> None:
+def test_the_predictors_are_how_other_lenses_fit_the_finest_look_and_a_coarse_one() -> None:
     shorter, bent = seen(lambda places: 0.97 * places), seen(barrel)
     mixed = said(replace(shorter, stages=(bent.stages[0], *shorter.stages[1:])))
     assert mixed.fine_focal == pytest.approx(math.log(0.97), abs=0.005) and mixed.fine_focal_size == -mixed.fine_focal

@@ -9,7 +9,7 @@ from numpy.random import Generator
 from calibnet.geometry import miscalibration, pose_error
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.mount import ALIKE_DEG, ALIKE_M, FEWEST, Finding, difference, excess_of, mount_over
+from calibnet.judging.mount import COMMON_DEG, COMMON_M, FEWEST, Finding, difference, excess_of, mount_over
 from tests.support.fakes import REFERENCE
 
 COVARIANCE = np.diag([*[0.05**2] * 3, *[np.radians(0.1) ** 2] * 3])
@@ -31,7 +31,7 @@ def test_a_mount_that_stays_is_known_better_than_by_one_drive() -> None:
     error = pose_error(stay.camera_from_lidar, REFERENCE)
     assert error.rotation_deg < 0.06
     assert error.translation_cm < 3.0
-    alike = np.repeat([ALIKE_M, np.radians(ALIKE_DEG)], 3) ** 2
+    alike = np.repeat([COMMON_M, np.radians(COMMON_DEG)], 3) ** 2
     assert np.diag(stay.covariance) == pytest.approx(np.diag(COVARIANCE) / 40 + alike, rel=0.1)
 
 

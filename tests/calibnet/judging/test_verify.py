@@ -76,13 +76,13 @@ def test_the_probability_is_that_of_the_normal_distribution() -> None:
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
-    doubted = replace(found(), word="rejected", reason="Picture and scan do not fit together.")
-    verdict = verify(off(), doubted, TIGHT)
+    rejected = replace(found(), word="rejected", reason="Picture and scan do not fit together.")
+    verdict = verify(off(), rejected, TIGHT)
     assert verdict.word == "cannot tell"
     assert verdict.reason.endswith("Picture and scan do not fit together.")
-    caused = verify(off(), replace(doubted, causes=(MIRRORED,)), TIGHT)
-    assert (caused.word, caused.reason, caused.causes) == ("rejected", doubted.reason, (MIRRORED,))
-    unsure = verify(off(), replace(doubted, word="cannot tell", causes=(MIRRORED,)), TIGHT)
+    caused = verify(off(), replace(rejected, causes=(MIRRORED,)), TIGHT)
+    assert (caused.word, caused.reason, caused.causes) == ("rejected", rejected.reason, (MIRRORED,))
+    unsure = verify(off(), replace(rejected, word="cannot tell", causes=(MIRRORED,)), TIGHT)
     assert (unsure.word, unsure.causes) == ("cannot tell", (MIRRORED,))
 
 

@@ -12,8 +12,8 @@ from calibnet.evaluation import verdict_log
 from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import RANGES
 from calibnet.judging.coefficients import load_coefficients
-from calibnet.judging.covariance import Spread
-from calibnet.judging.drive_witnesses import DriveWitnesses
+from calibnet.judging.covariance import CovarianceModel
+from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.weights.manifest import load_manifest
 from inspector.cli.errors import run
 from inspector.cli.main import cli
@@ -28,16 +28,16 @@ class Known:
 
     def __init__(self, kind: verdict_log.Kind) -> None:
         self.kind = kind
-        self.runs = lens_runs(120, 6.0) if kind == "lenses" else runs(300, Spread(), seed=1)
+        self.runs = lens_runs(120, 6.0) if kind == "lenses" else runs(300, CovarianceModel(), seed=1)
 
     def run(self, number: int) -> VerdictRun:
         Known.made += 1
         made = self.runs[number]
         if self.kind != "drives":
             return made
-        assert made.witnesses is not None
-        said = {one.name: 0.0 for one in fields(DriveWitnesses)} | {"match_error": made.witnesses["match_error"]}
-        return replace(made, witnesses=said, match_error_px=float("nan"))
+        assert made.predictors is not None
+        said = {one.name: 0.0 for one in fields(DrivePredictors)} | {"match_error": made.predictors["match_error"]}
+        return replace(made, predictors=said, match_error_px=float("nan"))
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
     assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
     assert Known.made == 300 + 120 + 80 and (weights / "compact-verdict.toml").read_bytes() == before
     (weights / load_manifest("compact").file(RANGES[4])).write_bytes(b"trained on")
-    assert load_coefficients(load_manifest("compact", weights), weights).doubt is None
+    assert load_coefficients(load_manifest("compact", weights), weights).frame is None
 
 
 @pytest.mark.parametrize(

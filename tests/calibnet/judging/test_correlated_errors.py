@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibnet.geometry import PinholeCamera
-from calibnet.judging.alike import SIGMA_PX, alike_covariance, monomials
+from calibnet.judging.correlated_errors import SIGMA_PX, correlated_covariance, monomials
 from calibnet.judging.lens import INDEPENDENT, view
 from calibnet.trace import Matches
 
@@ -30,16 +30,16 @@ def test_it_is_what_dense_covariances_of_the_matches_give() -> None:
         errors = np.diag((some.scale[:, axis].astype(np.float64) / 300.0) ** 2 / INDEPENDENT)
         errors += (SIGMA_PX / 300.0) ** 2 * terms @ terms.T
         information += jacobian[:, axis, :6].T @ np.linalg.solve(errors, jacobian[:, axis, :6])
-    assert np.allclose(alike_covariance(some, CAMERA, PRIOR), np.linalg.inv(information), rtol=1e-6, atol=1e-10)
+    assert np.allclose(correlated_covariance(some, CAMERA, PRIOR), np.linalg.inv(information), rtol=1e-6, atol=1e-10)
 
 
 def test_a_common_error_stays_however_many_matches_there_are() -> None:
     """At one depth a shift across the view looks like the polynomial's constant: it is never known better than that."""
-    flat = alike_covariance(matches(200_000, (9.99, 10.01)), CAMERA, PRIOR)
+    flat = correlated_covariance(matches(200_000, (9.99, 10.01)), CAMERA, PRIOR)
     assert np.sqrt(flat[0, 0]) > 0.9 * 10.0 * SIGMA_PX / 300.0
-    deep = alike_covariance(matches(200_000, (2.0, 40.0)), CAMERA, PRIOR)
+    deep = correlated_covariance(matches(200_000, (2.0, 40.0)), CAMERA, PRIOR)
     assert np.sqrt(deep[0, 0]) < 0.1 * np.sqrt(flat[0, 0])
 
 
 def test_without_matches_nothing_is_known_but_what_was() -> None:
-    assert np.allclose(alike_covariance(matches(0, (1.0, 2.0)), CAMERA, PRIOR), np.linalg.inv(PRIOR))
+    assert np.allclose(correlated_covariance(matches(0, (1.0, 2.0)), CAMERA, PRIOR), np.linalg.inv(PRIOR))

@@ -19,7 +19,7 @@ LEAST_GAIN = -1.0
 
 
 @dataclass(frozen=True)
-class LensWitnesses:
+class LensPredictors:
     """Numbers of the finest look and of a coarse one, whose matches are fitted with another lens besides the pose.
 
     Attributes:
@@ -90,7 +90,7 @@ class LensFits:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Those of `LensWitnesses` that are of one look, in its order."""
+        """Those of `LensPredictors` that are of one look, in its order."""
         focal = math.log(self.focal.focal)
         return (
             self.gain(self.focal),
@@ -112,6 +112,6 @@ def lens_fits(trace: CascadeTrace) -> tuple[LensFits, LensFits] | None:
     return (fine, coarse) if fine and coarse else None
 
 
-def lens_witnesses(looks: tuple[LensFits, LensFits]) -> LensWitnesses:
-    """The witnesses of a run, of its looks as `lens_fits` has them."""
-    return LensWitnesses(*(number for look in looks for number in look.numbers))
+def lens_predictors(looks: tuple[LensFits, LensFits]) -> LensPredictors:
+    """The predictors of a run, of its looks as `lens_fits` has them."""
+    return LensPredictors(*(number for look in looks for number in look.numbers))

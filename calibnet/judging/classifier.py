@@ -1,4 +1,4 @@
-"""How likely a result is wrong, by its witnesses."""
+"""How likely a result is wrong, by its predictors."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ LARGEST_ODDS = 50.0
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """Logistic regression of a wrong result on the witnesses.
+class Classifier:
+    """Logistic regression of a wrong result on the predictors.
 
     Attributes:
         intercept: of the logarithm of the odds.
-        weights: of the witnesses, by name.
+        weights: of the predictors, by name.
         accepted_below: probability of being wrong below which a result is accepted.
         rejected_above: probability above which it is rejected; in between nobody can tell.
     """
@@ -26,10 +26,10 @@ class Doubt:
     rejected_above: float
 
     def __call__(self, of: object) -> float:
-        """Probability that the result is wrong; not a number where a witness is missing.
+        """Probability that the result is wrong; not a number where a predictor is missing.
 
         Args:
-            of: what has the witnesses as attributes: of a frame, or of a drive.
+            of: what has the predictors as attributes: of a frame, or of a drive.
         """
         odds = self.intercept + sum(weight * getattr(of, name) for name, weight in self.weights.items())
         return odds if math.isnan(odds) else 1 / (1 + math.exp(-min(max(odds, -LARGEST_ODDS), LARGEST_ODDS)))

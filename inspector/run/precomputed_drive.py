@@ -10,7 +10,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace, DriveEstimate
 
 
-class SolvedDrive:
+class PrecomputedDrive:
     """A `calibnet.calibrator.DriveCalibrator` that knows its answer."""
 
     def __init__(self, estimate: DriveEstimate) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from calibnet.calibrator import Explainer
 from calibnet.datasets.frame import Frames
-from calibnet.datasets.selection import spread
+from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.lag import lags
@@ -19,7 +19,7 @@ SUSPECTS = 3
 """Frames, spread over a drive, that are asked for the cause: each runs stages up to thirty times."""
 
 
-def judge_given(method: object, frames: Frames, given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
+def judge_initial(method: object, frames: Frames, given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
 
     Args:
@@ -42,7 +42,7 @@ def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, 
     if not isinstance(method, Explainer):
         return ()
     verdicts: list[Verdict] = []
-    for position in spread(len(frames), SUSPECTS):
+    for position in evenly_spaced(len(frames), SUSPECTS):
         try:
             verdicts.append(method.explain(frames[position], given, lags(frames, position)))
         except (CalibrationError, DatasetError) as error:

@@ -10,7 +10,7 @@ import numpy as np
 from calibnet.geometry import MiscalibrationRange, invert, pose_error
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Vector6
-from calibnet.judging.witnesses import LEAST, reach
+from calibnet.judging.predictors import LEAST, reach
 from calibnet.trace import DriveEstimate, DriveLook
 
 DEGREES_A_CENTIMETRE = 0.3 / 8
@@ -20,7 +20,7 @@ FEWEST = 2
 
 
 @dataclass(frozen=True)
-class DriveWitnesses:
+class DrivePredictors:
     """Numbers that grow with what speaks against a drive's extrinsic; not a number where it does not tell.
 
     Attributes:
@@ -47,10 +47,10 @@ class DriveWitnesses:
     frames: float
 
 
-def drive_witnesses(
+def drive_predictors(
     estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange
-) -> DriveWitnesses | None:
-    """The witnesses of a drive; None where a method tells nothing of its frames, or there are too few of them.
+) -> DrivePredictors | None:
+    """The predictors of a drive; None where a method tells nothing of its frames, or there are too few of them.
 
     Args:
         estimate: of the drive.
@@ -63,7 +63,7 @@ def drive_witnesses(
     networks, middle = estimate.networks or estimate, len(looks) // 2
     whole = agreed(looks)
     lens = [math.log(max(min(look.bent_misfit, look.misfit), LEAST) / max(look.misfit, LEAST)) for look in looks]
-    return DriveWitnesses(
+    return DrivePredictors(
         match_error=_log(np.median([look.match_error_px for look in looks])),
         misfit=_log(np.median([look.misfit for look in looks])),
         lens=float(np.median(lens)),

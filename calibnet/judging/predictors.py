@@ -1,7 +1,7 @@
-"""What tells right from wrong: a few numbers of one run, none of which needs the network again.
+"""Predictors of a wrong result: a few numbers computed from one run, without running a network again.
 
-`calibnet.judging.doubt.Doubt` sums them up to the probability that a result is wrong; docs/decisions.md says what each
-adds.
+`calibnet.judging.classifier.Classifier` turns them into the probability that the result is wrong; docs/decisions.md
+says what each of them adds.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.alike import alike_covariance
+from calibnet.judging.correlated_errors import correlated_covariance
 from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
@@ -59,7 +59,7 @@ def reach(before: Extrinsic, after: Extrinsic, range_: MiscalibrationRange) -> R
 
 
 @dataclass(frozen=True)
-class Witnesses:
+class Predictors:
     """Numbers that grow with what speaks against a result; not a number where a trace does not tell.
 
     Attributes:
@@ -69,8 +69,8 @@ class Witnesses:
         lens: logarithm of the least cost of its matches with another lens, relative to that with the pose alone;
             0 where no lens explains them better.
         stated: logarithm of the deviation of the translation, in centimetres, that its information states.
-        alike: logarithm of the deviation of the translation, in centimetres, if matches also err alike, see
-            `calibnet.judging.alike`.
+        correlated: logarithm of the deviation of the translation, in centimetres, if matches also err alike, see
+            `calibnet.judging.correlated_errors`.
         reach: how far the run went, in ranges searched.
         last_reach: how far the last stage went, in its own ranges.
         again_reach: how far it would have gone, had it been applied once more.
@@ -81,29 +81,29 @@ class Witnesses:
     misfit: float
     lens: float
     stated: float
-    alike: float
+    correlated: float
     reach: float
     last_reach: float
     again_reach: float
 
 
-def witnesses(trace: CascadeTrace) -> Witnesses:
-    """The witnesses of a run of at least one stage.
+def predictors(trace: CascadeTrace) -> Predictors:
+    """The predictors of a run of at least one stage.
 
     Where the last stage looked again from where the run arrived, that look is asked instead of its last one: it tells
-    more. Without it, `Witnesses.again_reach` is not a number.
+    more. Without it, `Predictors.again_reach` is not a number.
     """
     last, again = trace.stages[-1], trace.again
     asked = again or last
     earlier = trace.stages[-2] if len(trace.stages) > 1 else last
     alone, bent = misfits(asked)
-    return Witnesses(
+    return Predictors(
         match_error=math.log(asked.match_error_px),
         earlier_error=math.log(earlier.match_error_px),
         misfit=math.log(max(alone, LEAST)),
         lens=math.log(max(bent, LEAST) / max(alone, LEAST)),
         stated=_stated(asked),
-        alike=_alike(asked, trace.stages[0].range),
+        correlated=_correlated(asked, trace.stages[0].range),
         reach=reach(trace.initial, last.after, trace.stages[0].range).share,
         last_reach=reach(last.before, last.after, last.range).share,
         again_reach=math.nan if again is None else reach(again.before, again.after, again.range).share,
@@ -139,9 +139,9 @@ def _stated(stage: StageTrace) -> float:
     return math.log(100 * math.sqrt(np.trace(np.linalg.inv(stage.information)[:3, :3])))
 
 
-def _alike(stage: StageTrace, searched: MiscalibrationRange) -> float:
+def _correlated(stage: StageTrace, searched: MiscalibrationRange) -> float:
     """Logarithm of the deviation of the translation, in centimetres, if a stage's matches also err alike."""
     if stage.matches is None or not len(stage.matches.points):
         return math.nan
-    covariance = alike_covariance(stage.matches, stage.camera, searched.information)
+    covariance = correlated_covariance(stage.matches, stage.camera, searched.information)
     return math.log(100 * math.sqrt(np.trace(covariance[:3, :3])))

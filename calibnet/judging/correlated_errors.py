@@ -1,6 +1,6 @@
 """The uncertainty of a pose whose matches err alike: what networks get wrong varies slowly over a picture.
 
-A thousand matches that share one error are no thousand witnesses. Here each match errs independently, and all of them
+A thousand matches that share one error are no thousand predictors. Here each match errs independently, and all of them
 by a polynomial of their place in the picture besides; what such a polynomial can imitate (a turn, mostly, and what a
 long lens or a bare road shows of a shift) is known only as well as the polynomial is small.
 """
@@ -20,7 +20,7 @@ SIGMA_PX = 1.0
 """Standard deviation of each of its coefficients, pixels of the stage's camera."""
 
 
-def alike_covariance(matches: Matches, camera: PinholeCamera, prior: Matrix6) -> Matrix6:
+def correlated_covariance(matches: Matches, camera: PinholeCamera, prior: Matrix6) -> Matrix6:
     """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` if matches err independently and alike.
 
     Args:

@@ -14,7 +14,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit
 from calibnet.runtime.interruption import StopRequest
 from calibnet.verdict import Verdict
-from inspector.run.given import judge_given, suspected
+from inspector.run.initial_verdict import judge_initial, suspected
 from inspector.run.progress import drive_observer, frame_progress
 from inspector.run.session import STOPPING, Session
 from inspector.run.summary import Summary
@@ -120,4 +120,4 @@ def _judge(session: Session, frames: Readable, given: Extrinsic) -> Verdict:
             found, standard = session.cascade.calibrate_drive(frames, given, observer).verdict, DRIVE
         frames.check()
     assert found is not None, "the cascade judges what it finds"
-    return judge_given(session.cascade, frames, given, found, standard)
+    return judge_initial(session.cascade, frames, given, found, standard)
