@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.special import softmax
 
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.corruptions import Corruption
+from calibnet.evaluation.logistic import left_out, regression
 from calibnet.evaluation.verdict_fit import rounded
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
-from calibnet.geometry.types import Floats
 from calibnet.judging.lens_causes import BENT, CENTER, FAULTS, FOCAL, LensOdds
 from calibnet.judging.lens_predictors import lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
@@ -31,7 +30,7 @@ TOO_WEAK = (
 )
 """Not fitted to: what a frame can hardly show, and a principal point moved down, which looks like a pitch."""
 RIDGE = 1.0
-"""Times the squares of the coefficients of standardised predictors: what is added to the negative log likelihood."""
+"""Penalty of `calibnet.evaluation.logistic.regression`."""
 WRONG_NAMES = 0.05
 """Share of the runs that may be given a wrong name, left out by sequence; those without a fault any name."""
 FEWEST = 10
@@ -87,13 +86,14 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
         )
     names = list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])
-    likely = _left_out(values, kinds, [run.sequence for run in asked])
+    odds_left_out = left_out(values, kinds, len(FAULTS) + 1, RIDGE, [run.sequence for run in asked])
+    likely = softmax(np.column_stack([np.zeros(len(asked)), odds_left_out]), axis=1)
     best, sure = 1 + likely[:, 1:].argmax(axis=1), likely[:, 1:].max(axis=1)
     wrong = np.sort(sure[best != kinds])[::-1]
     allowed = int(WRONG_NAMES * len(asked))
     named_from = float(wrong[allowed]) if allowed < len(wrong) else 0.5
     named = sure > named_from
-    intercepts, weights = _regression(values, kinds)
+    intercepts, weights = regression(values, kinds, len(FAULTS) + 1, RIDGE)
     odds = LensOdds(
         rounded(named_from),
         dict(zip(FAULTS, map(rounded, intercepts), strict=True)),
@@ -108,41 +108,3 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
         wrong=float((named & (best != kinds))[faulty].mean()),
         named_without=float(named[~faulty].mean()),
     )
-
-
-def _left_out(values: Floats, kinds: NDArray[np.intp], sequences: Sequence[str]) -> Floats:
-    """Probabilities ``[N, F + 1]`` of none and of each fault, each from a fit without the runs of its own sequence."""
-    likely, names = np.zeros((len(values), len(FAULTS) + 1)), np.array(sequences)
-    for name in dict.fromkeys(sequences):
-        own = names == name
-        others = ~own if len(set(sequences)) > 1 else own
-        intercepts, weights = _regression(values[others], kinds[others])
-        odds = np.column_stack([np.zeros(own.sum()), values[own] @ weights.T + intercepts])
-        likely[own] = _softmax(odds)
-    return likely
-
-
-def _regression(values: Floats, kinds: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Multinomial logistic regression: intercepts ``[F]`` and weights ``[F, W]`` relative to no fault."""
-    mean, deviation = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-9)
-    design = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
-    shape = (len(FAULTS) + 1, design.shape[1])
-    target = np.eye(shape[0])[kinds]
-
-    def cost(flat: Floats) -> tuple[float, Floats]:
-        beta = flat.reshape(shape)
-        likely = _softmax(design @ beta.T)
-        penalty = np.where(np.arange(shape[1]) > 0, beta, 0.0)
-        likelihood = -np.log(np.maximum(likely[np.arange(len(kinds)), kinds], 1e-300)).sum()
-        gradient = (likely - target).T @ design + 2 * RIDGE * penalty
-        return float(likelihood + RIDGE * (penalty**2).sum()), gradient.ravel()
-
-    beta = minimize(cost, np.zeros(shape[0] * shape[1]), jac=True, method="L-BFGS-B").x.reshape(shape)
-    beta = beta[1:] - beta[0]
-    weights = beta[:, 1:] / deviation
-    return beta[:, 0] - weights @ mean, weights
-
-
-def _softmax(odds: Floats) -> Floats:
-    likely = np.exp(odds - odds.max(axis=1, keepdims=True))
-    return np.asarray(likely / likely.sum(axis=1, keepdims=True), np.float64)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from calibnet.errors import CalibrationError
+from calibnet.evaluation.logistic import left_out, regression
 from calibnet.evaluation.verdict_runs import VerdictRun
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Floats
@@ -20,8 +21,8 @@ from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """The ranges of the last stage and of the first one."""
-RIDGE = 3.0
-"""Weight of the squared coefficients of standardised predictors, added to the negative log likelihood."""
+RIDGE = 6.0
+"""Penalty of `calibnet.evaluation.logistic.regression`: 3 times the squared coefficients of the odds of being wrong."""
 FALSE_ACCEPTS = 0.01
 """Share of all runs that may be accepted and wrong, left out by sequence. Half of these runs have no fault; where every
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
@@ -135,11 +136,12 @@ def fit_classifier(
         )
     names = names or list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])
-    odds = left_out(values, ~good, [run.sequence for run in asked])
+    wrong_or_right = (~good).astype(np.intp)
+    odds = left_out(values, wrong_or_right, 2, RIDGE, [run.sequence for run in asked])[:, 0]
     plain = np.array([run.plain for run in asked], bool)
     accepted_below = threshold(odds, ~good, FALSE_ACCEPTS * len(runs))
     rejected_above = max(float(np.quantile(odds[good], 1 - GOOD_REJECTED)), accepted_below)
-    intercept, weights = regression(values, ~good)
+    (intercept,), (weights,) = regression(values, wrong_or_right, 2, RIDGE)
     classifier = Classifier(
         rounded(intercept),
         {name: rounded(weight) for name, weight in zip(names, weights, strict=True)},
@@ -195,35 +197,6 @@ def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:
 def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:
     """Share of the good plain runs, of all that were made, that are accepted."""
     return float(accepted.sum() / max(sum(run.plain and run.good for run in runs), 1))
-
-
-def regression(values: Floats, wrong: NDArray[np.bool_]) -> tuple[float, Floats]:
-    """Logistic regression: intercept and coefficients ``[W]`` of the predictors ``[N, W]``, in their own units."""
-    mean, deviation = values.mean(axis=0), np.maximum(values.std(axis=0), 1e-9)
-    design = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
-    target = wrong.astype(np.float64)
-
-    def cost(beta: Floats) -> tuple[float, Floats]:
-        odds = design @ beta
-        penalty = np.concatenate([[0.0], beta[1:]])
-        likelihood = np.logaddexp(0, odds) - target * odds
-        gradient = design.T @ (1 / (1 + np.exp(-odds)) - target) + 2 * RIDGE * penalty
-        return float(likelihood.sum() + RIDGE * penalty @ penalty), gradient
-
-    beta = minimize(cost, np.zeros(design.shape[1]), jac=True, method="BFGS").x
-    weights = beta[1:] / deviation
-    return float(beta[0] - mean @ weights), np.asarray(weights)
-
-
-def left_out(values: Floats, wrong: NDArray[np.bool_], sequences: Sequence[str]) -> Floats:
-    """Logarithms of the odds ``[N]`` of being wrong, each from a fit without the runs of its own sequence."""
-    odds, names = np.zeros(len(values)), np.array(sequences)
-    for name in dict.fromkeys(sequences):
-        own = names == name
-        others = ~own if len(set(sequences)) > 1 else own
-        intercept, weights = regression(values[others], wrong[others])
-        odds[own] = intercept + values[own] @ weights
-    return odds
 
 
 def threshold(odds: Floats, wrong: NDArray[np.bool_], most: float) -> float:
