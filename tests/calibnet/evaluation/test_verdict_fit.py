@@ -14,9 +14,7 @@ from calibnet.evaluation.verdict_fit import (
     fit_drives,
     fit_frames,
     is_near,
-    left_out,
     nees_of,
-    regression,
     threshold,
 )
 from calibnet.evaluation.verdict_runs import VerdictRun
@@ -77,17 +75,6 @@ def test_runs_near_a_limit_are_set_aside_in_a_curve_of_their_own() -> None:
 def test_what_predictors_do_not_tell_is_not_accepted() -> None:
     classifier, _, figures = fit_frames(runs(800, CovarianceModel(), sharpness=0.0), BOTH)
     assert figures.acceptance_of_good < 0.1 and classifier.accepted_below < 0.5
-
-
-def test_each_sequence_is_judged_by_a_fit_to_the_others() -> None:
-    values = np.random.default_rng(0).normal(size=(40, 1))
-    wrong = values[:, 0] > 0
-    names = ["a"] * 20 + ["b"] * 20
-    wrong[20:] = ~wrong[20:]  # the other way round in one of them: a fit to its own runs would know
-    odds = left_out(values, wrong, names)
-    assert np.mean((odds > 0) == wrong) < 0.1
-    intercept, weights = regression(values[:20], wrong[:20])
-    np.testing.assert_allclose(odds[20:], intercept + values[20:] @ weights, atol=1e-6)
 
 
 def test_a_threshold_lets_so_many_wrong_ones_through() -> None:
