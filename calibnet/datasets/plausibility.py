@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from calibnet.errors import ImplausibleError
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.camera_model import CameraModel
-from calibnet.geometry.types import Extrinsic
+from calibnet.geometry.types import Extrinsic, Intrinsics
 from calibnet.geometry.visibility import is_accumulated
 
 VIEW_DEG = (8.0, 150.0)
@@ -38,6 +38,8 @@ FLAT = 0.4
 """A scene is this much lower than it is wide, whatever it is; else z is not up."""
 GRID, SEEN = 40, 0.5
 """Places across a rectified picture, and the share of them that at least shows something of any real lens."""
+BLACK = (0.05, 0.2)
+"""Shares of a side by which a rectified picture may reach beyond the original on one side, and on the other."""
 GREY_LEVELS = 24
 """A picture that shines no brighter than this has lost its upper bits."""
 WRAPPED, GREY = 0.01, 0.3
@@ -133,6 +135,33 @@ def distortion(camera: CameraModel) -> Implausible | None:
         "give those of this camera, in the order of the lens model"
     )
     return Implausible("distortion", text, certain=True)
+
+
+def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection: Intrinsics) -> Implausible | None:
+    """Whether a camera's matrix and the one for its rectified pictures are of pictures of different sizes.
+
+    A rectified picture that reaches far beyond the original on one side, and not at all on the other, was made of a
+    larger one: so bags of KITTI's rectified pictures are, which carry the matrix and lens of those before.
+
+    Args:
+        camera: of the pictures as they were taken.
+        rotation: ``[3, 3]``, of the rectified camera from that one.
+        projection: ``[3, 3]``, of the rectified camera, for pictures of the same size.
+    """
+    right, bottom, (u, v) = camera.width - 1.0, camera.height - 1.0, projection[:2, 2]
+    middles = np.array([[0.0, v, 1.0], [right, v, 1.0], [u, 0.0, 1.0], [u, bottom, 1.0]])
+    with np.errstate(all="ignore"):
+        seen = camera.see(middles @ np.linalg.inv(projection).T @ rotation)
+    (left, _), (far, _), (_, top), (_, low) = seen.pixels / (camera.width, camera.height)
+    beyond = [sorted((-start, end - 1.0)) for start, end in ((left, far), (top, low))]
+    if not seen.valid.all() or not any(near < BLACK[0] and BLACK[1] < more for near, more in beyond):
+        return None
+    text = (
+        "the CameraInfo has a matrix K of larger pictures than its matrix P, so these seem to be rectified already, "
+        "whatever their topic is called (kitti2bag writes such); give their calibration, P without distortion, with "
+        "--guess FILE"
+    )
+    return Implausible("picture-size", text)
 
 
 def pixel_shape(camera: PinholeCamera) -> Implausible | None:

@@ -33,6 +33,9 @@ GUESS = click.Option(
     metavar="FILE",
     help="Start from the extrinsic of this calibration file; needed where the data's own has none.",
 )
+CAMERA_OF_FILE = click.Option(
+    ["--camera"], metavar="NAME", help="Camera of a calibration file of several, for instance cam0."
+)
 CAMERA_FRAME = click.Option(
     ["--camera-frame"], metavar="NAME", help="The camera's optical frame, among many in a calibration file or a bag."
 )
@@ -148,9 +151,7 @@ SOURCES = (
                 help="What the folder holds; packages can add to these.",
             ),
             GUESS,
-            click.Option(
-                ["--camera"], metavar="NAME", help="Camera of a calibration file of several, for instance cam0."
-            ),
+            CAMERA_OF_FILE,
             CAMERA_FRAME,
             LIDAR_FRAME,
             click.Option(
@@ -178,6 +179,7 @@ SOURCES = (
                 ["--info"], metavar="TOPIC", help="Topic of the CameraInfo.  [default: the one beside the images]"
             ),
             GUESS,
+            CAMERA_OF_FILE,
             CAMERA_FRAME,
             LIDAR_FRAME,
             click.Option(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 from google.protobuf import descriptor_pb2
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.json_format import ParseDict
@@ -144,9 +145,15 @@ def cloud_of(frame: Frame, at: float, **more: Any) -> dict[str, Any]:
     return {**head, "point_stride": 16, "fields": fields, "data": data, **more}
 
 
+def quaternion_of(pose: np.ndarray) -> list[float]:
+    """x y z w."""
+    found: list[float] = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+    return found
+
+
 def transform_of(frame: Frame, at: float) -> dict[str, Any]:
     pose = frame.camera_from_lidar
-    turn = dict(zip("xyzw", Rotation.from_matrix(pose[:3, :3]).as_quat().tolist(), strict=True))
+    turn = dict(zip("xyzw", quaternion_of(pose), strict=True))
     moved = dict(zip("xyz", pose[:3, 3].tolist(), strict=True))
     names = {"parent_frame_id": CAMERA_FRAME, "child_frame_id": LIDAR_FRAME}
     return {"timestamp": time_of(at), **names, "translation": moved, "rotation": turn}

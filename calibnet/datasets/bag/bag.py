@@ -10,20 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.bag.messages import (
-    IMAGES,
-    POINTS,
-    TRANSFORMS,
-    camera_info_of,
-    columns_of,
-    levels_of,
-    links_of,
-)
+from calibnet.datasets.bag import calibration
+from calibnet.datasets.bag.messages import IMAGES, POINTS, columns_of, levels_of
 from calibnet.datasets.bag.moments import STILL_M, change, periods, stillest
 from calibnet.datasets.bag.recording import BagRecording, Stamped
-from calibnet.datasets.bag.topics import found_topic, info_of
-from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted, read_calibration, ros
-from calibnet.datasets.calibration_files.frames import Link, camera_from_lidar
+from calibnet.datasets.bag.topics import found_topic
+from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted
 from calibnet.datasets.clouds.columns import CloudError, points_of
 from calibnet.datasets.clouds.scans import clean_points, full_scale_of
 from calibnet.datasets.folder import DEPTHS_LOOKED_AT
@@ -31,14 +23,9 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.development import Development, ImageError, Levels
 from calibnet.datasets.images.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
-from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_lens, of_scan, refuse
+from calibnet.datasets.plausibility import bit_depth, of_scan, refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
-from calibnet.geometry.rectification import central
-from calibnet.geometry.types import Extrinsic
-
-MOST_TRANSFORMS = 2000
-"""Messages of a topic of transforms that are looked at."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +36,8 @@ class BagOptions:
         image: topic of the images; None to find it, as for the other two.
         points: topic of the point clouds.
         info: topic of the camera's calibration.
-        guess: file with the extrinsic to start from, and with the camera where the bag has none.
+        guess: file with the extrinsic to start from, the camera, or both, where the bag's are not to be taken.
+        camera: its name, in a ``guess`` of several cameras.
         frames: names of the coordinate frames; by default those that the messages are in.
         every: seconds from one frame to the next; None for about 40 frames.
         accumulate: scans put together at a standstill, for scanners that do not repeat their pattern.
@@ -60,6 +48,7 @@ class BagOptions:
     points: str | None = None
     info: str | None = None
     guess: Path | None = None
+    camera: str | None = None
     frames: FrameChoice = BY_NAME
     every: float | None = None
     accumulate: int = 1
@@ -94,31 +83,21 @@ class Bag:
         images, scans = self._bag.times(self.image), self._bag.times(self.points)
         first_image = self._bag.message(self.image).content
         first_scan = self._bag.message(self.points).content
-        guess = None if options.guess is None else read_calibration(options.guess, Wanted(frames=options.frames))
-        info = info_of(self._bag, options.info, self.image)
-        camera = None if guess is None else guess.camera
-        if info is not None:
-            message = self._bag.message(info).content
-            camera = ros.read(camera_info_of(message), Path(f"{self._bag}, {info}")).camera
-        if camera is None:
-            raise DatasetError(
-                f"Bag {self._bag} holds no CameraInfo of {self.image}; give the camera's calibration with --guess "
-                "FILE, or its topic with --info."
-            )
         frames = FrameChoice(
             options.frames.camera or str(first_image.header.frame_id).lstrip("/"),
             options.frames.lidar or str(first_scan.header.frame_id).lstrip("/"),
         )
-        extrinsic = None if guess is None else guess.camera_from_lidar
-        self.camera_from_lidar = self._of_transforms(frames) if extrinsic is None else extrinsic
-        remarks = [*of_lens(camera), *of_camera(central(camera).pinhole), *of_extrinsic(self.camera_from_lidar)]
-        refuse(remarks, f"Calibration of {self.image} in {self._bag}")
         looked_at = list[NDArray[np.uint8]]()
         self._development = Development()
         with suppress(ImageError):  # each frame says it of itself
             first = levels_of(first_image)
             self._development = Development.of([first] if first.dtype == np.uint8 else self._some_levels(images))
             looked_at = [self._development(first)]
+        size = looked_at[0].shape[1::-1] if looked_at else None
+        wanted = Wanted(options.camera, options.frames, size)
+        camera, self.camera_from_lidar, self._remarks = calibration.read(
+            self._bag, self.image, frames, options.info, options.guess, wanted
+        )
         if camera.is_pinhole or any(one.shape[:2] != (camera.height, camera.width) for one in looked_at):
             looked_at = []
         self._lens = Lens.of(camera, self.camera_from_lidar, looked_at)
@@ -152,7 +131,7 @@ class Bag:
             raise DatasetError(f"The image of {where} {error}.") from None
         if taken.shape[:2] != (camera.height, camera.width):
             raise DatasetError(
-                f"The image of {where} is {taken.shape[1]}x{taken.shape[0]} and its CameraInfo is for "
+                f"The image of {where} is {taken.shape[1]}x{taken.shape[0]} and its calibration is for "
                 f"{camera.width}x{camera.height}; give the topic of the images as they are calibrated."
             )
         points = np.concatenate([self._scan(scan) for scan in moment.scans])
@@ -166,7 +145,7 @@ class Bag:
             camera=self._lens.pinhole,
             camera_from_lidar=self.camera_from_lidar,
             source=where,
-            remarks=remarks,
+            remarks=self._remarks + remarks,
             original=original,
             faces=faces,
         )
@@ -191,24 +170,6 @@ class Bag:
 
     def _intensities(self, scans: list[Stamped]) -> NDArray[np.float32]:
         return np.concatenate([self._raw(scans[position])[:, 3] for position in evenly_spaced(len(scans), 4)])
-
-    def _of_transforms(self, frames: FrameChoice) -> Extrinsic:
-        topics = self._bag.of_type(TRANSFORMS)
-        static = [topic for topic in topics if topic.name.endswith("tf_static")]
-        links = [
-            link
-            for topic in static or topics
-            for message in self._bag.messages(topic.name, most=MOST_TRANSFORMS)
-            for link in links_of(message.content)
-        ]
-        where = f"{self._bag}, {' and '.join(topic.name for topic in static or topics)}"
-        links = links if static else steady(links)
-        if not links:
-            raise DatasetError(
-                f"Bag {self._bag} has no /tf_static, which would say where the LiDAR is; give a first guess with "
-                "--guess FILE."
-            )
-        return camera_from_lidar(links, frames, where)
 
     def _moments(self, images: list[Stamped], scans: list[Stamped]) -> tuple[list[Moment], tuple[str, ...]]:
         """The frames: of each period the stillest scan, with the image nearest to it."""
@@ -247,18 +208,6 @@ class Bag:
         if 1000 * farthest > WORTH_A_WARNING_MS and still < len(moments):
             notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm: record while standing, if you can.")
         return moments, tuple(notes)
-
-
-def steady(links: Sequence[Link]) -> list[Link]:
-    """Those that never change: what is on one mount, where static transforms are told among the others."""
-    told: dict[tuple[str, str], list[Link]] = {}
-    for link in links:
-        told.setdefault((link.parent, link.child), []).append(link)
-    return [
-        same[0]
-        for same in told.values()
-        if all(np.allclose(one.parent_from_child, same[0].parent_from_child, atol=1e-6) for one in same)
-    ]
 
 
 def _around(taken: NDArray[np.float64], swept: NDArray[np.float64]) -> NDArray[np.int64]:

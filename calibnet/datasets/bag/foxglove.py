@@ -83,6 +83,8 @@ def _camera(message: Any) -> SimpleNamespace:
         distortion_model=message.distortion_model or ("" if any(message.D) else "plumb_bob"),
         d=list(message.D),
         k=list(message.K),
+        r=list(message.R),
+        p=list(message.P),
         binning_x=0,
         binning_y=0,
         roi=SimpleNamespace(x_offset=0, y_offset=0),

@@ -127,6 +127,8 @@ def camera_info_of(message: Any) -> dict[str, Any]:
         "distortion_model": str(message.distortion_model),
         "D": np.asarray(message.d if lower else message.D, np.float64).tolist(),
         "K": np.asarray(message.k if lower else message.K, np.float64).tolist(),
+        "R": np.asarray(message.r if lower else message.R, np.float64).tolist(),
+        "P": np.asarray(message.p if lower else message.P, np.float64).tolist(),
         "binning_x": int(message.binning_x),
         "binning_y": int(message.binning_y),
         "roi": {"x_offset": int(roi.x_offset), "y_offset": int(roi.y_offset)},

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
-from calibnet.datasets.bag.messages import INFOS
+from calibnet.datasets.bag.messages import IMAGES, INFOS
 from calibnet.datasets.bag.recording import BagRecording, Topic
 from calibnet.errors import DatasetError
 
 SUFFIXES = ("/compressed", "/image_raw", "/image_color", "/image_rect_color", "/image_rect", "/image_mono", "/image")
 """What an image's topic ends with, beyond the camera's name; taken off one after the other."""
+RECTIFIED = re.compile(r"(?<![a-z])rect(ified)?(?![a-z])", re.IGNORECASE)
+"""In the names of topics of images that were rectified, ``image_rect_color`` for instance."""
+DEPTH = "/compressedDepth"
+"""What the topics of packed images of depth end with, which have the type of pictures."""
 
 
 def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], option: str, what: str) -> str:
@@ -25,6 +30,7 @@ def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], opti
         if asked in [topic.name for topic in found]:
             return asked
         raise DatasetError(f"Bag {bag} has no {what} in {asked!r}; {_listed(found, what, bag)}.")
+    found = [topic for topic in found if not topic.name.endswith(DEPTH)]
     compressed = {topic.name.removesuffix("/compressed") for topic in found if topic.name.endswith("/compressed")}
     found = [topic for topic in found if topic.name not in compressed]
     if len(found) == 1:
@@ -39,6 +45,8 @@ def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], opti
 def info_of(bag: BagRecording, asked: str | None, image: str) -> str | None:
     """The topic of the camera's calibration: asked for, beside the images, or the only one; None where there is none.
 
+    The only one that is not beside the images counts where it cannot be of other images in the bag.
+
     Raises:
         DatasetError: what is asked for is not there, or it is one of several.
     """
@@ -48,17 +56,33 @@ def info_of(bag: BagRecording, asked: str | None, image: str) -> str | None:
         if asked in names:
             return asked
         raise DatasetError(f"Bag {bag} has no CameraInfo in {asked!r}; {_listed(infos, 'CameraInfo', bag)}.")
-    camera = image
-    for suffix in SUFFIXES:
-        camera = camera.removesuffix(suffix)
-    beside = [name for name in names if name.rpartition("/")[0] in (camera, camera.rpartition("/")[0]) and camera]
-    for found in ([name for name in names if name.rpartition("/")[0] == camera], beside, names):
+    camera = camera_of(image)
+    above = {name: name.rpartition("/")[0] for name in names}
+    own = [name for name in names if above[name] == camera or above[name] == image.removesuffix("/compressed")]
+    beside = [name for name in names if above[name] in (camera, camera.rpartition("/")[0]) and camera]
+    cameras = {camera_of(topic.name) for topic in bag.of_type(IMAGES)}
+    for found in (own, beside, names if len(cameras) == 1 else []):
         if len(found) == 1:
             return found[0]
     if not names:
         return None
     listed = _listed(infos, "CameraInfo", bag)
-    raise DatasetError(f"Bag {bag} holds several topics of CameraInfo, choose that of {image} with --info; {listed}.")
+    raise DatasetError(
+        f"Bag {bag} does not say which CameraInfo is that of {image}, choose it with --info, or give the camera's "
+        f"calibration with --guess FILE; {listed}."
+    )
+
+
+def camera_of(image: str) -> str:
+    """The camera's name in that of its topic of images."""
+    for suffix in SUFFIXES:
+        image = image.removesuffix(suffix)
+    return image
+
+
+def is_rectified(image: str) -> bool:
+    """Whether a topic of images is called like one that ``image_proc`` rectified."""
+    return bool(RECTIFIED.search(image))
 
 
 def _listed(topics: Sequence[Topic], what: str, bag: BagRecording) -> str:

@@ -30,16 +30,18 @@ class Wanted:
     Attributes:
         camera: its name in the file; None where the file holds only one.
         frames: of the coordinate frames.
-        picture: one of the camera's, for formats that do not say its size.
+        picture: one of the camera's, or its width and height, for formats that do not say its size.
     """
 
     camera: str | None = None
     frames: FrameChoice = BY_NAME
-    picture: Path | None = None
+    picture: Path | tuple[int, int] | None = None
 
     @property
     def size(self) -> tuple[int, int] | None:
         """Width and height of the picture; None where it cannot be read."""
+        if isinstance(self.picture, tuple):
+            return self.picture
         try:
             height, width = read_image(self.picture).shape[:2] if self.picture is not None else (0, 0)
         except DatasetError:

@@ -1,7 +1,7 @@
 """ROS's ``camera_info``: as ``camera_calibration`` writes it, and as ``topic echo`` of ROS 1 and 2 prints it.
 
-Its matrix and lens are of the pictures as they are taken (``image_raw``); ``R`` and ``P`` are of rectified ones, and
-are not needed. Keys of our own for the extrinsic may stand beside.
+Its matrix ``K`` and lens are of the pictures as they are taken (``image_raw``); ``P`` is the matrix of those that
+``image_proc`` rectified by it. Keys of our own for the extrinsic may stand beside.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 from calibnet.datasets.calibration_files import values
 from calibnet.datasets.calibration_files.calibration_file import CalibrationFile
 from calibnet.errors import DatasetError
+from calibnet.geometry.camera_model import CameraModel
 
 NAMES = {
     "width": ("image_width", "width"),
@@ -32,7 +33,21 @@ def is_known(content: Any) -> bool:
 
 
 def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
-    """Read it.
+    """Read its camera, and the extrinsic that may stand beside.
+
+    Raises:
+        DatasetError: it is incomplete, or is of pictures that were binned or cut.
+    """
+    return CalibrationFile("ROS's camera_info", camera(content, path), values.extrinsic(content, path))
+
+
+def camera(content: Mapping[Any, Any], path: Path, rectified: bool = False) -> CameraModel:
+    """The camera of the pictures.
+
+    Args:
+        content: of the file or message.
+        path: of the file.
+        rectified: whether the pictures were rectified already, so that they have the matrix ``P`` and no distortion.
 
     Raises:
         DatasetError: it is incomplete, or is of pictures that were binned or cut.
@@ -54,7 +69,19 @@ def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
         return content[found[what]]
 
     size = values.pixels(value("width"), "width", path), values.pixels(value("height"), "height", path)
+    if rectified and content.get("P") and any(projection := values.numbers(content["P"], "P", path, (3, 4)).ravel()):
+        return values.camera(size, projection.reshape(3, 4)[:, :3], "plumb_bob", [], path, "P")
     model = values.lens_model(content.get("distortion_model") or "plumb_bob", path, "distortion_model")
     matrix = values.numbers(value("matrix"), str(found["matrix"]), path, (3, 3))
-    camera = values.camera(size, matrix, model, value("coefficients"), path, str(found["coefficients"]))
-    return CalibrationFile("ROS's camera_info", camera, values.extrinsic(content, path))
+    if not matrix.any():
+        raise DatasetError(
+            f"Calibration {path}: the camera matrix is zero, as drivers write it of a camera that nobody calibrated; "
+            "calibrate it, and give its calibration file."
+        )
+    taken = values.camera(size, matrix, model, value("coefficients"), path, str(found["coefficients"]))
+    if rectified and not taken.is_pinhole:
+        raise DatasetError(
+            f"Calibration {path}: the pictures are rectified, and this camera_info lacks their matrix P; take those "
+            "that were not, or give a calibration file of these."
+        )
+    return taken

@@ -92,7 +92,7 @@ def test_one_of_several_topics_has_to_be_named(tmp_path: Path) -> None:
     assert Bag([path], BagOptions(image="/right/image_raw"))[0].camera.width == 130, "with the CameraInfo beside it"
     with pytest.raises(DatasetError, match="has no images in '/rear'"):
         Bag([path], BagOptions(image="/rear"))
-    with pytest.raises(DatasetError, match=r"is 128x48 and its CameraInfo is for 130x48"):
+    with pytest.raises(DatasetError, match=r"is 128x48 and its calibration is for 130x48"):
         Bag([path], BagOptions(image="/left/image_raw", info="/right/camera_info"))[0]
 
 

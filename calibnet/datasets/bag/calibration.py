@@ -1,0 +1,113 @@
+"""Camera and first guess of a bag: of its own messages, or of a file that the user names instead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from calibnet.datasets.bag.messages import TRANSFORMS, camera_info_of, links_of
+from calibnet.datasets.bag.recording import BagRecording
+from calibnet.datasets.bag.topics import info_of, is_rectified
+from calibnet.datasets.calibration_files import FrameChoice, Wanted, read_calibration, ros
+from calibnet.datasets.calibration_files.frames import Link, camera_from_lidar
+from calibnet.datasets.plausibility import Implausible, of_camera, of_extrinsic, of_lens, rectification, refuse
+from calibnet.errors import DatasetError
+from calibnet.geometry.camera_model import CameraModel
+from calibnet.geometry.rectification import central
+from calibnet.geometry.types import Extrinsic
+
+MOST_TRANSFORMS = 2000
+"""Messages of a topic of transforms that are looked at."""
+
+
+class BagCalibration(NamedTuple):
+    """What is known of the sensors of a bag.
+
+    Attributes:
+        camera: with its lens.
+        camera_from_lidar: 4x4, the first guess.
+        remarks: what is unlikely about them.
+    """
+
+    camera: CameraModel
+    camera_from_lidar: Extrinsic
+    remarks: tuple[Implausible, ...]
+
+
+def read(
+    bag: BagRecording, image: str, frames: FrameChoice, info: str | None, guess: Path | None, wanted: Wanted
+) -> BagCalibration:
+    """Read it.
+
+    Args:
+        bag: the recording.
+        image: topic of the images.
+        frames: the coordinate frames that images and scans are in.
+        info: topic of the CameraInfo; None to find it.
+        guess: a calibration file; what it says holds, but for the camera where ``info`` is named.
+        wanted: what to take from that file.
+
+    Raises:
+        DatasetError: something is missing, or cannot be right.
+    """
+    given = None if guess is None else read_calibration(guess, wanted)
+    remarks: list[Implausible | None] = []
+    if given is not None and given.camera is not None and info is None:
+        camera = given.camera
+    else:
+        camera, mixed = _of_info(bag, info, image)
+        remarks.append(mixed)
+    extrinsic = None if given is None else given.camera_from_lidar
+    extrinsic = _of_transforms(bag, frames) if extrinsic is None else extrinsic
+    remarks += [*of_lens(camera), *of_camera(central(camera).pinhole), *of_extrinsic(extrinsic)]
+    return BagCalibration(camera, extrinsic, refuse(remarks, f"Calibration of {image} in {bag}"))
+
+
+def _of_info(bag: BagRecording, asked: str | None, image: str) -> tuple[CameraModel, Implausible | None]:
+    """The camera of the CameraInfo that belongs to the images, and what is odd about that."""
+    info = info_of(bag, asked, image)
+    if info is None:
+        raise DatasetError(
+            f"Bag {bag} holds no CameraInfo of {image}; give the camera's calibration with --guess FILE, or its topic "
+            "with --info."
+        )
+    content, where = camera_info_of(bag.message(info).content), Path(f"{bag}, {info}")
+    rectified = is_rectified(image)
+    camera = ros.camera(content, where, rectified)
+    projection, rotation = np.array(content["P"]), np.array(content["R"])
+    if rectified or not (projection.size == 12 and projection.any() and rotation.size == 9 and rotation.any()):
+        return camera, None
+    return camera, rectification(camera, rotation.reshape(3, 3), projection.reshape(3, 4)[:, :3])
+
+
+def _of_transforms(bag: BagRecording, frames: FrameChoice) -> Extrinsic:
+    topics = bag.of_type(TRANSFORMS)
+    static = [topic for topic in topics if topic.name.endswith("tf_static")]
+    links = [
+        link
+        for topic in static or topics
+        for message in bag.messages(topic.name, most=MOST_TRANSFORMS)
+        for link in links_of(message.content)
+    ]
+    where = f"{bag}, {' and '.join(topic.name for topic in static or topics)}"
+    links = links if static else steady(links)
+    if not links:
+        raise DatasetError(
+            f"Bag {bag} has no /tf_static, which would say where the LiDAR is; give a first guess with --guess FILE."
+        )
+    return camera_from_lidar(links, frames, where)
+
+
+def steady(links: Sequence[Link]) -> list[Link]:
+    """Those that never change: what is on one mount, where static transforms are told among the others."""
+    told: dict[tuple[str, str], list[Link]] = {}
+    for link in links:
+        told.setdefault((link.parent, link.child), []).append(link)
+    return [
+        same[0]
+        for same in told.values()
+        if all(np.allclose(one.parent_from_child, same[0].parent_from_child, atol=1e-6) for one in same)
+    ]
