@@ -14,6 +14,7 @@ from datetime import timedelta
 import rerun as rr
 
 from inspector import entities
+from inspector.live import matches
 from inspector.live.tries import Try
 from inspector.record.contents import Contents, Part
 from inspector.record.frame import log_frame
@@ -26,7 +27,7 @@ from inspector.record.tabs.registry import Tab
 
 TIMELINE = "try"
 APPLICATION_ID = "calib-inspect-live"
-TABS: tuple[Tab, ...] = (cost_volumes, cascade, exhibits, scene, hourglass)
+TABS: tuple[Tab, ...] = (matches, cost_volumes, cascade, exhibits, scene, hourglass)
 """Tabs of the viewer beside the page, which has the overview itself; first the one that answers a click."""
 CONTENTS = Contents(frozenset({Part.OVERLAYS, Part.VOLUMES, Part.HOURGLASS, Part.SCENE}), dense=True)
 

@@ -10,6 +10,8 @@ from calibnet.errors import CalibnetError
 from calibnet.runtime.writing import write_whole
 from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
+QUIET = b"console.debug = () => {};\n"
+"""Precedes the viewer's program, whose 15,000 sentences about its shaders take longer than making these."""
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 
 
@@ -36,7 +38,7 @@ def fetch_viewer(folder: Path) -> None:
         for name in VIEWER_FILES:
             address = f"http://{LOCALHOST}:{web_port}/{name}"
             with urllib.request.urlopen(address, timeout=60) as answer:
-                write_whole(folder / name, answer.read())
+                write_whole(folder / name, (QUIET if name == "re_viewer.js" else b"") + answer.read())
     except URLError as error:
         raise ViewerFilesError(
             f"The installed Rerun does not hand out its web viewer ({error.reason}); reinstall rerun-sdk."

@@ -6,7 +6,6 @@ const page = new URLSearchParams(location.search).get("page") ?? location.origin
 let viewer = null;
 
 async function start() {
-  hint.textContent = "Starting the viewer: some seconds the first time.";
   delete WebAssembly.instantiateStreaming;
   await wasm_bindgen({ module_or_path: "re_viewer_bg.wasm" });
   viewer = new wasm_bindgen.WebHandle({
@@ -18,31 +17,31 @@ async function start() {
     panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden" },
     on_viewer_event: (event) => heard(typeof event === "string" ? JSON.parse(event) : event),
   });
-  canvas.hidden = false;
   await viewer.start(canvas);
   viewer.open_channel(CHANNEL, "live");
-  hint.textContent = "The viewer takes the try in. Without a graphics card, on a busy machine, that is minutes.";
+  hint.textContent = "Your first try is shown here: every stage's cost volumes, the scene in 3D, and more.";
 }
 
-// The viewer says a time as soon as it has something to show: until then its canvas is blank.
+// The viewer says a time as soon as it has something to show. Until then it draws some fifty blank pictures, and takes
+// in a little with each: without a graphics card a large one costs a second, so its canvas is small so long.
 function heard(event) {
-  if (event.type.startsWith("time")) hint.hidden = true;
+  if (event.type.startsWith("time")) {
+    hint.hidden = true;
+    canvas.className = "";
+  }
   parent.postMessage({ viewer: event }, page);
 }
 
 const waiting = [];
-let starting = null;
+const started = start().then(() => true, (error) => {
+  hint.textContent = `The viewer does not start here (${error}). The picture and the answer above work without it.`;
+  return false;
+});
 
 async function take(piece) {
   waiting.push(new Uint8Array(piece));
-  starting ??= start();
-  try {
-    await starting;
-  } catch (error) {
-    hint.hidden = false;
-    hint.textContent = `The viewer does not start here (${error}). The picture and the answer above work without it.`;
-    return;
-  }
+  if (!(await started)) return;
+  if (!window.pieces) hint.textContent = "Taking in your first try.";
   while (waiting.length) viewer.send_rrd_to_channel(CHANNEL, waiting.shift());
   window.pieces += 1;
 }

@@ -11,3 +11,4 @@ def test_installed_rerun_hands_out_its_viewer(tmp_path: Path) -> None:
     fetch_viewer(tmp_path / "viewer")
     assert (tmp_path / "viewer" / "re_viewer_bg.wasm").read_bytes()[:4] == b"\0asm"
     assert {file.name for file in (tmp_path / "viewer").iterdir()} == set(VIEWER_FILES)
+    assert (tmp_path / "viewer" / "re_viewer.js").read_text().startswith("console.debug = () => {};\n")
