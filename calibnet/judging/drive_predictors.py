@@ -1,4 +1,4 @@
-"""What tells right from wrong of a drive: what its frames say together, and whether they say the same."""
+"""Predictors of a wrong result of a drive: how well its frames fit, and whether they agree."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from calibnet.judging.predictors import LEAST, reach
 from calibnet.trace import DriveEstimate, DriveLook
 
 DEGREES_A_CENTIMETRE = 0.3 / 8
-"""Degrees that count as much as a centimetre: as in what a drive may be off."""
+"""Degrees that count as much as one centimetre, by the ratio of the limits of a drive."""
 FEWEST = 2
-"""Frames that can agree."""
+"""Fewest frames that can agree or disagree."""
 
 
 @dataclass(frozen=True)
 class DrivePredictors:
-    """Numbers that grow with what speaks against a drive's extrinsic; not a number where it does not tell.
+    """Predictors of a wrong extrinsic of a drive; NaN where the estimate lacks the data.
 
     Attributes:
-        match_error: logarithm of the median match error of the last look, in pixels.
+        match_error: logarithm of the frames' median match error in the last look, in pixels.
         misfit: logarithm of the frames' median misfit.
-        lens: median logarithm of the cost of frames' matches with another lens, relative to that with the pose alone.
-        stated: logarithm of the deviation of the translation, in centimetres, on which the frames agree; without what
-            is known beforehand, which would make any drive look sure.
-        scatter: logarithm of how far a frame is from what all say, in centimetres, in the median.
-        halves: logarithm of how far the first half of the drive is from the second.
-        aligned: logarithm of how far the alignment of edges went from what the networks say.
-        reach: how far it is from the start, in ranges searched.
-        frames: minus the logarithm of their number.
+        lens: median logarithm of the cost of a frame's matches with another lens, relative to the cost with the pose
+            alone.
+        stated: logarithm of the standard deviation of the translation that all frames together state, in centimetres,
+            without the user's prior, which would make any drive look certain.
+        scatter: logarithm of the median distance of a frame's result from that of all frames, in centimetres.
+        halves: logarithm of the distance between the results of the first and the second half of the drive.
+        aligned: logarithm of how far the alignment of edges moved the networks' result.
+        reach: how far the result lies from the start, relative to the range searched.
+        frames: minus the logarithm of the number of frames.
     """
 
     match_error: float
@@ -50,12 +51,12 @@ class DrivePredictors:
 def drive_predictors(
     estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange
 ) -> DrivePredictors | None:
-    """The predictors of a drive; None where a method tells nothing of its frames, or there are too few of them.
+    """The predictors of a drive; None if the method reports no frames, or fewer than `FEWEST`.
 
     Args:
         estimate: of the drive.
-        initial: ``camera_from_lidar`` that it started from.
-        searched: the range that was searched around it.
+        initial: ``camera_from_lidar`` that the drive started from.
+        searched: range that was searched around the initial extrinsic.
     """
     looks = estimate.looks
     if len(looks) < FEWEST:
