@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,18 +126,18 @@ class StageTrace:
         """``camera_from_lidar`` that its last look started from, 4x4."""
         return self.before if self.last_before is None else self.last_before
 
-    def followed_by(self, again: StageTrace) -> StageTrace:
+    def followed_by(self, further: StageTrace) -> StageTrace:
         """This and a further look of the same stage as one trace; the detail stays that of the first look."""
-        parts = dict.fromkeys([*self.milliseconds, *again.milliseconds])  # in their order
+        mine, its = self.milliseconds, further.milliseconds
         return replace(
             self,
-            after=again.after,
-            correction=again.correction @ self.correction,
-            milliseconds={part: self.milliseconds.get(part, 0.0) + again.milliseconds.get(part, 0.0) for part in parts},
-            information=again.information,
-            match_error_px=again.match_error_px,
-            matches=again.matches,
-            last_before=again.looked_from,
+            after=further.after,
+            correction=further.correction @ self.correction,
+            milliseconds={part: mine.get(part, 0.0) + its.get(part, 0.0) for part in dict.fromkeys([*mine, *its])},
+            information=further.information,
+            match_error_px=further.match_error_px,
+            matches=further.matches,
+            last_before=further.looked_from,
         )
 
 
@@ -149,8 +150,6 @@ class CascadeTrace:
         stages: the stages that ran, coarse to fine.
         milliseconds: wall time shared by the stages (preparation, resizing, image features).
         wider: stages of wider ranges that ran before them, because a first run left the range it searched.
-        again: one more look of the last stage, from where the run arrived: it is not applied, and is what the verdict
-            is told by most. None where the result is rejected anyhow, or too few points are in the image there.
         verdict: whether the result is good; None from a method that does not say.
         match_error_limit_px: largest match error of the last stage that is believed, in pixels of its ``camera``.
         method: name of the method whose run it is; empty for the cascade.
@@ -161,7 +160,6 @@ class CascadeTrace:
     milliseconds: dict[str, float] = field(default_factory=dict)
     match_error_limit_px: float = math.inf
     wider: tuple[StageTrace, ...] = ()
-    again: StageTrace | None = field(default=None, repr=False)
     verdict: Verdict | None = None
     method: str = ""
 
@@ -228,8 +226,6 @@ class DriveLook:
         offset: ``[6]``, ``(translation m, rotation rad)`` from there to where it believes the extrinsic to be.
         information: ``[6, 6]`` of it as the network states it, or None.
         match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
-        misfit: mean cost of their residuals, see `calibnet.judging.predictors.misfit`.
-        bent_misfit: the same with whichever other lens explains them best.
     """
 
     frame: int
@@ -237,8 +233,6 @@ class DriveLook:
     offset: Vector6 = field(repr=False)
     information: Matrix6 | None = field(default=None, repr=False)
     match_error_px: float = math.nan
-    misfit: float = math.nan
-    bent_misfit: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +246,6 @@ class DriveEstimate(Estimate):
         verdict: whether the estimate is good; None from a method that does not say.
         networks: the estimate of the networks alone, where edges were aligned after them; its covariance has the
             scatter of the frames, not their common error. None where nothing was aligned: it would be the estimate.
-        free: the estimate without what is known beforehand of the extrinsic; None where nothing is.
         looks: what each frame says by itself, relative to ``looked_from``.
         looked_from: ``camera_from_lidar`` that the last look started from; None from a method without looks.
         traces: of the frames by their index, from a method that calibrates whole drives only: each goes from the
@@ -265,5 +258,17 @@ class DriveEstimate(Estimate):
     verdict: Verdict | None = None
     looks: tuple[DriveLook, ...] = field(repr=False, default=())
     looked_from: Extrinsic | None = field(repr=False, default=None)
-    free: Estimate | None = field(repr=False, default=None)
     traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)
+
+    def inflated(self, factor: float) -> Self:
+        """The same with every covariance so many times as large."""
+
+        def of(estimate: Estimate) -> Estimate:
+            return replace(estimate, covariance=factor * estimate.covariance)
+
+        return replace(
+            self,
+            covariance=factor * self.covariance,
+            history=tuple((frame, of(so_far)) for frame, so_far in self.history),
+            networks=None if self.networks is None else of(self.networks),
+        )

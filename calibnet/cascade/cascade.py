@@ -21,8 +21,8 @@ from calibnet.drive.solve import solve_drive
 from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, invert
 from calibnet.geometry.prior import PosePrior, Prior
-from calibnet.geometry.types import Extrinsic, Matrix6, Transform
-from calibnet.judging.causes import Search, match_error_of, reach_of
+from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.judging.causes import Measure, Search, match_error_of, reach_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.judge import judge
@@ -125,6 +125,10 @@ class Cascade:
         coefficients = self.coefficients if number == self.numbers[-1] else None
         return Cascade(chosen, self.skipped, self.common_error, (), coefficients, self.prior)
 
+    def with_coefficients(self, coefficients: Coefficients) -> Cascade:
+        """The same, judging by other coefficients."""
+        return Cascade(self.stages, self.skipped, self.common_error, self.wider, coefficients, self.prior)
+
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Correct the extrinsic of one frame.
 
@@ -136,26 +140,11 @@ class Cascade:
         Raises:
             CalibrationError: too few LiDAR points fall into the image under ``initial``.
         """
-        upright = Upright.of(initial, self.stages[0].range)
-        clock, limit = Clock(self.device), self.stages[-1].match_error_limit_px
-        start, pose_prior = upright.extrinsic(initial), self._pose_prior(initial, upright)
-        with torch.inference_mode(), autocast(self.device):
-            views = ImageViews(prepared(frame, upright), clock)
-            clock("preparation")
-            trace = CascadeTrace(start, self._run(self.stages, views, start, detail, pose_prior), clock.parts, limit)
-            if wider := self._covering(trace.arrived @ invert(start)):
-                before = self._run(wider, views, start, pose_prior=pose_prior)
-                stages = self._run(self.stages, views, before[-1].after, detail, pose_prior)
-                trace = CascadeTrace(start, stages, clock.parts, limit, before)
-            clock.skip()  # the stages time themselves
-            trace = replace(trace, again=self._again(views, trace, pose_prior))
-            verdict = judge(views.frame, start, trace, self.coefficients, prior=self.prior.words)
-            clock("verdict")
-            if pose_prior is not None and verdict.covariance is not None:
-                narrowed = pose_prior.narrowed(verdict.covariance, verdict.camera_from_lidar)
-                verdict = replace(verdict, covariance=narrowed)
-            trace = replace(trace, verdict=verdict)
-        return upright.undo(trace, initial)
+        upright, start, pose_prior = self._uprighted(initial)
+        clock = Clock(self.device)
+        frame = prepared(frame, upright)
+        clock("preparation")
+        return upright.undo(self._calibrated(frame, start, pose_prior, clock, detail), initial)
 
     def explain(self, frame: Frame, initial: Extrinsic, lags: Search | None = None) -> Verdict:
         """The verdict on a frame with its causes: what, undone in the input, makes picture and scan fit.
@@ -167,17 +156,20 @@ class Cascade:
             initial: ``camera_from_lidar`` to start from.
             lags: of the scan, that are tried as well, see `calibnet.judging.lag.lags`.
         """
-        upright = Upright.of(initial, self.stages[0].range)
-        frame, start = prepared(frame, upright), upright.extrinsic(initial)
+        upright, start, pose_prior = self._uprighted(initial)
+        frame, clock = prepared(frame, upright), Clock(self.device)
+
+        def calibrated(frame: Frame, start: Extrinsic) -> CascadeTrace:
+            return self._calibrated(frame, start, pose_prior, clock)
+
         try:
-            trace = self.calibrate(frame, start)
+            trace = calibrated(frame, start)
         except CalibrationError:
             trace = None
         verdict = None if trace is None else trace.verdict
         if verdict is None or verdict.word != ACCEPTED:
-            match_error = match_error_of(self.stages[0])
-            lag = None if lags is None else (lags, reach_of(self.calibrate))
-            verdict = judge(frame, start, trace, self.coefficients, match_error, lag, self.prior.words)
+            lag = None if lags is None else (lags, reach_of(calibrated))
+            verdict = self._judged(frame, start, trace, pose_prior, match_error_of(self.stages[0]), lag)
         return upright.undo_verdict(verdict)
 
     def calibrate_drive(
@@ -194,9 +186,8 @@ class Cascade:
             CalibrationError: no frame could be calibrated.
             ValueError: there are no frames.
         """
-        upright = Upright.of(initial, self.stages[0].range)
-        start, frames = upright.extrinsic(initial), PreparedFrames(frames, upright)
-        pose_prior = self._pose_prior(initial, upright)
+        upright, start, pose_prior = self._uprighted(initial)
+        frames = PreparedFrames(frames, upright)
 
         def solve(stages: Sequence[Stage]) -> DriveEstimate:
             return solve_drive(stages, frames, start, self.common_error, observer, pose_prior)
@@ -239,19 +230,49 @@ class Cascade:
             return solve_rig(stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
 
         estimate = self._solved(solve, initial)
-        inflation = self.coefficients.inflation
-        inflated = (replace(one, covariance=inflation * one.covariance) for one in estimate.cameras)
-        found = tuple(turn.undo_camera(one) for one, turn in zip(inflated, upright, strict=True))
+        found = tuple(turn.undo_camera(one) for one, turn in zip(estimate.cameras, upright, strict=True))
         return replace(estimate, cameras=found)
 
     def _solved(self, solve: Callable[[Sequence[Stage]], AnyEstimate], initial: Extrinsic) -> AnyEstimate:
         """A drive or a rig solved with the stages, and where it leaves their range with the wider ones too; judged."""
         estimate = solve(self.stages)
-        if wider := self._covering(estimate.camera_from_lidar @ invert(initial)):
+        if wider := self._covering(initial, estimate.camera_from_lidar):
             estimate = solve([*wider, *self.stages])
-        estimate = replace(estimate, covariance=self.coefficients.inflation * estimate.covariance)
+        estimate = estimate.inflated(self.coefficients.inflation)
         classifier = self.coefficients.for_drive(self.stages[-1].range)
         return replace(estimate, verdict=judge_drive(estimate, initial, self.stages[0].range, classifier))
+
+    def _calibrated(
+        self, frame: Frame, start: Extrinsic, pose_prior: PosePrior | None, clock: Clock, detail: bool = False
+    ) -> CascadeTrace:
+        """A run on a prepared frame, from an extrinsic of its upright camera; with its verdict."""
+        limit = self.stages[-1].match_error_limit_px
+        with torch.inference_mode(), autocast(self.device):
+            views = ImageViews(frame, clock)
+            trace = CascadeTrace(start, self._run(self.stages, views, start, detail, pose_prior), clock.parts, limit)
+            if wider := self._covering(start, trace.arrived):
+                before = self._run(wider, views, start, pose_prior=pose_prior)
+                stages = self._run(self.stages, views, before[-1].after, detail, pose_prior)
+                trace = CascadeTrace(start, stages, clock.parts, limit, before)
+            clock.skip()  # the stages time themselves
+            trace = replace(trace, verdict=self._judged(frame, start, trace, pose_prior))
+            clock("verdict")
+        return trace
+
+    def _judged(
+        self,
+        frame: Frame,
+        start: Extrinsic,
+        trace: CascadeTrace | None,
+        pose_prior: PosePrior | None,
+        match_error: Measure | None = None,
+        lag: tuple[Search, Measure] | None = None,
+    ) -> Verdict:
+        """The verdict on a run, its covariance narrowed by what is known beforehand; arguments as of `judge`."""
+        verdict = judge(frame, start, trace, self.coefficients, match_error, lag, self.prior.words)
+        if pose_prior is None or verdict.covariance is None:
+            return verdict
+        return replace(verdict, covariance=pose_prior.narrowed(verdict.covariance, verdict.camera_from_lidar))
 
     def _run(
         self,
@@ -269,30 +290,19 @@ class Cascade:
             traces.append(stage.correct(views.frame, views.of(stage, branches[stage]), before, detail, pose_prior))
         return tuple(traces)
 
-    def _again(self, views: ImageViews, trace: CascadeTrace, pose_prior: PosePrior | None) -> StageTrace | None:
-        """One more look of the last stage, from where a run arrived: it tells most about the result.
+    def _uprighted(self, initial: Extrinsic) -> tuple[Upright, Extrinsic, PosePrior | None]:
+        """How the image is turned upright, and what the upright camera starts from and knows of it beforehand."""
+        upright = Upright.of(initial, self.stages[0].range)
+        pose_prior = self.prior.about(initial).turned(upright.rotation) if self.prior else None
+        return upright, upright.extrinsic(initial), pose_prior
 
-        None where the rest speaks against it already.
+    def _covering(self, initial: Extrinsic, found: Extrinsic) -> list[Stage]:
+        """The wider stages with which to start again from an initial extrinsic that turns out to be so far off.
+
+        None where the first stage's range covers it; else from the stage whose range does, or from the widest of all.
         """
-        moved = trace.arrived @ invert(trace.initial)
-        if not trace.fits or not self.stages[0].range.contains(moved, MARGIN):
-            return None
-        last, branch = self.stages[-1], self.image_branches[len(self.stages) - 1]
-        try:
-            return last.look(views.frame, views.of(last, branch), trace.arrived, pose_prior=pose_prior)
-        except CalibrationError:  # too few points are left in the picture: the run itself was fine
-            return None
-
-    def _pose_prior(self, initial: Extrinsic, upright: Upright) -> PosePrior | None:
-        """What is known of an extrinsic, as the upright camera has it; None for nothing."""
-        return self.prior.about(initial).turned(upright.rotation) if self.prior else None
-
-    def _covering(self, moved: Transform) -> list[Stage]:
-        """The wider stages with which to start again after moving so far; none where the first stage's range covers it.
-
-        They begin with the one whose range does, or with the widest of all.
-        """
-        if not self.wider or self.stages[0].range.contains(moved, MARGIN):
+        miscalibration = initial @ invert(found)
+        if not self.wider or self.stages[0].range.contains(miscalibration, MARGIN):
             return []
-        covering = [position for position, stage in enumerate(self.wider) if stage.range.contains(moved, MARGIN)]
+        covering = [number for number, stage in enumerate(self.wider) if stage.range.contains(miscalibration, MARGIN)]
         return self.wider[max(covering, default=0) :]

@@ -106,6 +106,8 @@ class Stage:
     ) -> StageTrace:
         """Look at a frame, and again from where that arrives, until the next stage can take over.
 
+        The finest stage, which none follows, looks as often as it may.
+
         Args:
             frame: scan and camera; its own extrinsic is not looked at.
             view: its image, as `view` gives it.
@@ -114,13 +116,16 @@ class Stage:
             pose_prior: what is known of the extrinsic beforehand.
 
         Raises:
-            CalibrationError: see `look`.
+            CalibrationError: the first look fails, see `look`.
         """
         look = trace = self.look(frame, view, before, detail, pose_prior)
         for _ in range(self.settings.looks - 1):
             if self.is_settled(look.correction):
                 break
-            look = self.look(frame, view, look.after, pose_prior=pose_prior)
+            try:
+                look = self.look(frame, view, look.after, pose_prior=pose_prior)
+            except CalibrationError:  # too few points are left in the image: what was found before stands
+                break
             trace = trace.followed_by(look)
         return trace
 
@@ -196,9 +201,9 @@ class Stage:
         )
 
     def is_settled(self, correction: Transform) -> bool:
-        """Whether the next stage can take over: what a look has corrected is within that stage's range."""
-        position = RANGES.index(self.range) if self.range in RANGES else len(RANGES)
-        return RANGES[min(position + 1, len(RANGES) - 1)].contains(correction)
+        """Whether a next stage can take over: what a look has corrected is within that stage's range."""
+        following = RANGES[RANGES.index(self.range) + 1 :] if self.range in RANGES else RANGES[-1:]
+        return bool(following) and following[0].contains(correction)
 
     def _correction(self, output: NetworkOutput) -> Transform:
         """The correction of a batch of one, extended by the stage's gain."""

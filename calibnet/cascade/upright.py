@@ -90,9 +90,8 @@ class Upright:
         if not self:
             return trace
         stages, wider = (tuple(map(self._real_stage, part)) for part in (trace.stages, trace.wider))
-        again = None if trace.again is None else self._real_stage(trace.again)
         verdict = None if trace.verdict is None else self.undo_verdict(trace.verdict)
-        return replace(trace, initial=initial, stages=stages, wider=wider, again=again, verdict=verdict)
+        return replace(trace, initial=initial, stages=stages, wider=wider, verdict=verdict)
 
     def undo_verdict(self, verdict: Verdict) -> Verdict:
         """The verdict on an upright frame or drive, of the real camera."""
@@ -115,7 +114,6 @@ class Upright:
             self._real(estimate),
             history=history,
             networks=networks,
-            free=None if estimate.free is None else self._real(estimate.free),
             verdict=verdict,
             looks=looks,
             looked_from=looked_from,

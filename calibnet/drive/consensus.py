@@ -74,11 +74,6 @@ class Consensus:
             mean, covariance = self.pose_prior.fused(mean, inverse(covariance + self.common_error), self.before)
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
-    def free_estimate(self) -> Estimate:
-        """The estimate from the frames alone, without what is known beforehand."""
-        mean, covariance = self.agreed()
-        return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
-
     def agreed(self) -> tuple[Vector6, Matrix6]:
         """The correction of all frames, without what is known beforehand, and its covariance."""
         if not self._vectors:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -68,6 +69,18 @@ class RigEstimate(DriveEstimate):
 
     cameras: tuple[CameraEstimate, ...] = field(repr=False, default=())
 
+    def inflated(self, factor: float) -> Self:
+        """The same with every covariance so many times as large, those of the cameras too."""
+        cameras = tuple(
+            replace(
+                one,
+                covariance=factor * one.covariance,
+                alone_covariance=None if one.alone_covariance is None else factor * one.alone_covariance,
+            )
+            for one in self.cameras
+        )
+        return replace(super().inflated(factor), cameras=cameras)
+
 
 def solve_rig(
     stages: Sequence[DriveStage],
@@ -115,10 +128,6 @@ def solve_rig(
     agreed = _look(stages[-1], cameras, everything, places, rig, common_error, read, last)
     mean, covariance = rig_correction(agreed, rig, pose_prior, tolerance)
     of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(last.looks))
-    opened = None
-    if pose_prior is not None:
-        free, spread_of_free = rig_correction(agreed, rig, None, tolerance)
-        opened = Estimate(pose_from_vector(free) @ rig, spread_of_free, len(last.looks))
     if aligns:
         too_far = (
             of_networks.rotation_deg > FARTHEST_ROTATION_DEG
@@ -137,7 +146,6 @@ def solve_rig(
         networks=of_networks if aligns else None,
         looks=tuple(last.looks),
         looked_from=rig,
-        free=opened,
         cameras=tuple(_of_cameras(cameras, agreed, found, last.of_camera, tolerance)),
     )
 

@@ -17,7 +17,6 @@ from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.judging.predictors import misfits
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
@@ -129,20 +128,12 @@ def solve_drive(
         networks=of_networks if aligns else None,
         looks=tuple(looks),
         looked_from=extrinsic,
-        free=None if pose_prior is None else consensus.free_estimate(),
     )
 
 
 def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
     """What one look at one frame of a drive says, as the drive keeps it."""
-    return DriveLook(
-        frame.index,
-        position,
-        pose_vector(look.correction),
-        look.information,
-        look.match_error_px,
-        *misfits(look),
-    )
+    return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px)
 
 
 def agree(

@@ -98,7 +98,7 @@ def measured(
     estimate = cascade.calibrate_drive(drive, guess)
     there = estimate.camera_from_lidar
     error = farthest(there, drive)
-    found = drive_predictors(estimate, guess, cascade.stages[0].range)
+    found = drive_predictors(estimate)
     asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
     return VerdictRun(
         number,

@@ -28,14 +28,6 @@ FALSE_ACCEPTS = 0.01
 fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
-OF_FRAMES = ("match_error", "misfit", "lens", "correlated")
-"""Predictors of a frame that are fitted: on sequences left out, all nine accept fewer of the good ones, and so does the
-stated deviation in the place of, or beside, the one for matches that err alike. How far a run went counts apart, in the
-ranges it is held to."""
-OF_DRIVES = ("match_error", "aligned")
-"""Predictors of a drive that are fitted: there are few drives, and on those left out more of them do no better. What
-tells most is how far the alignment of edges goes from what the networks say: where they disagree, either may be
-wrong."""
 LEAST_DEG = 1e-3
 """Common deviation of the rotation that is as good as none."""
 FEWEST, FEWEST_DRIVES = 10, 6
@@ -84,7 +76,7 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, 
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    classifier, figures, kept = fit_classifier(runs, FRAME_LIMITS, names=OF_FRAMES)
+    classifier, figures, kept = fit_classifier(runs, FRAME_LIMITS)
     model = fit_covariance(kept, ranges)
     return classifier, model, replace(figures, nees=nees_of(kept, ranges, model))
 
@@ -95,7 +87,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     Raises:
         CalibrationError: too few of them end right, or wrong.
     """
-    classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES, OF_DRIVES)
+    classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES)
     # only accepted runs count: a few gross errors would inflate the covariance of all
     accepted = [run for run in kept if error_probability(run, classifier) < classifier.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
@@ -111,7 +103,7 @@ def error_probability(run: VerdictRun, classifier: Classifier) -> float:
 
 
 def fit_classifier(
-    runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST, names: Sequence[str] = ()
+    runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST
 ) -> tuple[Classifier, FitFigures, list[VerdictRun]]:
     """Fit a classifier to runs, and say how it does on sequences that are left out.
 
@@ -119,7 +111,6 @@ def fit_classifier(
         runs: of a known truth.
         limits: degrees and centimetres that they are held to.
         fewest: that have to end right, and wrong.
-        names: of the predictors to fit; all by default.
 
     Returns:
         The classifier, its figures, and the plain runs that it does not reject.
@@ -134,7 +125,7 @@ def fit_classifier(
             f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
             f"seem to fit; {fewest} of each at least are needed to tell them apart. Make more runs, or add other data."
         )
-    names = names or list(asked[0].predictors or {})
+    names = list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])
     wrong_or_right = (~good).astype(np.intp)
     odds = left_out(values, wrong_or_right, 2, RIDGE, [run.sequence for run in asked])[:, 0]

@@ -192,5 +192,4 @@ def asking(cascade: Cascade) -> Cascade:
     """The cascade with a verdict that accepts whatever its predictors would be asked for."""
     everything = Classifier(0.0, {}, accepted_below=1.0, rejected_above=1.0)
     finest = cascade.stages[-1].range
-    cascade.coefficients = Coefficients(everything, drive=everything, weights={finest: ""}, missing="")
-    return cascade
+    return cascade.with_coefficients(Coefficients(everything, drive=everything, weights={finest: ""}, missing=""))

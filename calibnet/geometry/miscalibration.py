@@ -46,7 +46,11 @@ class MiscalibrationRange:
         return cls(rotation, translation)
 
     def contains(self, delta: Transform, margin: float = 1.0) -> bool:
-        """Whether ``delta`` stays within so many times this range on every axis, in the camera frame."""
+        """Whether a miscalibration, 4x4, stays within so many times this range on every axis, in the camera frame.
+
+        An extrinsic is miscalibrated by ``extrinsic @ invert(truth)``. The inverse of that, the correction, may lie
+        within another range: its translation is turned.
+        """
         found = range_of(delta)
         return found.rotation_deg <= margin * self.rotation_deg and found.translation_m <= margin * self.translation_m
 

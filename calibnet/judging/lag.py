@@ -1,8 +1,8 @@
-"""Scans that are later or earlier than their pictures, recognised by the motion of the car from scan to scan.
+"""Scans that are later or earlier than their pictures: told by how the car moved from one scan to the next.
 
-A late scan shows the world from where the car is by then. Matches explain this by a camera farther back, and they fit:
-nothing in one frame contradicts them. But if the scan is moved back by the car's own motion, which registering two
-scans gives, the result lies near the guess again.
+A late scan shows the world from where the car is by then. Matches explain that by a camera farther back, and fit.
+Nothing in one frame contradicts them; but put back by the car's own motion, which registering two scans tells, the same
+scan is found where the guess says.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from calibnet.judging.causes import Attempt, Search, scan_moved
 Points = NDArray[np.float32] | NDArray[np.float64]
 
 VOXEL_M = 0.5
-"""Side of the voxels in which points are averaged before scans are registered."""
+"""Side of the cells in which points are averaged before scans are registered."""
 FARTHEST_M = 3.0
-"""Largest distance between corresponding points: at 100 km/h the car moves this far from scan to scan."""
+"""Between points that are taken for the same: the car moves that far from scan to scan at 100 km/h."""
 FEWEST_POINTS = 500
-"""Fewest inliers of a registration that is trusted."""
+"""That have to agree for a registration to be believed."""
 STANDING_M = 0.1
-"""Motion between scans below which a lag makes no difference."""
+"""Motion below which a lag makes no difference."""
 SHARES = (1.0, 0.5)
 """Lags that are tried, as shares of the time between two scans."""
 SHARE, MOST = 0.5, 1.0
-"""See `calibnet.judging.causes.Search`: without the lag the result lies within the range, at most half as far away."""
+"""See `calibnet.judging.causes.Search`: the result then lies in the range searched, half as far from the guess."""
 
 
 def lags(frames: Frames, position: int) -> Search | None:
-    """Attempts to undo a time lag of the scan of one frame, by the motion to the scans before and after it.
+    """What undoes a lag of the scan at a position of a drive, by the motion to the scans before and after it.
 
     Args:
         frames: of the drive, in the order in which they were taken.
         position: of the frame.
 
     Returns:
-        Attempts whose measure is `calibnet.judging.causes.reach_of`; None if there is no neighbour or no motion.
+        Attempts, to be judged by `calibnet.judging.causes.reach_of`; None where there is no neighbour, or no motion.
     """
     beside = {step: _motion(frames, position, step) for step in (-1, 1)}
     attempts: list[Attempt] = []
@@ -54,23 +54,23 @@ def lags(frames: Frames, position: int) -> Search | None:
 
 
 Motion = tuple[Transform | None, float]
-"""The motion from one scan to another, and the seconds between them."""
+"""From one scan to another, and the seconds between them."""
 
 
 def _motion(frames: Frames, position: int, step: int) -> Motion | None:
-    """The motion to the scan ``step`` frames on; None if there is none or registration fails."""
+    """From the scan at a position to the one so many further; None where there is none, or none that fits."""
     if not 0 <= position + step < len(frames):
         return None
     try:
         here, there = frames[position], frames[position + step]
-    except DatasetError:  # an unreadable neighbour tells nothing
+    except DatasetError:  # of what cannot be read nothing can be learnt
         return None
     motion = registered(here.points, there.points)
     return None if motion is None else (motion, abs(there.timestamp - here.timestamp))
 
 
 def _backwards(motion: Motion | None) -> Motion:
-    """The motion to the scan on the other side, at constant velocity."""
+    """The motion to the scan on the other side, if the car goes on as it does."""
     if motion is None or motion[0] is None:
         return None, 0.0
     return invert(motion[0]), motion[1]
@@ -86,14 +86,14 @@ def _attempt(motion: Transform, share: float, seconds: float, word: str) -> Atte
 
 
 def registered(points: Points, onto: Points) -> Transform | None:
-    """Register one scan onto another: the transform 4x4 of points of the first into the LiDAR's frame at the second.
+    """The motion that takes one scan onto another, 4x4: points of the first as the LiDAR saw them at the second.
 
     Args:
         points: ``[N, 3 or more]`` metres.
         onto: ``[M, 3 or more]`` likewise.
 
     Returns:
-        None if too few points correspond.
+        None where too few points agree.
     """
     import small_gicp
 

@@ -19,20 +19,20 @@ from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
 AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
-"""Names of a correction's axes for users: rotations about the camera's x, y and z, then translations along them."""
+"""What the axes of a correction are to a user: turns about the camera's x, y and z, then moves along them."""
 LEAST = 1e-6
-"""Lower limit of values whose logarithm is taken."""
+"""What is smaller counts as this much, so that it has a logarithm."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """How far a run moved the extrinsic, on the axis where that is largest relative to the range searched.
+    """The axis on which a run went farthest, compared with the range that was searched.
 
     Attributes:
-        share: distance relative to the range; 1 is its border.
+        share: of the range; 1 is its border.
         axis: index into `AXES`.
-        moved: distance on that axis, in degrees or metres.
-        searched: half width of the range on that axis, in degrees or metres.
+        moved: degrees or metres that it went.
+        searched: degrees or metres of the range.
     """
 
     share: float
@@ -50,7 +50,7 @@ class Reach:
 
 
 def reach(before: Extrinsic, after: Extrinsic, range_: MiscalibrationRange) -> Reach:
-    """How far ``after`` lies from ``before``, relative to a range."""
+    """How far it is from one extrinsic to another, in ranges; the miscalibration is that of ``before``."""
     delta = before @ invert(after)
     moved = np.concatenate([np.degrees(euler_xyz(delta[:3, :3])), delta[:3, 3]])
     searched = np.repeat([range_.rotation_deg, range_.translation_m], 3)
@@ -60,67 +60,47 @@ def reach(before: Extrinsic, after: Extrinsic, range_: MiscalibrationRange) -> R
 
 @dataclass(frozen=True)
 class Predictors:
-    """Predictors of a wrong result of one frame; NaN where the trace lacks the data.
+    """Numbers that grow with what speaks against a result; not a number where a trace does not tell.
 
     Attributes:
-        match_error: logarithm of the match error that the last stage expects, in pixels.
-        earlier_error: that of the stage before it.
-        misfit: logarithm of the last stage's `misfit`.
-        lens: logarithm of the lowest cost of its matches with another lens, relative to the cost with the pose alone;
-            0 if no lens explains them better.
-        stated: logarithm of the standard deviation of the translation that its information states, in centimetres.
-        correlated: the same if matches have correlated errors, see `calibnet.judging.correlated_errors`.
-        reach: how far the run moved the extrinsic, relative to the range searched.
-        last_reach: how far the last stage moved it, relative to its own range.
-        again_reach: how far the last stage would move it if it were applied once more.
+        match_error: logarithm of the error, in pixels, that the last stage expects of its matches.
+        misfit: logarithm of what its residuals cost, see `misfits`.
+        lens: logarithm of the least cost of its matches with another lens, relative to that with the pose alone;
+            0 where no lens explains them better.
+        correlated: logarithm of the deviation of the translation, in centimetres, if matches also err alike, see
+            `calibnet.judging.correlated_errors`.
     """
 
     match_error: float
-    earlier_error: float
     misfit: float
     lens: float
-    stated: float
     correlated: float
-    reach: float
-    last_reach: float
-    again_reach: float
 
 
 def predictors(trace: CascadeTrace) -> Predictors:
     """The predictors of a run of at least one stage.
 
-    They are computed from the additional look of the last stage at the run's result where there is one, because it is
-    more informative than the look before. Without it `Predictors.again_reach` is NaN.
+    Of the last stage they are those of its last look.
     """
-    last, again = trace.stages[-1], trace.again
-    asked = again or last
-    earlier = trace.stages[-2] if len(trace.stages) > 1 else last
-    alone, bent = misfits(asked)
+    last = trace.stages[-1]
+    alone, bent = misfits(last)
     return Predictors(
-        match_error=math.log(asked.match_error_px),
-        earlier_error=math.log(earlier.match_error_px),
+        match_error=math.log(last.match_error_px),
         misfit=math.log(max(alone, LEAST)),
         lens=math.log(max(bent, LEAST) / max(alone, LEAST)),
-        stated=_stated(asked),
-        correlated=_correlated(asked, trace.stages[0].range),
-        reach=reach(trace.initial, last.after, trace.stages[0].range).share,
-        last_reach=reach(last.before, last.after, last.range).share,
-        again_reach=math.nan if again is None else reach(again.before, again.after, again.range).share,
+        correlated=_correlated(last, trace.stages[0].range),
     )
 
 
-def misfit(stage: StageTrace) -> float:
-    """Mean cost per match of a stage's last look, at the pose that fits its matches best; NaN without matches.
-
-    It varies between frames as much as with faults of the input, but for one frame it is lowest with the right lens.
-    """
-    return misfits(stage, ())[0]
-
-
 def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, float]:
-    """The `misfit`, and the lowest one with another lens fitted together with the pose.
+    """What the residuals of a stage's last matches cost, a match, after the pose that fits them best.
 
-    Both are equal if no lens explains the matches better.
+    Not a number where there are no matches. Between frames it varies as much as with what is wrong; for one frame it is
+    least with the right lens.
+
+    Returns:
+        The cost with the camera as given, and with whichever other lens explains the matches best, fitted together
+        with the pose; the second is the first where no lens explains them better.
     """
     matches, prior, origin = stage.matches, stage.range.information, stage.looked_from
     if matches is None or not len(matches.points):
@@ -130,15 +110,8 @@ def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, 
     return alone.cost / len(matches.points), min(alone.cost, *bent, math.inf) / len(matches.points)
 
 
-def _stated(stage: StageTrace) -> float:
-    """Logarithm of the standard deviation of the translation that a stage states, in centimetres."""
-    if stage.information is None:
-        return math.nan
-    return math.log(100 * math.sqrt(np.trace(np.linalg.inv(stage.information)[:3, :3])))
-
-
 def _correlated(stage: StageTrace, searched: MiscalibrationRange) -> float:
-    """The same if a stage's matches have correlated errors."""
+    """Logarithm of the deviation of the translation, in centimetres, if a stage's matches also err alike."""
     if stage.matches is None or not len(stage.matches.points):
         return math.nan
     covariance = correlated_covariance(stage.matches, stage.camera, searched.information)

@@ -85,11 +85,8 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
     for line in summary.lines():
         tell(line)
     if outputs.file is not None and summary.frames:
-        for line in [
-            *size_lines(outputs.file, summary.frames),
-            *saved_lines(outputs, summary.frames),
-            *next_lines(outputs.file),
-        ]:
+        tell(size_line(outputs.file, summary.frames))
+        for line in [*saved_lines(outputs, summary.frames), *next_lines(outputs.file)]:
             tell(line)
         if report is not None:
             from inspector.cli.report import write_report_of
@@ -109,9 +106,9 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
     return ExitCode.OK
 
 
-def size_lines(file: Path, frames: int) -> list[str]:
-    """The line that says what a frame's bytes go to; none for a recording without an index."""
+def size_line(file: Path, frames: int) -> str:
+    """What a frame's bytes go to."""
     from inspector.read.sizes import sizes_by_group
 
     parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
-    return [f"Kilobytes a frame: {', '.join(parts)}."] if parts else []
+    return f"Kilobytes a frame: {', '.join(parts)}."

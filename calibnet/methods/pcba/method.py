@@ -117,8 +117,7 @@ class PCBA:
         for schedule in (TURN, ALL):
             rounds += self._rounds(drive, planes, schedule, extrinsic, initial)
             extrinsic = rounds[-1][1].camera_from_lidar
-        change = extrinsic @ invert(initial)
-        if not self.range.contains(change, FARTHEST):
+        if not self.range.contains(initial @ invert(extrinsic), FARTHEST):
             turned, shifted = moved(initial, extrinsic)
             raise CalibrationError(
                 f"pcba ends {turned:.1f}° and {shifted:.0f} cm from the start, far out of the range "

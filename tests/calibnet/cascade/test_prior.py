@@ -52,8 +52,6 @@ def test_fixed_axes_stay_in_a_drive_whose_edges_are_aligned(frame: Frame) -> Non
         assert estimate is not None
         assert all(abs(moved(estimate.camera_from_lidar)[axis]) < 0.02 for axis in "xyz")
     assert held.translation_cm < 0.01 < free.translation_cm
-    assert free.free is None and held.free is not None
-    assert held.free.translation_cm > 0.1, "without what is known"
     assert held.verdict is not None and held.verdict.covariance is not None
 
 

@@ -21,6 +21,7 @@ from calibnet.geometry import (
     rotation_from_vector,
     transform,
 )
+from calibnet.geometry.prior import Prior
 from calibnet.geometry.visibility import as_one_scan
 from calibnet.trace import CascadeTrace
 from tests.support.pillars import scan
@@ -149,8 +150,9 @@ def test_an_upright_camera_is_left_as_it_is(degrees):
     assert upright.undo(trace, initial) is trace
 
 
-def cascade() -> Cascade:
-    return Cascade([Stage(number, RANGES[number - 1], tiny_network(seed=number, stage=number)) for number in (4, 5)])
+def cascade(prior: Prior | None = None) -> Cascade:
+    stages = [Stage(number, RANGES[number - 1], tiny_network(seed=number, stage=number)) for number in (4, 5)]
+    return Cascade(stages, prior=prior)
 
 
 def rolled(frame: Frame, quarters: int) -> Frame:
@@ -177,6 +179,19 @@ def test_a_camera_on_its_head_or_side_is_calibrated_as_one_that_stands(quarters)
         assert one.information is not None and other.information is not None
         axes = np.kron(np.eye(2), turn[:3, :3])
         np.testing.assert_allclose(other.information, axes @ one.information @ axes.T, rtol=1e-3, atol=1.0)
+
+
+@pytest.mark.parametrize("quarters", [0, 1])
+def test_a_frame_is_explained_with_what_is_known_of_it_as_it_is_calibrated(quarters):
+    frame, initial = make_frame(3), roll(90 * quarters) @ DELTA @ REFERENCE
+    frame = rolled(frame, quarters) if quarters else frame
+    known = cascade(Prior.of("x", translation_m=0.02))
+    calibrated, explained = known.calibrate(frame, initial).verdict, known.explain(frame, initial)
+    assert calibrated.covariance is not None and explained.covariance is not None
+    np.testing.assert_allclose(explained.camera_from_lidar, calibrated.camera_from_lidar, atol=1e-12)
+    np.testing.assert_allclose(explained.covariance, calibrated.covariance, rtol=1e-9, atol=1e-15)
+    held = explained.camera_from_lidar @ np.linalg.inv(initial)
+    assert abs(held[0, 3]) < 1e-3 < np.sqrt(explained.covariance[1, 1]) < 0.03, "x of the camera as it is mounted"
 
 
 def test_a_drive_of_a_camera_on_its_head_is_solved_as_one_that_stands():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,12 +49,6 @@ def test_the_predictors_are_how_other_lenses_fit_the_finest_look_and_a_coarse_on
     assert max(straight.fine_focal_gain, straight.fine_center_gain, straight.coarse_radial_gain) < 0.02
 
 
-def test_the_look_from_where_the_run_arrived_is_the_finest() -> None:
-    straight, shorter = seen(lambda places: places), seen(lambda places: 0.97 * places)
-    again = said(replace(straight, again=shorter.stages[-1]))
-    assert asdict(again) == asdict(said(replace(straight, stages=(*straight.stages[:2], shorter.stages[-1]))))
-
-
 def test_probabilities_are_those_of_the_fitted_odds() -> None:
     found = replace(said(seen(lambda places: places)), fine_focal_gain=0.2, fine_center_gain=0.1, fine_radial_gain=0.0)
     odds = np.exp([0.0, 2.0, 0.0, -2.0])  # none, then each fault
@@ -71,7 +65,7 @@ def test_probabilities_are_those_of_the_fitted_odds() -> None:
         (lambda places: 1.03 * places, ["focal-length"], "% longer"),
         (lambda places: places + np.array([0.05, 0]), ["principal-point"], "of the width farther to the right"),
         (lambda places: places - np.array([0.05, 0]), ["principal-point"], "of the width farther to the left"),
-        (barrel, BARREL, "looks barrel-distorted"),
+        (barrel, BARREL, "looks barrel-shaped"),
     ],
 )
 def test_the_likeliest_fault_is_named_with_its_direction(
@@ -79,7 +73,7 @@ def test_the_likeliest_fault_is_named_with_its_direction(
 ) -> None:
     found = lens_causes(seen(bend), LENS_ODDS)
     assert [cause.name for cause in found] == names
-    assert all(text in cause.text and "%, by a regression fitted to" in cause.evidence for cause in found)
+    assert all(text in cause.text and "% likely" in cause.evidence for cause in found)
 
 
 def test_nothing_is_named_that_is_not_likely_enough_or_cannot_be_told() -> None:

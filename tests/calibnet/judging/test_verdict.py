@@ -9,8 +9,7 @@ import pytest
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import load_coefficients
-from calibnet.judging.predictors import Predictors, misfit, misfits, predictors, reach
-from calibnet.trace import CascadeTrace
+from calibnet.judging.predictors import Predictors, misfits, predictors, reach
 from calibnet.verdict import BadFrame, Cause, Verdict, moved
 from calibnet.weights.manifest import load_manifest
 from tests.support.drive import REFERENCE
@@ -57,48 +56,29 @@ def test_predictors_of_a_run_that_fits_and_of_one_that_does_not() -> None:
     guess = miscalibration([1, 2, 3], [0.1, 0.2, -0.25]) @ REFERENCE
     fits = run(guess, REFERENCE, matches(np.eye(4), noise=0.5))
     found = predictors(fits)
-    assert found.match_error == found.earlier_error == pytest.approx(np.log(1.5))
-    assert found.reach == pytest.approx(0.6)
+    assert found.match_error == pytest.approx(np.log(1.5))
     bent = matches(np.eye(4), lambda places: places * (1 - 0.3 * (places**2).sum(axis=1, keepdims=True)), noise=0.5)
     wrong = predictors(run(guess, REFERENCE, bent))
     assert wrong.misfit > found.misfit + 0.5
     assert wrong.lens < -0.5 < -0.05 < found.lens <= 0
     curved = run(guess, REFERENCE, bent).stages[-1]
     (alone, bent), (fitting, _) = misfits(curved), misfits(fits.stages[-1])
-    assert bent < 0.5 * alone and misfits(fits.stages[-1])[1] > 0.95 * fitting and misfit(curved) == alone
-
-
-def test_a_look_again_counts_instead_of_the_last_one() -> None:
-    trace, other = (
-        run(REFERENCE, REFERENCE, matches(np.eye(4)), 3.0),
-        run(REFERENCE, REFERENCE, matches(np.eye(4)), 1.0),
-    )
-    again = predictors(replace(trace, again=other.stages[-1]))
-    assert (again.match_error, again.earlier_error) == (pytest.approx(0.0), pytest.approx(np.log(3)))
-    assert again.again_reach == 0 and np.isnan(predictors(trace).again_reach)
-
-
-def test_how_far_the_last_stage_went_and_what_it_states() -> None:
-    moved = miscalibration([0, 0.5, 0], [0, 0, 0.02]) @ REFERENCE
-    last = replace(run(REFERENCE, moved, matches(np.eye(4))).stages[1], number=5, range=RANGES[4])
-    found = predictors(CascadeTrace(REFERENCE, (last,)))
-    assert found.last_reach == pytest.approx(0.5, abs=0.02)  # of ±1 degree
-    assert found.stated == pytest.approx(np.log(100 * np.sqrt(1 / 4e4 + 1 / 4e4 + 1 / 1e4)))
+    assert bent < 0.5 * alone and misfits(fits.stages[-1])[1] > 0.95 * fitting
 
 
 def test_without_matches_the_predictor_is_missing_and_the_probability_is_not_a_number() -> None:
     trace = run(REFERENCE, REFERENCE)
-    assert np.isnan(misfit(trace.stages[-1]))
+    assert np.isnan(misfits(trace.stages[-1])).all()
     classifier = Classifier(0.0, {"misfit": 1.0}, 0.1, 0.9)
     assert np.isnan(classifier(predictors(trace)))
 
 
-NOTHING = Predictors(*[0.0] * 9)
+NOTHING = Predictors(*[0.0] * 4)
 
 
 def test_the_classifier_is_a_logistic_regression() -> None:
-    classifier = Classifier(1.0, {"reach": 2.0, "match_error": -1.0}, 0.1, 0.9)
-    assert classifier(replace(NOTHING, match_error=0.5, reach=1.0)) == pytest.approx(1 / (1 + np.exp(-2.5)))
+    classifier = Classifier(1.0, {"misfit": 2.0, "match_error": -1.0}, 0.1, 0.9)
+    assert classifier(replace(NOTHING, match_error=0.5, misfit=1.0)) == pytest.approx(1 / (1 + np.exp(-2.5)))
 
 
 def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_find_worse_results_likelier_wrong() -> None:
@@ -106,7 +86,7 @@ def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_find_wor
     assert coefficients.missing == "", "fit them again: calib-inspect fit-verdict"
     classifier = coefficients.frame
     assert classifier is not None and 0 < classifier.accepted_below < classifier.rejected_above <= 1
-    good = Predictors(np.log(1.6), np.log(1.9), np.log(0.008), -0.02, np.log(0.3), np.log(2.0), 0.6, 0.3, 0.1)
-    bad = Predictors(1.6, 1.6, -3.5, -0.2, np.log(0.9), np.log(5.0), 1.1, 1.2, 1.0)
+    good = Predictors(np.log(1.6), np.log(0.008), -0.02, np.log(2.0))
+    bad = Predictors(1.6, -3.5, -0.2, np.log(5.0))
     assert classifier(good) < classifier.accepted_below < classifier(bad)
     assert coefficients.fitted["frames"]["false_accept_rate"] <= 0.01
