@@ -39,6 +39,8 @@ OTHERS = (
     "<?xml version='1.0'?><opencv_storage><image_width>400</image_width><image_height>120</image_height>"
     "<K type_id='opencv-matrix'><rows>3</rows><cols>3</cols><dt>d</dt><data>232 0 200 0 232 60 0 0 1</data></K>"
     "<D>0 0 0 0 0</D></opencv_storage>",
+    "<robot><joint type='fixed'><parent link='velodyne'/><child link='cam_optical'/><origin xyz='0.2 0 -0.1' "
+    "rpy='-1.57 0 -1.57'/></joint></robot>",
 )
 """Whole calibrations as other tools write them."""
 VALUES = {

@@ -54,6 +54,10 @@ def read(
         DatasetError: something is missing, or cannot be right.
     """
     given = None if guess is None else read_calibration(guess, wanted)
+    if given is not None and given.camera is None and given.camera_from_lidar is None:
+        raise DatasetError(
+            f"Calibration {guess} says neither where the LiDAR is nor what the camera is; give one that does."
+        )
     remarks: list[Implausible | None] = []
     if given is not None and given.camera is not None and info is None:
         camera = given.camera

@@ -17,7 +17,7 @@ def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> Calibration
     """Read a calibration file.
 
     Known are our ``calibration.yaml``, ROS's ``camera_info``, Kalibr's ``camchain``, OpenCV's ``FileStorage``,
-    CamOdoCal's (KITTI-360's fisheyes), koide3's ``calib.json``, lists of transforms such as ``/tf_static``, and
+    CamOdoCal's (KITTI-360's fisheyes), koide3's ``calib.json``, lists of transforms such as ``/tf_static``, URDF, and
     Autoware's.
 
     Args:

@@ -1,4 +1,4 @@
-"""The text of a calibration file as nested mappings, lists and numbers: YAML, JSON, and OpenCV's YAML, XML and JSON."""
+"""The text of a calibration file as nested mappings, lists and numbers: YAML, JSON, XML, and OpenCV's kind of each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from calibnet.datasets.calibration_files import urdf
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import parse_json, parse_yaml, read_text
 
@@ -39,7 +40,10 @@ def parse(path: Path) -> Parsed:
     start = text.lstrip()
     if start.startswith("<"):
         try:
-            return Parsed({child.tag: _xml_value(child) for child in ElementTree.fromstring(text)}, True)
+            root = ElementTree.fromstring(text)
+            if root.tag in urdf.ROOTS:
+                return Parsed(urdf.transforms_of(root, path), False)
+            return Parsed({child.tag: _xml_value(child) for child in root}, True)
         except (ElementTree.ParseError, RecursionError) as error:
             line = error.position[0] if isinstance(error, ElementTree.ParseError) else 1
             raise DatasetError(f"Calibration {path} is not valid XML (line {line}); write it again.") from None

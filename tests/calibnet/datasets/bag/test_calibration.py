@@ -127,3 +127,10 @@ def test_a_file_that_does_not_say_the_size_gets_that_of_the_images(tmp_path: Pat
     frame = Bag([path], BagOptions(guess=guess))[0]
     assert (frame.camera.width, frame.camera.height) == (128, 48)
     assert_allclose(frame.camera_from_lidar, FRAME.camera_from_lidar, atol=1e-6)
+
+
+def test_a_file_that_says_nothing_is_refused(tmp_path: Path) -> None:
+    path, guess = bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}), tmp_path / "launch.yaml"
+    guess.write_text("launch: [{node: {pkg: tf2_ros}}]\n")
+    with pytest.raises(DatasetError, match="says neither where the LiDAR is nor what the camera is"):
+        Bag([path], BagOptions(guess=guess))
