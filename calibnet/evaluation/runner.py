@@ -16,7 +16,7 @@ from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, WORDS
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,6 @@ class Evaluation:
             "seed": self.seed,
             "frames": self.frames,
             "failed": self.failed,
-            "unconfirmed": self.verdicts[REJECTED],  # its former name
             "verdicts": {word.replace(" ", "_"): count for word, count in self.verdicts.items()},
             "accepted": None if self.accepted is None else self.accepted.as_dict(),
             "initial": self.initial.as_dict(),
@@ -163,7 +162,7 @@ class Evaluation:
         if self.audit:
             content["audit"] = {name: metrics.as_dict() for name, metrics in self.audit.items()}
             content["audit_arrived"] = {name: metrics.as_dict() for name, metrics in self.audit_arrived.items()}
-            content["audit_unconfirmed"] = content["audit_rejected"] = self.audit_rejected
+            content["audit_rejected"] = self.audit_rejected
             content["audit_images"] = self.audit_images
         return content
 

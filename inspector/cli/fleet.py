@@ -91,10 +91,10 @@ def fleet(
 
     if workers is not None and scheduler is not None:
         raise click.UsageError("Give --workers or --scheduler, not both.")
-    if any(map(is_url, (out, *sources))):
-        require_extra("fsspec")
     common = f"--frames {shlex.quote(frames)} {options}" if frames else options
     drives = find_drives(sources, common)
+    if any(map(is_url, (out, *(drive.path for drive in drives)))):
+        require_extra("fsspec")
     store = Store(out if is_url(out) else str(Path(out).absolute()))
     run = secrets.token_hex(8)
     tasks = [Task(drive, store, str(detail), force, run) for drive in drives]

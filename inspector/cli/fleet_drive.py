@@ -21,7 +21,8 @@ from calibnet.runtime.reading import protecting_inputs, read_file
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import keeping_others
 from inspector.cli.errors import environment_sentence
-from inspector.cli.sequences import judged_options, over_sequences
+from inspector.cli.run_options import verify_options
+from inspector.cli.sequences import over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
@@ -30,7 +31,7 @@ from inspector.fleet.table import FAILED, METRICS, PAGE, RECORDING, VERDICT, Row
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence
 
-DECIDED = ("save", "headless", "serve", "bind", "connect", "report", "json_file", "overwrite", "per_frame")
+DECIDED = ("save", "serve", "bind", "connect", "report", "json_file", "overwrite")
 """Options of `verify` that the fleet decides itself."""
 LOG = "log.txt"
 LONGEST_JSON = 64 << 20
@@ -201,7 +202,7 @@ def _given(metrics: Path) -> tuple[float, ...] | None:
 def _commands(act: Callable[..., int]) -> click.Group:
     """The subcommands of `verify`, with another action."""
     group = click.Group("verify")
-    over_sequences(group, act, judged_options)
+    over_sequences(group, act, lambda _: verify_options(), "Verify")
     return group
 
 

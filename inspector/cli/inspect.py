@@ -32,12 +32,12 @@ def calibrate_opened(opening: Opening, **asked: Any) -> int:
     return calibrate(opening(), **asked)
 
 
-over_sequences(runs, calibrate_opened, run_options, "Calibrate")
+over_sequences(runs, calibrate_opened, lambda source: run_options(source.given), "Calibrate")
 
 
 @runs.command()
 @length_option
-@run_options
+@run_options()
 def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> int:
     """Calibrate a drive through the synthetic world: needs no data.
 

@@ -114,7 +114,7 @@ def live_opened(opening: Opening, keeping: Keeping, **asked: Any) -> int:
     return serve_live(opening(), keeping, **asked)
 
 
-over_sequences(live, live_opened, live_options, "On")
+over_sequences(live, live_opened, lambda _: live_options, "Explore")
 
 
 def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:

@@ -20,44 +20,54 @@ from inspector.cli.options import (
     SEED,
     STAGES,
 )
-from inspector.cli.viewing import viewing_options
-from inspector.run.options import DEFAULT_RANGE
+from inspector.cli.output import JSON_FILE
+from inspector.cli.viewing import viewing_options, windowless_options
+from inspector.run.options import DEFAULT_RANGE, MANY_FRAMES
 
-_OPTIONS: tuple[Callable[..., Any], ...] = (
-    click.option(
-        "--frames",
-        type=FRAMES,
-        help="Positions to run, for instance 0:100:5, or : for all.  [default: all; of more than 200, 200 of them]",
-    ),
-    click.option(
-        "--range",
-        type=RANGE,
-        help=f"Draw the miscalibration from ± these degrees and metres.  [default: {DEFAULT_RANGE}]",
-    ),
-    click.option(
-        "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
-    ),
-    click.option("--per-frame", is_flag=True, help="Draw one for every frame, not one for the run."),
-    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
-    click.option(
-        "--drive/--no-drive",
-        default=None,
-        help="After the frames, solve the one extrinsic of the whole drive from all of them: the best there is.  "
-        "[default: with several frames on one mount]",
-    ),
-    click.option("--sequence-estimate/--no-sequence-estimate", "drive", default=None, hidden=True),  # its former name
-    click.option(
-        "--on-bad-frame",
-        type=click.Choice(["skip", "stop"]),
-        default="skip",
-        show_default=True,
-        help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
-    ),
-    *KNOWN_OPTIONS,
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def start_options(given: bool, every: str) -> tuple[Decorator, ...]:
+    """Which frames are run, and from which extrinsic.
+
+    Args:
+        given: without a miscalibration the run starts from the dataset's extrinsic as it is.
+        every: the frames that are run by default, in words.
+    """
+    undisturbed = "none: the calibration as it is" if given else str(DEFAULT_RANGE)
+    return (
+        click.option(
+            "--frames",
+            type=FRAMES,
+            help=f"Positions to run, for instance 0:100:5, or : for all.  [default: {every}]",
+        ),
+        click.option(
+            "--range",
+            type=RANGE,
+            help=f"Draw the miscalibration from ± these degrees and metres.  [default: {undisturbed}]",
+        ),
+        click.option(
+            "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
+        ),
+        click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
+        *KNOWN_OPTIONS,
+    )
+
+
+NETWORK_OPTIONS: tuple[Decorator, ...] = (
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
-    *METHOD_OPTIONS,
-    click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
+    click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]"),
+)
+"""Which networks run."""
+BAD_FRAME_OPTION: Decorator = click.option(
+    "--on-bad-frame",
+    type=click.Choice(["skip", "stop"]),
+    default="skip",
+    show_default=True,
+    help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
+)
+RECORDING_OPTIONS: tuple[Decorator, ...] = (
     click.option(
         "--detail",
         type=DETAIL,
@@ -83,11 +93,63 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
     ),
 )
+"""What is recorded of each frame, and the report."""
+PER_FRAME_OPTION: Decorator = click.option(
+    "--per-frame", is_flag=True, help="Draw another miscalibration for every frame, not one for the run."
+)
+DRIVE_OPTION: Decorator = click.option(
+    "--drive/--no-drive",
+    default=None,
+    help="After the frames, solve the one extrinsic of the whole drive from all of them: the best there is.  "
+    "[default: with several frames on one mount]",
+)
+JSON_OPTION: Decorator = click.option(
+    "--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The result as JSON; - for stdout."
+)
+FEW = f"all; of more than {MANY_FRAMES}, {MANY_FRAMES} of them"
 
 
-def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command all options of a calibration run; it passes them on to `calibrate`, under the same names."""
-    command = viewing_options(command)
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
+def run_options(given: bool = False) -> Decorator:
+    """Give a command all options of a calibration run; it passes them on to `calibrate`, under the same names.
+
+    Args:
+        given: see `start_options`.
+    """
+    return _all(
+        *start_options(given, FEW),
+        PER_FRAME_OPTION,
+        DRIVE_OPTION,
+        BAD_FRAME_OPTION,
+        *NETWORK_OPTIONS,
+        *METHOD_OPTIONS,
+        *RECORDING_OPTIONS,
+        viewing_options,
+    )
+
+
+def verify_options() -> Decorator:
+    """Give a command the options that `verify` has for every kind of data."""
+    return _all(
+        *start_options(True, FEW),
+        BAD_FRAME_OPTION,
+        *NETWORK_OPTIONS,
+        *RECORDING_OPTIONS,
+        JSON_OPTION,
+        windowless_options,
+    )
+
+
+def watch_options() -> Decorator:
+    """Give a command the options that `watch` has for every kind of data."""
+    return _all(*start_options(True, "all"), *NETWORK_OPTIONS, JSON_OPTION, windowless_options)
+
+
+def _all(*options: Decorator) -> Decorator:
+    """Some options in this order."""
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate

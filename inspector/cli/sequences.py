@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.output import JSON_FILE
-from inspector.cli.run_options import run_options
+from inspector.cli.run_options import Decorator
 from inspector.cli.source import Source
 from inspector.cli.sources import SOURCES
 
@@ -17,35 +16,32 @@ if TYPE_CHECKING:
     from calibnet.datasets import Sequence
 
 Opening = Callable[[], "Sequence"]
-Options = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-def over_sequences(group: click.Group, act: Callable[..., int], options: Options, verb: str = "Of") -> None:
+def over_sequences(
+    group: click.Group,
+    act: Callable[..., int],
+    options: Callable[[Source], Decorator],
+    verb: str,
+    sources: Iterable[Source] = SOURCES,
+) -> None:
     """Give a group a subcommand for every kind of data.
 
     Args:
         group: that they belong to.
         act: called with what opens the sequence, and with the options; returns the exit code.
-        options: gives a command those that do not depend on the data.
+        options: for a kind of data, gives a command the options that do not say what is opened.
         verb: how the help of each begins, before the data's name.
+        sources: the kinds of data.
     """
-    for source in SOURCES:
-        group.add_command(_command(source, act, options, verb))
+    for source in sources:
+        group.add_command(_command(source, act, options(source), verb))
 
 
-def judged_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command all options of a calibration run, and ``--json``."""
-    json_option = click.option(
-        "--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The result as JSON; - for stdout."
-    )
-    decorated: Callable[..., Any] = json_option(run_options(command))
-    return decorated
-
-
-def _command(source: Source, act: Callable[..., int], options: Options, verb: str) -> click.Command:
+def _command(source: Source, act: Callable[..., int], options: Decorator, verb: str) -> click.Command:
     def run(**asked: Any) -> int:
         opened = {name: asked.pop(name) for name in names}
-        if not source.one_mount and asked.get("drive", True) is None:
+        if not source.one_mount and asked.get("drive") is None:
             asked["drive"] = False
         as_is = source.given and not disturbed(asked)
         return act(partial(source.open, **opened), camera=opened.get("camera"), as_is=as_is, **asked)

@@ -13,7 +13,8 @@ from inspector.cli.errors import VERDICT_CODES, ExitCode
 from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
 from inspector.cli.run import checked, choose_outputs, finish, recording_to
-from inspector.cli.sequences import Opening, disturbed, judged_options, over_sequences
+from inspector.cli.run_options import verify_options
+from inspector.cli.sequences import Opening, disturbed, over_sequences
 
 if TYPE_CHECKING:
     from calibnet.verdict import Verdict
@@ -47,8 +48,6 @@ def verify_sequence(
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
-    if asked["per_frame"]:
-        raise click.UsageError("verify judges one calibration; --per-frame draws another for every frame.")
     prepare_json(json_file)
     from calibnet.judging.verify import named_cause, unfit
     from inspector.run.verify import UNKNOWN
@@ -61,7 +60,13 @@ def verify_sequence(
             raise
         return conclude(unfit(UNKNOWN, str(error), causes), json_file)
     options = checked(sequence, {**asked, "as_is": not disturbed(asked)})
-    options = replace(options, drive=options.drive or len(options.positions) > 1)  # nothing else can verify several
+    several = len(options.positions) > 1
+    if several and options.drive is False:
+        raise click.UsageError(
+            f"The frames of {sequence.name} are of several mounts, and verify judges one calibration; "
+            "choose one frame, for instance with --frames 0."
+        )
+    options = replace(options, drive=several)
     return verify_run(options, json_file, viewing, report)
 
 
@@ -71,7 +76,7 @@ def verify_run(options: RunOptions, json_file: str | None, viewing: Viewing, rep
     from inspector.run.verify import verify_session
 
     record = bool(viewing.save or report or viewing.serve or viewing.connect)
-    outputs = choose_outputs(options, replace(viewing, headless=True), report) if record else Outputs()
+    outputs = choose_outputs(options, viewing, report) if record else Outputs()
     with recording_to(outputs):
         verdict, summary = verify_session(prepare(options, outputs, verify=True), record)
         if summary is None:
@@ -91,4 +96,4 @@ def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> Ex
     return VERDICT_CODES[verdict.word]
 
 
-over_sequences(verify, verify_sequence, judged_options)
+over_sequences(verify, verify_sequence, lambda _: verify_options(), "Verify")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,15 +19,17 @@ if TYPE_CHECKING:
 
 RECORDINGS = Path("recordings")
 
-_OPTIONS: tuple[Callable[..., Any], ...] = (
-    click.option(
+_OPTIONS: Mapping[str, Callable[..., Any]] = {
+    "save": click.option(
         "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording to this file."
     ),
-    click.option("--headless", is_flag=True, help="Open no window."),
-    click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
-    click.option("--bind", default="127.0.0.1", show_default=True, help="Address that --serve listens on."),
-    click.option("--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."),
-)
+    "headless": click.option("--headless", is_flag=True, help="Open no window."),
+    "serve": click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
+    "bind": click.option("--bind", default="127.0.0.1", show_default=True, help="Address that --serve listens on."),
+    "connect": click.option(
+        "--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -66,14 +68,21 @@ class Viewing:
 
 def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of `Viewing`, which it gets as one, ``viewing``."""
-    names = [field.name for field in fields(Viewing) if field.name != "keep"]
+    return _as_one(command, _OPTIONS)
 
+
+def windowless_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The same without ``--headless``, for a command that opens no window of its own accord."""
+    return _as_one(command, {name: _OPTIONS[name] for name in _OPTIONS if name != "headless"}, headless=True)
+
+
+def _as_one(command: Callable[..., Any], options: Mapping[str, Callable[..., Any]], **fixed: Any) -> Callable[..., Any]:
     @wraps(command)
     def packed(**given: Any) -> Any:
-        return command(viewing=Viewing(**{name: given.pop(name) for name in names}), **given)
+        return command(viewing=Viewing(**{name: given.pop(name) for name in options}, **fixed), **given)
 
     decorated: Callable[..., Any] = packed
-    for option in (overwrite_option, *reversed(_OPTIONS)):
+    for option in (overwrite_option, *reversed([*options.values()])):
         decorated = option(decorated)
     return decorated
 
@@ -95,17 +104,21 @@ def next_lines(file: Path, rig: bool = False) -> list[str]:
     ]
 
 
-def saved_lines(outputs: Outputs, frames: int) -> list[str]:
-    """What to say about a recording that was written, and about an earlier one of its name."""
+def saved_lines(outputs: Outputs, frames: int = 0) -> list[str]:
+    """What to say about a recording that was written, if one was, and about an earlier one of its name.
+
+    Args:
+        outputs: where it went.
+        frames: that it has, where each has a size of its own.
+    """
     from inspector.programs import open_command
 
-    assert outputs.file is not None
-    file, size = outputs.file, outputs.file.stat().st_size
+    if outputs.file is None:
+        return []
+    file, size = outputs.file, outputs.file.stat().st_size / 1e6
     replacing = " in place of an earlier recording" if outputs.replaced else ""
-    lines = [
-        f"Saved {file}{replacing} ({size / 1e6:.1f} MB, {size / frames / 1e6:.2f} MB a frame).",
-        f"Open it with: {open_command(file)}",
-    ]
+    each = f", {size / frames:.2f} MB a frame" if frames else ""
+    lines = [f"Saved {file}{replacing} ({size:.1f} MB{each}).", f"Open it with: {open_command(file)}"]
     return lines if outputs.earlier is None else [*lines, earlier_line(outputs)]
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
@@ -12,7 +10,10 @@ from inspector.cli.errors import ExitCode
 from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
 from inspector.cli.run import checked, choose_outputs, recording_to
-from inspector.cli.sequences import Opening, disturbed, judged_options, over_sequences
+from inspector.cli.run_options import watch_options
+from inspector.cli.sequences import Opening, disturbed, over_sequences
+from inspector.cli.sources import SOURCES
+from inspector.cli.viewing import saved_lines
 
 if TYPE_CHECKING:
     from calibnet.cascade.cascade import Cascade
@@ -34,22 +35,15 @@ def watch() -> None:
     """
 
 
-def watch_sequence(
-    opening: Opening, *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
-) -> int:
+def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing, **asked: Any) -> int:
     """Watch a sequence; returns the exit code.
 
     Args:
         opening: opens the sequence.
         json_file: where the result goes as JSON.
         viewing: where the recording is shown and kept, if anywhere.
-        report: not made here.
         **asked: fields of `RunOptions`.
     """
-    if asked["per_frame"]:
-        raise click.UsageError("watch looks for moves of the mount; --per-frame moves it in every frame.")
-    if report is not None:
-        raise click.UsageError("watch makes no report; keep its recording with --save FILE.rrd.")
     prepare_json(json_file)
     from inspector.mount_changes import CANNOT_TELL, CHANGED, as_json, sentences, word
     from inspector.record.outputs import Outputs
@@ -58,7 +52,7 @@ def watch_sequence(
         opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}
     )
     record = bool(viewing.save or viewing.serve or viewing.connect)
-    outputs = choose_outputs(options, replace(viewing, headless=True), None) if record else Outputs()
+    outputs = choose_outputs(options, viewing, None) if record else Outputs()
     with recording_to(outputs):
         session = prepare(options, outputs, verify=True)
         watched = watch_session(session)
@@ -73,7 +67,7 @@ def watch_sequence(
                 say(remark, err=True)
             outputs.complete()
         write_json(json_file, as_json(watched))
-        for line in lines:
+        for line in [*saved_lines(outputs), *lines]:
             say(line, err=json_file == "-")
         if outputs.page is not None:
             say(f"Serving at {outputs.page} until Ctrl-C.", err=json_file == "-")
@@ -99,4 +93,5 @@ def watch_session(session: Session) -> Watched:
         return watch_drive(cast("Cascade", session.cascade), session.frames, initial, drive_observer(progress, stop))
 
 
-over_sequences(watch, watch_sequence, judged_options)
+DRIVES = [source for source in SOURCES if source.one_mount]
+over_sequences(watch, watch_sequence, lambda _: watch_options(), "Watch", DRIVES)

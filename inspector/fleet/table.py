@@ -23,8 +23,7 @@ from inspector.fleet.drives import Drive
 
 TABLE = "fleet.parquet"
 FAILED = "failed"
-WORDS = (FAILED, "rejected", "cannot tell", "accepted")
-"""Words for a drive by itself, worst first."""
+"""Word for a drive that could not be read or calibrated."""
 ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
 APART: ByCar = "apart"
 """Word for a drive that says something else than the others of its car."""

@@ -19,7 +19,7 @@ def charts(figures: Figures) -> str:
     if len(figures.run.frames) == 1:
         return ""
     what = figures.measure
-    ends = [figures.initial, figures.corrected] if figures.run.stages else [figures.initial]
+    ends = [figures.initial, figures.corrected]
     curves = [_curve(figures, quantity, what) for quantity in (ROTATION, TRANSLATION)]
     bars = [_bars(ends, quantity, what) for quantity in (ROTATION, TRANSLATION)]
     return (

@@ -157,7 +157,6 @@ class Figures:
             "versions": run.provenance,
             "weights": {str(number): record for number, record in run.weights.items()},
             "frames": len(run.frames),
-            "unconfirmed": self.rejected,  # its former name
             "verdicts": self._verdicts(),
             "verdict_of_given": None if run.given_verdict is None else run.given_verdict.as_dict(),
             "verdict_of_drive": None if run.drive_verdict is None else run.drive_verdict.as_dict(),

@@ -24,7 +24,7 @@ SETTING_NAMES = {
     "seed": "seed",
     "stages": "stages",
     "preset": "network",
-    "sequence_estimate": "solved as one drive",
+    "drive": "solved as one drive",
     "detail": "recorded detail",
     "calib_inspect": "calib-inspect",
 }

@@ -218,7 +218,7 @@ class RunOptions:
             "detail": str(self.detail or (self._level if self.parts is None else Detail.FULL)),
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),
-            "sequence_estimate": self.solves_drive,
+            "drive": self.solves_drive,
             **self.labels,
         }
 

@@ -64,7 +64,7 @@ def test_rows_measure_where_the_cascade_ended_whatever_the_verdict() -> None:
     evaluation = evaluate_frames(ShrinkingCascade(doubted=frozenset({1})), [Drive([0, 1, 2])], RANGE, repeats=2, seed=7)
     assert evaluation.verdicts == {"accepted": 4, "rejected": 2, "cannot tell": 0}
     assert evaluation.as_dict()["verdicts"] == {"accepted": 4, "rejected": 2, "cannot_tell": 0}
-    assert evaluation.as_dict()["unconfirmed"] == 2
+    assert evaluation.as_dict()["verdicts"]["rejected"] == 2
     for run in evaluation.runs:
         assert (run.verdict == "rejected") == (run.frame == 1) == (run.applied == run.initial)
         assert run.stages[4].yaw_deg == pytest.approx(0.5)

@@ -182,9 +182,8 @@ class AskedError(BaseException):
     """Raised instead of running, with what was asked for."""
 
 
-@pytest.mark.parametrize("option", ["--drive", "--sequence-estimate"])
-def test_a_drive_is_solved_by_default_and_under_the_new_name_and_the_former(
-    invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch, option: str
+def test_several_frames_of_one_mount_are_solved_as_a_drive_by_default(
+    invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from inspector.run.session import Session
 
@@ -194,23 +193,21 @@ def test_a_drive_is_solved_by_default_and_under_the_new_name_and_the_former(
     monkeypatch.setattr(Session, "run", run)
     one = ("--frames", "0")
     for given, drive in (
-        ((option,), True),
+        (("--drive",), True),
         ((), True),
         (one, False),
-        ((option, *one), True),
-        ((f"--no{option[1:]}",), False),
+        (("--drive", *one), True),
+        (("--no-drive",), False),
     ):
         with pytest.raises(AskedError) as asked:
             invoke("folder", str(own_folder), "--save", "own.rrd", *given)
         assert asked.value.args == (drive,), given
-    code, _, err = invoke("folder", str(own_folder), option, "--range", "5/0.5", "--per-frame")
+    code, _, err = invoke("folder", str(own_folder), "--drive", "--range", "5/0.5", "--per-frame")
     assert code == 2 and "--drive needs one mount" in err
 
 
-def test_help_does_not_show_the_former_name(invoke: Invoke) -> None:
-    shown = invoke("raw", "--help")[1]
-    assert "--drive" in shown and "--sequence-estimate" not in shown
-    assert "Usage: calib-inspect raw [OPTIONS] DATE DRIVE" in shown
+def test_help_names_what_a_drive_is_told_by(invoke: Invoke) -> None:
+    assert "Usage: calib-inspect raw [OPTIONS] DATE DRIVE" in invoke("raw", "--help")[1]
 
 
 def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke, own_folder: Path) -> None:

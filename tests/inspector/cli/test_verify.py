@@ -207,9 +207,22 @@ def test_the_table_of_a_single_frame_begins_with_it(invoke: Invoke, own_folder: 
     assert text.as_py()[0].startswith("# Calibration as given: rejected\n\nThe calibration is off by 2.00°")
 
 
-def test_one_calibration_is_verified_not_one_a_frame(invoke: Invoke, own_folder: Path) -> None:
-    code, _, err = invoke("folder", str(own_folder), "--range", "5/0.5", "--per-frame")
-    assert code == 2 and "verify judges one calibration" in err
+@pytest.mark.parametrize("save", [(), ("--save", "why.rrd")])
+def test_frames_of_several_mounts_are_verified_one_at_a_time(
+    invoke: Invoke, kitti_folder: Path, save: tuple[str, ...]
+) -> None:
+    root = str(kitti_folder / "object")
+    code, _, err = invoke("object", "--root", root, *save)
+    assert code == 2 and "several mounts" in err and "--frames 0" in err
+    code, out, err = invoke("object", "--root", root, "--frames", "0", *save)
+    assert code in (0, 1, 4), err
+    assert out.splitlines()[-1].startswith("Verdict: ")
+
+
+def test_verify_has_no_option_that_it_would_refuse_or_ignore(invoke: Invoke) -> None:
+    shown = invoke("folder", "--help")[1]
+    for option in ("--per-frame", "--method", "--drive", "--headless", "--intrinsics", "--masks"):
+        assert option not in shown
 
 
 def test_kitti_is_verified_as_it_is(invoke: Invoke, kitti_folder: Path) -> None:

@@ -70,7 +70,9 @@ def test_json_and_recording_hold_the_estimate_over_the_drive(
     monkeypatch.setattr(watching, "watch_drive", lambda *_: STEP)
     file = tmp_path / "watch.rrd"
     assert run(cli, ["watch", "folder", str(own), "--json", "-", "--save", str(file)]) == 1
-    content = json.loads(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    assert f"Saved {file} (" in printed.err
+    content = json.loads(printed.out)
     (change,) = content["changes"]
     assert content["result"] == "changed" and abs(change["frame"] - 50) <= 2 and change["confidence"] > 0.999
     assert change["rotation_deg"] == pytest.approx(0.5, abs=0.15)
@@ -97,9 +99,17 @@ def test_a_run_has_a_tab_that_says_so_of_its_drive(
     assert list(RrdReader(tmp_path / "short.rrd").store().stream().filter(content="/watch/result")) == []
 
 
-def test_what_watch_does_not_do_is_wrong_usage(own: Path, tmp_path: Path) -> None:
-    assert run(cli, ["watch", "folder", str(own), "--per-frame"]) == 2
-    assert run(cli, ["watch", "folder", str(own), "--report", str(tmp_path / "report")]) == 2
+def test_watch_has_no_option_that_it_would_refuse_or_ignore(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, ["watch", "folder", "--help"]) == 0
+    shown = capsys.readouterr().out
+    for option in ("--per-frame", "--method", "--no-drive", "--headless", "--report", "--log"):
+        assert option not in shown
+    assert "[default: none: the calibration as it is]" in " ".join(shown.split())
+
+
+def test_frames_of_several_mounts_cannot_be_watched(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, ["watch", "object"]) == 2
+    assert "No such command 'object'" in capsys.readouterr().err
 
 
 def test_a_drive_of_three_frames_cannot_be_told(own: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -59,7 +59,7 @@ def test_rejected_frames_are_told(record: Callable[..., Any], tmp_path: Path) ->
     for doubted in ((1,), (0, 1, 2)):
         record(tmp_path / "run.rrd", detail="overview", strides=(32,), doubted=doubted)
         figures = Figures.of(read_run(tmp_path / "run.rrd"))
-        assert figures.rejected == figures.as_dict()["unconfirmed"] == len(doubted)
+        assert figures.rejected == figures.as_dict()["verdicts"]["rejected"] == len(doubted)
         content = figures.as_dict()
         assert content["verdicts"] == {"accepted": 3 - len(doubted), "rejected": len(doubted), "cannot_tell": 0}
         assert content["verdict_of_drive"] is None
