@@ -6,18 +6,27 @@ graphics card takes long for every view.
 
 from __future__ import annotations
 
+import rerun as rr
 import rerun.blueprint as rrb
 
-from inspector import entities
+from inspector import colors, entities
 from inspector.record.contents import Contents
-from inspector.record.observation import Layout, Observation
+from inspector.record.observation import Grid, Layout, Observation, StageLayout
+from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs import cost_volumes
-from inspector.record.tabs.cost_volumes import LEGEND_WINDOW, WINDOW
-from inspector.record.tabs.views import View, image_view, legend, scale_name
+from inspector.record.tabs.cost_volumes import WINDOW
+from inspector.record.tabs.views import View, legend, scale_name
 
 NAME = "Why there?"
+LEGEND = "legend/matches"
 LEGEND_SHARE = 0.12
+TITLE = "title"
+"""Name of a stage's window, above it: a title bar of Rerun's has no room for it beside its buttons."""
+TITLE_CELLS = 0.8
+"""Cells from a window to its title."""
+TITLE_COLOR: colors.Rgb = (90, 155, 240)
+"""To be read on the labels of both themes."""
 
 
 def wanted(layout: Layout) -> bool:
@@ -26,22 +35,41 @@ def wanted(layout: Layout) -> bool:
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log nothing: *Cost volumes* logs the windows and their legend."""
+    """Log the titles of the windows, which *Cost volumes* logs, and what their marks stand for."""
+    names = {"where the point was": colors.INITIAL, "where it was found": colors.FOUND}
+    log_names(rec, LEGEND, names | ({"where it belongs": colors.REFERENCE} if layout.has_reference else {}))
+    for stage in layout.stages_with_volumes:
+        grid = _finest(stage)
+        title = rr.Points2D(
+            [(grid.window / 2, -TITLE_CELLS)],
+            labels=[f"stage {stage.number}, {scale_name(grid)}"],
+            colors=TITLE_COLOR,
+            radii=0.0,
+            show_labels=True,
+        )
+        rec.log_once(entities.of_scale(stage.number, grid.stride, TITLE), title)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log nothing, as above."""
+    """Log nothing: *Cost volumes* does."""
 
 
 def view(layout: Layout) -> View:
-    """The window of the finest cells of every stage, in a row."""
-    windows = list[View]()
-    for stage in layout.stages_with_volumes:
-        finest = min(stage.grids, key=lambda grid: grid.stride)
-        windows.append(
-            image_view(
-                f"Stage {stage.number}, {scale_name(finest)}", entities.of_scale(stage.number, finest.stride, WINDOW)
-            )
-        )
-    marks = legend("Marks in the windows", LEGEND_WINDOW)
+    """The windows of the finest cells of all stages in a row."""
+    windows = [_window(stage.number, _finest(stage)) for stage in layout.stages_with_volumes]
+    marks = legend("Marks in the windows", LEGEND)
     return rrb.Vertical(rrb.Horizontal(*windows), marks, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=NAME)
+
+
+def _finest(stage: StageLayout) -> Grid:
+    return min(stage.grids, key=lambda grid: grid.stride)
+
+
+def _window(number: int, grid: Grid) -> View:
+    return rrb.Spatial2DView(
+        origin=f"/{entities.of_scale(number, grid.stride, WINDOW)}",
+        contents=["$origin/**", f"/{entities.of_scale(number, grid.stride, TITLE)}"],
+        name=f"Stage {number}, {scale_name(grid)}",
+        titlebar=False,
+        background=colors.GROUND,
+    )

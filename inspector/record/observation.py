@@ -14,7 +14,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, project_through
 from calibnet.geometry.projection import Projection
 from calibnet.geometry.types import Extrinsic, Vector3
-from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.trace import CascadeTrace, ScaleTrace, StageTrace
 from calibnet.verdict import Verdict
 from inspector.record.contents import Contents
 
@@ -121,11 +121,18 @@ class Observation:
 
 
 class Grid(NamedTuple):
-    """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width`` of them."""
+    """Cells of a cost volume: ``stride`` input pixels each, ``height`` by ``width``, ``window`` displacements in x."""
 
     stride: int
     height: int
     width: int
+    window: int
+
+    @classmethod
+    def of(cls, scale: ScaleTrace) -> Grid:
+        """Those of a scale of a stage."""
+        _, window, height, width = scale.volume.shape
+        return cls(scale.stride, height, width, window)
 
 
 @dataclass(frozen=True)
@@ -214,7 +221,7 @@ class Layout:
             StageLayout(
                 stage.number,
                 str(stage.range),
-                tuple(Grid(scale.stride, *scale.occupied.shape) for scale in contents.scales(stage.detail)),
+                tuple(map(Grid.of, contents.scales(stage.detail))),
                 tuple(exhibit.name for exhibit in stage.exhibits),
                 tuple(curve.name for curve in stage.curves),
             )

@@ -22,15 +22,27 @@ async function start() {
   hint.textContent = "Your first try is shown here: every stage's cost volumes, the scene in 3D, and more.";
 }
 
-// The viewer says a time as soon as it has something to show. Until then it draws some fifty blank pictures, and takes
-// in a little with each: without a graphics card a large one costs a second, so its canvas is small so long.
 function heard(event) {
-  if (event.type.startsWith("time")) {
-    hint.hidden = true;
-    canvas.className = "";
-  }
+  if (event.type.startsWith("time")) timed = true;
   parent.postMessage({ viewer: event }, page);
 }
+
+// The viewer takes in a little with every picture that it draws, of the first try for a hundred pictures long. Without a
+// graphics card a large one costs a second, so its canvas is small and unseen until it has said a time, which it does
+// when it knows what to show, and has had nothing to do for some pictures.
+const IDLE_MILLISECONDS = 4, IDLE_PICTURES = 4;
+const soon = requestAnimationFrame;
+let timed = false, idle = 0;
+
+window.requestAnimationFrame = (draw) => soon((time) => {
+  const began = performance.now();
+  draw(time);
+  idle = performance.now() - began < IDLE_MILLISECONDS ? idle + 1 : 0;
+  if (!timed || idle < IDLE_PICTURES) return;
+  window.requestAnimationFrame = soon;
+  hint.hidden = true;
+  canvas.className = "";
+});
 
 const waiting = [];
 const started = start().then(() => true, (error) => {

@@ -238,10 +238,15 @@ def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., L
         "type": "selection_change",
         "items": [{"entity_path": "/overlay/stage_5", "position": [u + 0.5, v + 0.5, 0]}],
     }
-    assert frame.locator("#hint").is_visible(), "until the viewer shows a time, it is blank"
+    assert frame.locator("#hint").is_visible(), "until the viewer says a time, it is blank"
     frame.evaluate("event => window.options.on_viewer_event(event)", event)
     frame.wait_for_function("window.given.length === 3")
     frame.evaluate("window.options.on_viewer_event({type: 'time_update', time: 0})")
+    assert frame.locator("#canvas").bounding_box()["width"] == 64, "it still takes in what it shows"  # type: ignore[index]
+    frame.evaluate(
+        "() => { const draw = () => requestAnimationFrame(draw); draw(); }"
+    )  # pictures without anything to do
+    frame.wait_for_function("document.getElementById('canvas').clientWidth > 64")
     assert frame.locator("#hint").is_hidden()
 
 

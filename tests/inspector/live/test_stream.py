@@ -42,6 +42,12 @@ def test_tries_lie_one_after_the_other_with_their_stages(tmp_path: Path) -> None
         files.append(tmp_path / f"{number}.rrd")
         files[-1].write_bytes(stream.piece(number))
     stream.close()
+    titles = [
+        chunk.to_record_batch()["Points2D:labels"].to_pylist()[0][0]
+        for chunk in RrdReader(files[0]).stream()
+        if str(chunk.entity_path).endswith("/title")
+    ]
+    assert sorted(titles) == [f"stage {stage}, 8 px cells" for stage in (3, 4, 5)]
     for number in (0, 1):
         steps = [time for time, _ in rows(files[number], "overlay/current", "Points2D:positions")]
         assert steps == [8 * number + stage for stage in (0, 3, 4, 5, 6, 7)]
