@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from calibnet.datasets.frame import Sequence
+from calibnet.datasets.published import options_of
 from calibnet.datasets.registry import open_sequence
 from calibnet.datasets.selection import PickedFrames, select_frames
 from calibnet.errors import DatasetError
@@ -79,18 +79,5 @@ def _opened(drive: ListedDrive, file: Path) -> Sequence:
             f"{file}: {name} is a bag, lies elsewhere or has a calibration of its own (--guess), which training does "
             "not read; leave it out of the list."
         )
-    sequence = open_sequence(drive.dataset, drive.path, **_options(drive))
+    sequence = open_sequence(drive.dataset, drive.path, **options_of(drive.dataset, drive.sequence, drive.camera))
     return PickedFrames(sequence, select_frames(sequence, drive.selection)) if drive.selection else sequence
-
-
-def _options(drive: ListedDrive) -> Mapping[str, Any]:
-    """Which sequence and camera of the dataset it is."""
-    words, kitti = drive.sequence.split(), drive.dataset.startswith("kitti-")
-    camera: Mapping[str, Any] = {}
-    if drive.camera or kitti:
-        camera = {"camera": int(drive.camera or 2) if kitti else drive.camera}
-    if drive.dataset == "kitti-raw":
-        return {"date": words[0], "drive": words[1], **camera}
-    if drive.dataset == "kitti-object":
-        return {"split": drive.sequence or "training", **camera}
-    return {"sequence": drive.sequence, **camera} if kitti else camera

@@ -73,7 +73,7 @@ class Task:
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Arguments of `calib-inspect verify` but for its outputs; options of the drive come last and count more."""
+        """Arguments of `calib-inspect verify` but for its outputs."""
         command, *rest = self.drive.arguments()
         return (command, "--detail", self.detail, *rest)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from calibnet.datasets.published import PUBLISHED
 from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER
 
@@ -28,10 +29,6 @@ class Source:
         open: opens it; what it raises is a `CalibnetError`.
         given: its extrinsic is what is to be corrected, and no reference, unless a miscalibration is asked for.
         one_mount: all its frames are of one extrinsic.
-        dataset: its name for `open_sequence`; empty where that knows none.
-        parts: options of the dataset that ``evaluate --sequences`` names, with slashes between them.
-        example: of such a name; the parts that it has are needed.
-        whole: the name where none is given; None where one is needed.
     """
 
     name: str
@@ -41,22 +38,9 @@ class Source:
     open: Callable[..., Sequence]
     given: bool = False
     one_mount: bool = True
-    dataset: str = ""
-    parts: tuple[str, ...] = ()
-    example: str = ""
-    whole: str | None = None
-
-    def named(self, text: str) -> dict[str, str]:
-        """The dataset's options for one of the names of ``evaluate --sequences``."""
-        words = text.split("/")
-        if not (self.example.count("/") < len(words) <= len(self.parts) and all(words)):
-            form = "/".join(self.parts).upper()
-            raise click.UsageError(f"{text!r} is not {form}, for instance {self.example}.")
-        return dict(zip(self.parts, words, strict=False))
 
 
 def published(
-    command: str,
     dataset: str,
     where: str,
     options: tuple[click.Parameter, ...],
@@ -67,8 +51,7 @@ def published(
     """A published data set, which lies below ``--root``.
 
     Args:
-        command: its name.
-        dataset: its name for `open_sequence`, which gets all options.
+        dataset: a name of `calibnet.datasets.published.PUBLISHED`; `open_sequence` gets all options.
         where: what it is called, and where it comes from, for the sentence that asks for ``--root``.
         options: besides ``--root``. An argument called ``number`` is the dataset's ``drive``, since ``--drive`` is
             an option of the run.
@@ -89,7 +72,14 @@ def published(
             )
         return open_sequence(dataset, root, **{"drive" if key == "number" else key: asked[key] for key in asked})
 
-    return Source(name=command, parameters=(*options, root_option), open=open_it, dataset=dataset, **more)
+    of_it = PUBLISHED[dataset]
+    return Source(
+        name=of_it.command,
+        parameters=(*options, root_option),
+        open=open_it,
+        one_mount=of_it.one_mount,
+        **more,
+    )
 
 
 def open_folder(

@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from calibnet.datasets import dataset_names
+from calibnet.datasets.published import PUBLISHED, options_of
+from calibnet.errors import ConfigError
 from inspector.cli.options import FOLDER
 from inspector.cli.source import Source, open_bag, open_folder, published
 
@@ -40,32 +41,23 @@ CAMERA_FRAME = click.Option(
     ["--camera-frame"], metavar="NAME", help="The camera's optical frame, among many in a calibration file or a bag."
 )
 LIDAR_FRAME = click.Option(["--lidar-frame"], metavar="NAME", help="The LiDAR's frame, likewise.")
-OTHERS = ("kitti-", "nuscenes")
-"""How the datasets begin that have commands of their own."""
 
 SOURCES = (
     published(
-        "seq",
         "kitti-odometry",
         KITTI.format("KITTI odometry"),
         (click.Argument(["sequence"]), CAMERA),
         of="a KITTI odometry sequence, for instance 04",
         note="--root is the folder that holds `sequences`.",
-        parts=("sequence",),
-        example="04",
     ),
     published(
-        "raw",
         "kitti-raw",
         KITTI.format("KITTI raw"),
         (click.Argument(["date"]), click.Argument(["number"], metavar="DRIVE"), CAMERA),
         of="a KITTI raw drive, for instance 2011_09_26 0005",
         note="--root is the folder that holds the dates.",
-        parts=("date", "drive"),
-        example="2011_09_26/0005",
     ),
     published(
-        "object",
         "kitti-object",
         KITTI.format("KITTI object detection"),
         (
@@ -76,23 +68,15 @@ SOURCES = (
         ),
         of="the frames of the KITTI object detection benchmark",
         note="--root is the folder that holds `training`. Its frames are of several mounts, so they are no drive.",
-        one_mount=False,
-        parts=("split",),
-        example="training",
-        whole="training",
     ),
     published(
-        "tracking",
         "kitti-tracking",
         KITTI.format("KITTI tracking"),
         (click.Argument(["sequence"]), CAMERA),
         of="a sequence of the KITTI tracking benchmark, for instance 0004",
         note="--root is the folder that holds `training`.",
-        parts=("sequence",),
-        example="0004",
     ),
     published(
-        "kitti360",
         "kitti-360",
         "KITTI-360 is unpacked (from cvlibs.net/datasets/kitti-360)",
         (
@@ -108,11 +92,8 @@ SOURCES = (
         variable="KITTI360_DATASET",
         of="a drive of KITTI-360, for instance 0003",
         note="--root is the folder that holds `calibration`, `data_2d_raw` and `data_3d_raw`.",
-        parts=("drive",),
-        example="0003",
     ),
     published(
-        "nuscenes",
         "nuscenes",
         "nuScenes is unpacked (from nuscenes.org)",
         (
@@ -133,9 +114,6 @@ SOURCES = (
         variable="NUSCENES",
         of="the keyframes of a scene of nuScenes, for instance scene-0061; the first one by default",
         note="--root is the folder that holds `samples` and the tables, `v1.0-mini`. Its SDK is not needed.",
-        parts=("scene", "camera"),
-        example="scene-0061",
-        whole="",
     ),
     Source(
         name="folder",
@@ -145,7 +123,7 @@ SOURCES = (
             click.Argument(["directory"], type=FOLDER),
             click.Option(
                 ["--dataset"],
-                type=click.Choice([name for name in dataset_names() if not name.startswith(OTHERS)]),
+                type=click.Choice([name for name in dataset_names() if name not in PUBLISHED]),
                 default="folder",
                 show_default=True,
                 help="What the folder holds; packages can add to these.",
@@ -220,15 +198,16 @@ def open_parts(dataset: str, root: Path, names: list[str], camera: str | None) -
     """
     from calibnet.datasets import open_sequence
 
-    options: dict[str, Any] = {}
-    if camera is not None:
-        options["camera"] = int(camera) if camera.isdecimal() else camera
-    source = next((one for one in SOURCES if one.dataset == dataset), None)
-    if source is None:
+    published = PUBLISHED.get(dataset)
+    if published is None:
+        options = options_of(dataset, "", camera or "")
         return [open_sequence(dataset, root / name, **options) for name in names or [os.curdir]]
-    if not names and source.whole is None:
+    if not names and published.whole is None:
         raise click.UsageError(
-            f"--sequences is needed with --dataset {dataset}, for instance --sequences {source.example}."
+            f"--sequences is needed with --dataset {dataset}, for instance --sequences {published.example}."
         )
-    parts: list[Mapping[str, Any]] = [source.named(name) for name in names] or [{source.parts[0]: source.whole}]
-    return [open_sequence(dataset, root, **{**options, **part}) for part in parts]
+    try:
+        asked = [options_of(dataset, name, camera or "") for name in names or [""]]
+    except ConfigError as error:
+        raise click.UsageError(str(error)) from None
+    return [open_sequence(dataset, root, **options) for options in asked]

@@ -15,16 +15,15 @@ from typing import Annotated, ClassVar
 from annotated_types import Len
 
 from calibnet.datasets import dataset_names
+from calibnet.datasets.published import PUBLISHED, Published
 from calibnet.errors import ConfigError
 from calibnet.runtime.reading import TEXT_BYTES, read_text
 from calibnet.runtime.schema import validated
 from calibnet.runtime.text import file_name, one_line
 
-BAG = "bag"
+BAG, FOLDER = "bag", "folder"
 PATH_OPTIONS = ("--guess", "--weights")
 """Options of a drive that name files: relative to its list, like its path."""
-COMMANDS = {"kitti-odometry": "seq", "kitti-raw": "raw", "kitti-object": "object", "kitti-tracking": "tracking"}
-"""Datasets that have a command of their own; ``folder`` reads all others."""
 MOST_DRIVES = 1_000_000
 REMEDY = "docs/fleet.md says what a list of drives holds"
 
@@ -59,10 +58,11 @@ class Drive:
         date: when it was driven, ISO 8601, or empty; drives of a car are in this order.
         dataset: a name of `calibnet.datasets.dataset_names`, or ``"bag"``.
         path: folder or file, absolute, or a URL that fsspec knows.
-        sequence: of a dataset that has several below its folder: ``"04"``, ``"2011_09_26 0005"``, a split.
+        sequence: of a dataset that has several below its folder: ``"04"``, ``"2011_09_26/0005"``.
         camera: which one, where there are several; empty for the default.
         frames: which of them, as ``--frames`` has it; empty for the default.
-        options: further options of ``calib-inspect verify``, in words.
+        common: options of ``calib-inspect verify`` for every drive, in words; everything else here counts more.
+        options: further ones of this drive, which count most.
         origin: where it is named, for messages.
     """
 
@@ -74,6 +74,7 @@ class Drive:
     sequence: str = ""
     camera: str = ""
     frames: str = ""
+    common: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     origin: str = ""
 
@@ -99,18 +100,26 @@ class Drive:
         Args:
             path: where its data lies, if that is not its own path.
         """
-        path = self.path if path is None else path
-        command = BAG if self.dataset == BAG else COMMANDS.get(self.dataset, "folder")
-        if command in (BAG, "folder"):
-            arguments = [command, path]
-            arguments += [] if self.dataset in (BAG, "folder") else ["--dataset", self.dataset]
-        elif command == "object":
-            arguments = [command, "--split", self.sequence or "training", "--root", path]
+        path, camera = self.path if path is None else path, self.camera
+        if self.dataset in PUBLISHED:
+            published = PUBLISHED[self.dataset]
+            named = published.named(self.sequence)
+            camera = camera or named.pop("camera", "")
+            arguments = [published.command, *named.values(), "--root", path]
+        elif self.dataset in (BAG, FOLDER):
+            arguments = [self.dataset, path]
         else:
-            arguments = [command, *self.sequence.split(), "--root", path]
-        arguments += ["--camera", self.camera] if self.camera else []
+            arguments = [FOLDER, path, "--dataset", self.dataset]
+        arguments += self.common  # of an option that is given twice the last one counts
+        arguments += ["--camera", camera] if camera else []
         arguments += ["--frames", self.frames] if self.frames else []
         return [*arguments, *self.options]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Patterns, below its path, of the files that belong to it; an empty one for all."""
+        of_it = PUBLISHED.get(self.dataset)
+        return ("",) if of_it is None else of_it.files_of(self.sequence, self.camera)
 
 
 def find_drives(sources: Sequence[str], options: str = "") -> list[Drive]:
@@ -118,7 +127,7 @@ def find_drives(sources: Sequence[str], options: str = "") -> list[Drive]:
 
     Args:
         sources: one ``.csv`` file, or folders of the plain layout.
-        options: further options of every drive; those of a row follow them and count more.
+        options: further options of every drive; what a row says counts more.
 
     Raises:
         ConfigError: a row cannot be right, or two drives have one name.
@@ -157,14 +166,12 @@ def _of_row(values: dict[str, str | list[str] | None], origin: str, base: Path, 
         raise ConfigError(f"{origin}: it has more fields than the first line names; {REMEDY}.")
     given = {str(name).strip(): str(value or "").strip() for name, value in values.items()}
     row = validated(_Columns, given, origin, ConfigError, REMEDY)
-    dataset = row.dataset or "folder"
+    dataset = row.dataset or FOLDER
     known = (*dataset_names(), BAG)
     if dataset not in known:
         raise ConfigError(f"{origin}: dataset {dataset!r} is unknown; choose one of {', '.join(known)}.")
-    if any(word.startswith("-") for word in row.sequence.split()):
-        raise ConfigError(f"{origin}: sequence {row.sequence!r} is none; {REMEDY}.")
-    if dataset in COMMANDS and dataset != "kitti-object" and not row.sequence:
-        raise ConfigError(f"{origin}: sequence is missing, which {dataset} needs; {REMEDY}.")
+    if dataset in PUBLISHED:
+        _check_sequence(PUBLISHED[dataset], dataset, row.sequence, origin)
     path = row.path if "://" in row.path else _absolute(base, row.path)
     place = PurePosixPath(path.replace(os.sep, "/").rstrip("/"))
     return Drive(
@@ -176,9 +183,28 @@ def _of_row(values: dict[str, str | list[str] | None], origin: str, base: Path, 
         sequence=row.sequence,
         camera=one_line(row.camera),
         frames=row.frames,
-        options=(*common, *_words(row.options, f"{origin}: options", base)),
+        common=tuple(common),
+        options=_words(row.options, f"{origin}: options", base),
         origin=origin,
     )
+
+
+def _check_sequence(published: Published, dataset: str, sequence: str, origin: str) -> None:
+    """Find out whether a row names a sequence of its dataset that is one drive.
+
+    Raises:
+        ConfigError: it does not.
+    """
+    if not published.one_mount:
+        raise ConfigError(f"{origin}: the frames of {dataset} are of several mounts, so none of it is a drive.")
+    if not sequence and published.whole is None:
+        raise ConfigError(f"{origin}: sequence is missing, for instance {published.example}; {REMEDY}.")
+    try:
+        named = published.named(sequence)
+    except ConfigError as error:
+        raise ConfigError(f"{origin}: {error}") from None
+    if any(word.startswith("-") for word in named.values()):
+        raise ConfigError(f"{origin}: sequence {sequence!r} must not begin with a dash; {REMEDY}.")
 
 
 def _of_folder(folder: Path, common: Sequence[str]) -> Drive:
@@ -186,7 +212,7 @@ def _of_folder(folder: Path, common: Sequence[str]) -> Drive:
     if not absolute.is_dir():
         raise ConfigError(f"{folder} is neither a folder nor a .csv file; give a list of drives, or folders of drives.")
     car, drive = one_line(absolute.parent.name or "car"), one_line(absolute.name)
-    return Drive(car, drive, "folder", str(absolute), options=tuple(common), origin=str(folder))
+    return Drive(car, drive, FOLDER, str(absolute), common=tuple(common), origin=str(folder))
 
 
 def _date(text: str, origin: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import os
 import stat
@@ -21,13 +20,6 @@ from calibnet.runtime.text import file_name, one_line
 from calibnet.runtime.writing import write_whole
 from inspector.fleet.drives import Drive
 
-PATTERNS = {
-    "kitti-odometry": ("sequences/{0}",),
-    "kitti-raw": ("{0}/{0}_drive_{1}_*", "{0}/calib_*.txt"),
-    "kitti-tracking": ("training/*/{0}", "training/*/{0}.txt"),
-}
-"""What belongs to one drive below the folder of a dataset that has many; all of it elsewhere."""
-
 
 def is_url(path: str) -> bool:
     """Whether a path is for fsspec."""
@@ -43,12 +35,6 @@ class Item:
     mark: str
 
 
-def patterns_of(drive: Drive) -> tuple[str, ...]:
-    """Which files below a drive's path belong to it."""
-    words = [glob.escape(word) for word in drive.sequence.split()]
-    return tuple(pattern.format(*words, "", "") for pattern in PATTERNS.get(drive.dataset, ("",)))
-
-
 def items_of(drive: Drive) -> list[Item]:
     """The files that a drive is made of, by name; those that its options name among them.
 
@@ -56,8 +42,8 @@ def items_of(drive: Drive) -> list[Item]:
         DatasetError: the place cannot be listed.
     """
     try:
-        items = _remote_items(drive) if is_url(drive.path) else _local_items(Path(drive.path), patterns_of(drive))
-        items += [item for named in _named(drive.options) for item in _local_items(Path(named), ("",), named)]
+        items = _remote_items(drive) if is_url(drive.path) else _local_items(Path(drive.path), drive.files)
+        items += [item for named in _guesses(drive) for item in _local_items(Path(named), ("",), named)]
     except (OSError, ValueError) as error:
         raise DatasetError(f"{drive.path} cannot be listed ({_reason(error)}); check the path.") from None
     return sorted(items, key=lambda item: item.path)
@@ -87,8 +73,8 @@ def content(folder: Path, drive: Drive) -> str:
         DatasetError: a file cannot be read.
     """
     digest = hashlib.sha256()
-    found = [(item.path, folder / item.path) for item in _local_items(folder, patterns_of(drive))]
-    found += [(named, Path(named)) for named in _named(drive.options)]
+    found = [(item.path, folder / item.path) for item in _local_items(folder, drive.files)]
+    found += [(named, Path(named)) for named in _guesses(drive)]
     for name, path in sorted(found):
         digest.update(name.encode(errors="surrogatepass") + b"\0")
         if not path.is_file():  # a fifo that nobody writes to is not waited for
@@ -243,7 +229,7 @@ def _files(start: Path) -> Iterator[Path]:
 def _remote_items(drive: Drive) -> list[Item]:
     system, root = _system(drive.path)
     found: dict[str, Item] = {}
-    for pattern in patterns_of(drive):
+    for pattern in drive.files:
         for start in sorted(system.glob(f"{root}/{pattern}")) if pattern else [root]:
             for name, info in system.find(start, detail=True).items():
                 relative = name[len(root) :].lstrip("/")
@@ -255,8 +241,9 @@ def _remote_items(drive: Drive) -> list[Item]:
     return list(found.values())
 
 
-def _named(options: Sequence[str]) -> list[str]:
-    """Files that options name: those of the initial guess."""
+def _guesses(drive: Drive) -> list[str]:
+    """Files that a drive's options name: those of the initial guess."""
+    options = (*drive.common, *drive.options)
     named = [value for option, value in pairwise(options) if option == "--guess"]
     return named + [word.removeprefix("--guess=") for word in options if word.startswith("--guess=")]
 

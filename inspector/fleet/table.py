@@ -135,7 +135,7 @@ def row_of(drive: Drive, **what_came: Any) -> Row:
         sequence=one_line(drive.sequence),
         camera=drive.camera,
         selection=one_line(drive.frames),
-        options=one_line(" ".join(drive.options)),
+        options=one_line(" ".join((*drive.common, *drive.options))),
         folder=drive.folder,
         **what_came,
     )

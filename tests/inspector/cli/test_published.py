@@ -8,6 +8,7 @@ from typing import Any
 import click
 import pytest
 
+from calibnet.datasets.published import PUBLISHED
 from inspector.cli import inspect as commands
 from inspector.cli.errors import run
 from inspector.cli.main import COMMANDS, cli
@@ -65,17 +66,16 @@ def test_they_can_be_verified_and_watched(group: str, command: str, capsys: pyte
     ],
 )
 def test_a_sequence_is_named_by_its_parts(dataset: str, text: str, options: dict[str, str]) -> None:
-    (source,) = (one for one in SOURCES if one.dataset == dataset)
-    assert source.named(text) == options
+    assert PUBLISHED[dataset].named(text) == options
 
 
 @pytest.mark.parametrize(
     ("dataset", "text"), [("kitti-raw", "0005"), ("kitti-raw", "2011_09_26/"), ("nuscenes", "a/b/c")]
 )
-def test_another_name_says_what_one_looks_like(dataset: str, text: str) -> None:
-    (source,) = (one for one in SOURCES if one.dataset == dataset)
-    with pytest.raises(click.UsageError, match=f"is not [A-Z/]+, for instance {source.example}"):
-        source.named(text)
+def test_another_name_says_what_one_looks_like(tmp_path: Path, dataset: str, text: str) -> None:
+    example = PUBLISHED[dataset].example
+    with pytest.raises(click.UsageError, match=f"is not [A-Z/]+, for instance {example}"):
+        open_parts(dataset, tmp_path, [text], None)
 
 
 def test_every_kind_of_data_is_a_command_of_its_own_and_below_the_others() -> None:

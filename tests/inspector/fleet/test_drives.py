@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from calibnet.datasets.published import PUBLISHED, options_of
 from calibnet.errors import ConfigError
+from inspector.cli.fleet_drive import Task, check_options
 from inspector.fleet.drives import Drive, find_drives
+from inspector.fleet.places import Store
 
 
 def listed(tmp_path: Path, text: str, options: str = "") -> list[Drive]:
@@ -28,28 +31,58 @@ def test_rows_are_the_commands_that_do_the_same_by_hand(tmp_path: Path) -> None:
         tmp_path,
         "car,drive,dataset,path,sequence,camera,frames,options\n"
         "a,1,kitti-odometry,kitti,04,2,0:9,--seed 1\n"
-        "a,2,kitti-raw,kitti,2011_09_26 0005,,,\n"
+        "a,2,kitti-raw,kitti,2011_09_26/0005,,,\n"
         "a,3,bag,drive.mcap,,,,\n"
         "a,4,folder,mine,,cam0,,--guess 'first guess.yaml'\n",
         "--stages 5",
     )
     root = str(tmp_path / "kitti")
     assert [drive.arguments() for drive in drives] == [
-        ["seq", "04", "--root", root, "--camera", "2", "--frames", "0:9", "--stages", "5", "--seed", "1"],
+        ["seq", "04", "--root", root, "--stages", "5", "--camera", "2", "--frames", "0:9", "--seed", "1"],
         ["raw", "2011_09_26", "0005", "--root", root, "--stages", "5"],
         ["bag", str(tmp_path / "drive.mcap"), "--stages", "5"],
         [
             "folder",
             str(tmp_path / "mine"),
-            "--camera",
-            "cam0",
             "--stages",
             "5",
+            "--camera",
+            "cam0",
             "--guess",
             str(tmp_path / "first guess.yaml"),
         ],
     ]
     assert drives[3].folder == "drives/a/4@cam0"
+
+
+def test_what_a_row_says_counts_more_than_what_is_said_of_all(tmp_path: Path) -> None:
+    common = "--frames : --camera 3 --seed 1"
+    (drive,) = listed(tmp_path, "path,frames,camera,options\nmine,0:5,2,--seed 7\n", common)
+    asked = check_options(Task(drive, Store(str(tmp_path / "out"))))
+    assert (asked["frames"], asked["camera"], asked["seed"]) == ("0:5", "2", 7)
+
+
+@pytest.mark.parametrize("dataset", PUBLISHED)
+def test_every_published_dataset_of_drives_can_be_in_a_list(tmp_path: Path, dataset: str) -> None:
+    published = PUBLISHED[dataset]
+    text = f"path,dataset,sequence,camera\ndata,{dataset},{published.example},1\n"
+    if not published.one_mount:
+        with pytest.raises(ConfigError, match=r"row 1 .*several mounts"):
+            listed(tmp_path, text)
+        return
+    (drive,) = listed(tmp_path, text)
+    asked = check_options(Task(drive, Store(str(tmp_path / "out"))))
+    assert (drive.arguments()[0], asked["root"], str(asked["camera"])) == (published.command, tmp_path / "data", "1")
+    asked["drive"] = asked.get("number")  # what the dataset calls so; the option --drive is of the run
+    opened = options_of(dataset, published.example, "")
+    assert opened.items() <= asked.items()
+
+
+def test_a_camera_of_nuscenes_may_stand_in_the_name_of_the_sequence(tmp_path: Path) -> None:
+    (drive,) = listed(tmp_path, "path,dataset,sequence\ndata,nuscenes,scene-0061/CAM_BACK\n")
+    root = str(tmp_path / "data")
+    assert drive.arguments() == ["nuscenes", "scene-0061", "--root", root, "--camera", "CAM_BACK"]
+    assert drive.files == ("*/*.json", "samples/CAM_BACK", "samples/LIDAR_TOP")
 
 
 @pytest.mark.parametrize(
@@ -62,7 +95,9 @@ def test_rows_are_the_commands_that_do_the_same_by_hand(tmp_path: Path) -> None:
         ("path,car\nx\ny,b,c\n", "row 2 .*more fields than the first line names"),
         ("path,dataset\nx,waymo\n", "row 1 .*dataset 'waymo' is unknown"),
         ("path,dataset\nx,kitti-raw\n", "row 1 .*sequence is missing"),
-        ("path,dataset,sequence\nx,kitti-odometry,04 --save=/etc/x\n", "row 1 .*is none"),
+        ("path,dataset,sequence\nx,kitti-odometry,04 --save=/etc/x\n", "row 1 .*is not SEQUENCE, for instance 04"),
+        ("path,dataset,sequence\nx,kitti-odometry,--save=x\n", "row 1 .*must not begin with a dash"),
+        ("path,dataset,sequence\nx,kitti-raw,0005\n", "row 1 .*is not DATE/DRIVE, for instance 2011_09_26/0005"),
         ("path,date\nx,yesterday\n", "row 1 .*date 'yesterday' is none"),
         ("path,options\nx,'\n", "row 1 .*options cannot be split"),
         ("path,drive\nx,one\ny,one\nx/../x,one\n", "row 3 .* and .*row 1 .*are both called"),

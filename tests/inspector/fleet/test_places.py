@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 
 from inspector.fleet.drives import Drive
 from inspector.fleet.places import content, items_of, on_this_machine, seen
+from tests.calibnet.datasets.published import write_kitti_360
 from tests.inspector.fleet.conftest import Invoke
 from tests.support.folder import write_folder
 from tests.support.judged_drives import JudgedCascade
@@ -109,6 +111,14 @@ def test_of_a_dataset_with_many_drives_only_its_own_files_count(tmp_path: Path) 
         (tmp_path / name).write_text(name)
     drive = Drive("car", "04", "kitti-odometry", str(tmp_path), sequence="04")
     assert [item.path for item in items_of(drive)] == ["sequences/04/calib.txt"]
+    assert items_of(replace(drive, sequence="4")) == items_of(drive)
+
+
+def test_files_of_a_drive_of_kitti_360_are_its_own_and_the_calibrations(tmp_path: Path) -> None:
+    write_kitti_360(tmp_path)
+    drive = Drive("car", "3", "kitti-360", str(tmp_path), sequence="3")
+    assert {item.path.split("/")[0] for item in items_of(drive)} == {"calibration", "data_2d_raw", "data_3d_raw"}
+    assert items_of(replace(drive, sequence="4")) == [one for one in items_of(drive) if one.path < "data"]
 
 
 def test_a_guess_is_input_as_well(tmp_path: Path) -> None:
