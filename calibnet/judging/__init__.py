@@ -1,1 +1,1 @@
-"""Judging what was found: predictors, causes, uncertainty, and from them a `calibnet.verdict.Verdict`."""
+"""Judging a result: predictors of an error, causes and covariance give a `calibnet.verdict.Verdict`."""

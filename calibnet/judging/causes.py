@@ -1,8 +1,9 @@
-"""Why picture and scan do not fit: whatever, done to what was given, makes them fit is the cause.
+"""Why picture and scan do not fit: faults are undone one at a time, and the one without which they fit is the cause.
 
-Each attempt undoes one fault. A mirrored or rolled picture and a scan in other axes keep the scan from being found in
-the picture at all, so a coarse stage's match error tells. That needs the network again for every attempt, which is for
-doubt and for `verify`, not for every frame. A wrong lens is told by the matches, see `calibnet.judging.lens_causes`.
+If the picture is mirrored or rolled, or the scan uses other axes, hardly anything can be matched, so the match error of
+a coarse stage shows whether undoing a fault helps. Every attempt runs the network again, so this is done for frames
+that are not accepted and in `verify`, not for every frame. A wrong lens is recognised from the matches of the run
+itself, see `calibnet.judging.lens_causes`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from calibnet.trace import CascadeTrace, StageTrace
 from calibnet.verdict import Cause
 
 Measure = Callable[[Frame, Extrinsic], float]
-"""How badly picture and scan of a frame fit, from a guess; raises `CalibrationError` where that cannot be told."""
+"""How badly picture and scan of a frame fit, from a guess; raises `CalibrationError` if nothing can be matched."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class Attempt:
     """A fault that a frame may have, and how to undo it.
 
     Attributes:
-        names: of the causes; two where the picture cannot tell which.
+        names: names of the cause; two if the input cannot distinguish them.
         text: a sentence for the user.
-        undo: of a frame.
+        undo: returns the frame without the fault.
     """
 
     names: tuple[str, ...]
@@ -43,13 +44,13 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Search:
-    """Attempts that are judged by one measure.
+    """Attempts that are compared by one measure.
 
     Attributes:
-        attempts: what is tried.
-        share: of the measure with what was given, below which an attempt is the cause.
-        most: that the measure may be with the fault undone.
-        unit: of the measure, for the evidence.
+        attempts: faults to undo.
+        share: an attempt is the cause only if it reduces the measure below this share of its original value,
+        most: and below this value.
+        unit: unit of the measure, for the evidence.
     """
 
     attempts: tuple[Attempt, ...]
@@ -59,13 +60,13 @@ class Search:
 
 
 def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> tuple[Cause, ...]:
-    """Undo every fault in turn, and name the one without which picture and scan fit best, if they fit clearly better.
+    """Undo one fault at a time, and name the one without which picture and scan fit best, if they fit clearly better.
 
     Args:
-        search: what is tried.
-        frame: as it was given.
+        search: the attempts.
+        frame: the original frame.
         guess: ``camera_from_lidar`` that the run started from.
-        measure: how badly they fit.
+        measure: how badly picture and scan fit.
     """
 
     def measured(altered: Frame) -> float:
@@ -81,12 +82,12 @@ def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> t
     if not least < search.share * given or not least < search.most:
         return ()
     before = "no match at all" if np.isinf(given) else f"{given:.3g} {search.unit}"
-    evidence = f"{least:.3g} {search.unit} with that undone, instead of {before}"
+    evidence = f"{least:.3g} {search.unit} without this fault, {before} with it"
     return tuple(Cause(name, best.text, evidence) for name in best.names)
 
 
 class Looking(Protocol):
-    """What attempts need of a `calibnet.cascade.stage.Stage`."""
+    """The part of `calibnet.cascade.stage.Stage` that attempts use."""
 
     def view(self, frame: Frame) -> Any:
         """The frame's image as the stage sees it."""
@@ -98,7 +99,7 @@ class Looking(Protocol):
 
 
 def match_error_of(stage: Looking) -> Measure:
-    """The geometric mean, in pixels, of what two looks of a stage expect, the second from where the first arrives."""
+    """Geometric mean of the match errors, in pixels, that two successive looks of a stage expect."""
 
     def measure(frame: Frame, guess: Extrinsic) -> float:
         view = stage.view(frame)
@@ -110,7 +111,7 @@ def match_error_of(stage: Looking) -> Measure:
 
 
 def reach_of(calibrate: Callable[[Frame, Extrinsic], CascadeTrace]) -> Measure:
-    """How far a run goes from the guess, in ranges searched; infinite where picture and scan do not fit there."""
+    """How far a run moves from the guess, relative to the range searched; infinite if picture and scan do not fit."""
 
     def measure(frame: Frame, guess: Extrinsic) -> float:
         trace = calibrate(frame, guess)
@@ -126,7 +127,7 @@ def mirrored(frame: Frame) -> Frame:
 
 
 def turned(degrees: float) -> Callable[[Frame], Frame]:
-    """Turn the picture clockwise about its principal point."""
+    """Rotate the picture clockwise about its principal point."""
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
@@ -139,7 +140,7 @@ def turned(degrees: float) -> Callable[[Frame], Frame]:
 
 
 def scan_moved(motion: Transform) -> Callable[[Frame], Frame]:
-    """Take the scan's points after a motion, 4x4."""
+    """Move the points of the scan by a transform, 4x4."""
 
     def undo(frame: Frame) -> Frame:
         positions = transform_points(motion, frame.points[:, :3].astype(np.float64))
@@ -149,7 +150,7 @@ def scan_moved(motion: Transform) -> Callable[[Frame], Frame]:
 
 
 def scan(rotation: Floats) -> Callable[[Frame], Frame]:
-    """Take ``rotation [3, 3]`` of the scan's points."""
+    """Rotate the points of the scan by ``rotation [3, 3]``."""
 
     def undo(frame: Frame) -> Frame:
         positions = frame.points[:, :3] @ rotation.T
@@ -178,6 +179,6 @@ def _picture_and_scan() -> Iterator[Attempt]:
 
 
 PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=18.0, unit="px of expected match error")
-"""By the match error of a coarse stage. Of 4 frames of 4 rigs, a mirrored picture and other axes undone came to 0.13 to
-0.5 of it, a rolled picture to 0.3 to 0.6; the best wrong attempt for a picture of another place to 0.5 once, and
-otherwise to 0.8 and more. Undone they are 8 to 12 px; a picture of another place came to 23."""
+"""Compared by the match error of a coarse stage. On 4 frames of 4 rigs, undoing a mirrored picture or other axes cut
+it to 0.13 to 0.5 of its value, undoing a rolled picture to 0.3 to 0.6. For a picture of another place the best attempt
+reached 0.5 once, and otherwise 0.8 and more. Without the fault it is 8 to 12 px; for a picture of another place 23."""

@@ -1,23 +1,23 @@
-"""How likely a result is wrong, by its predictors."""
+"""The probability that a result is wrong, given its predictors."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-LARGEST_ODDS = 50.0
-"""Of which the logarithm is taken: beyond it, probabilities are 0 and 1 all the same."""
+LARGEST_LOG_ODDS = 50.0
+"""Log odds are clipped to plus or minus this, beyond which probabilities are 0 and 1 in double precision anyway."""
 
 
 @dataclass(frozen=True)
 class Classifier:
-    """Logistic regression of a wrong result on the predictors.
+    """Logistic regression on predictors, with the two thresholds of the verdict.
 
     Attributes:
-        intercept: of the logarithm of the odds.
-        weights: of the predictors, by name.
-        accepted_below: probability of being wrong below which a result is accepted.
-        rejected_above: probability above which it is rejected; in between nobody can tell.
+        intercept: log odds of a wrong result if all predictors are 0.
+        weights: change of the log odds per unit of each predictor, by its name.
+        accepted_below: results with a smaller probability of being wrong are accepted.
+        rejected_above: results with a larger one are rejected; in between the verdict is *cannot tell*.
     """
 
     intercept: float
@@ -26,10 +26,10 @@ class Classifier:
     rejected_above: float
 
     def __call__(self, of: object) -> float:
-        """Probability that the result is wrong; not a number where a predictor is missing.
+        """Probability that a result is wrong; NaN if a predictor is NaN.
 
         Args:
-            of: what has the predictors as attributes: of a frame, or of a drive.
+            of: an object whose attributes are the predictors, `Predictors` or `DrivePredictors`.
         """
         odds = self.intercept + sum(weight * getattr(of, name) for name, weight in self.weights.items())
-        return odds if math.isnan(odds) else 1 / (1 + math.exp(-min(max(odds, -LARGEST_ODDS), LARGEST_ODDS)))
+        return odds if math.isnan(odds) else 1 / (1 + math.exp(-min(max(odds, -LARGEST_LOG_ODDS), LARGEST_LOG_ODDS)))

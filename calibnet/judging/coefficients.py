@@ -1,7 +1,7 @@
-"""What verdicts are made with: coefficients that were fitted to one set of weights, and hold for no other.
+"""Coefficients of the verdict, which are fitted to one set of weights and are valid for no other.
 
-They lie beside the manifest, in ``PRESET-verdict.toml``, which `calib-inspect fit-verdict` writes, and name the weights
-they belong to by fingerprints. Where a set has none of its own, nothing is accepted.
+`calib-inspect fit-verdict` writes them to ``PRESET-verdict.toml`` beside the manifest. They name the weights they
+belong to by fingerprints. With weights that have no coefficients, nothing is accepted.
 """
 
 from __future__ import annotations
@@ -35,14 +35,15 @@ class Coefficients:
     """Coefficients of the verdict.
 
     Attributes:
-        frame: how predictors of a frame are summed up; None where nothing was fitted.
-        covariance: how far results of frames lie from the truth.
-        lens: how likely faults of the lens are; None where that was not fitted, and then none is named.
-        drive: how predictors of a drive are summed up; None where that was not fitted.
-        inflation: by what a drive's stated covariance is multiplied, to be as large as its errors are.
-        weights: fingerprints of the stages that were run, by range; the finest of them ends a run that can be judged.
-        missing: a sentence that says why there are none; empty where there are.
-        fitted: what they were fitted to, and what came of it.
+        frame: classifier of frames; None if nothing was fitted.
+        covariance: covariance model of frames.
+        lens: regression that names faults of the lens; None if it was not fitted, so that none is named.
+        drive: classifier of drives; None if it was not fitted.
+        inflation: factor on the stated covariance of a drive that makes it as large as errors are.
+        weights: fingerprints of the stages that were run in the fit, by range. Only runs that end with the finest of
+            them can be judged.
+        missing: a sentence that says why there are no coefficients; empty if there are.
+        fitted: data and figures of the fit.
     """
 
     frame: Classifier | None = None
@@ -55,19 +56,19 @@ class Coefficients:
     fitted: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def for_frame(self, last: MiscalibrationRange) -> Classifier | str:
-        """How to sum up the predictors of a run, or a sentence that says why nothing can be said of it.
+        """The classifier of frames, or a sentence that says why a run cannot be judged.
 
         Args:
-            last: range of the stage that ended it.
+            last: range of the last stage of the run.
         """
         return self._fitted_to(last) or self.frame or self.missing
 
     def for_drive(self, last: MiscalibrationRange) -> Classifier | str:
-        """The same of a drive."""
-        return self._fitted_to(last) or self.drive or "To drives the verdict has not been fitted."
+        """The classifier of drives, or a sentence that says why a drive cannot be judged."""
+        return self._fitted_to(last) or self.drive or "The verdict on drives has not been fitted."
 
     def _fitted_to(self, last: MiscalibrationRange) -> str:
-        """Why a run that a stage ended cannot be judged; empty where it can."""
+        """Why a run that ends with a stage cannot be judged; empty if it can."""
         finest = min(self.weights, default=last)
         if self.frame is not None and last != finest:
             return f"The verdict was fitted to runs that end with the stage of {finest.label}, not with {last.label}."
@@ -90,14 +91,14 @@ class Coefficients:
 
 
 def coefficients_path(preset: str, folder: Path | None = None) -> Path:
-    """Where the coefficients of a preset's weights lie: in ``folder``, or in the package."""
+    """The file of the coefficients for a preset's weights, in ``folder`` or in the package."""
     return (folder or PACKAGE) / f"{preset}-verdict.toml"
 
 
 def load_coefficients(manifest: Manifest, folder: Path | None = None) -> Coefficients:
-    """The coefficients that were fitted to the weights in a folder; without any, `Coefficients.missing` says why.
+    """Load the coefficients fitted to the weights in a folder; if there are none, `Coefficients.missing` says why.
 
-    A copy of the weights that ship with the package needs no file of its own: the package's is for the same weights.
+    A copy of the shipped weights needs no file of its own, because the package's coefficients belong to it.
 
     Raises:
         WeightsError: a file of coefficients is malformed.
@@ -143,12 +144,12 @@ def _lens(content: dict[str, Any]) -> LensOdds:
     if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
         raise KeyError(f"faults of the lens are {', '.join(FAULTS)}")
     if unknown := {name for weights in odds.weights.values() for name in weights} - known:
-        raise KeyError(f"no predictor is called {', '.join(sorted(unknown))}")
+        raise KeyError(f"there is no predictor {', '.join(sorted(unknown))}")
     return odds
 
 
 def _classifier(content: dict[str, Any], predictors: type[Predictors | DrivePredictors]) -> Classifier:
     classifier = Classifier(**content)
     if unknown := classifier.weights.keys() - {field.name for field in fields(predictors)}:
-        raise KeyError(f"no predictor is called {', '.join(sorted(unknown))}")
+        raise KeyError(f"there is no predictor {', '.join(sorted(unknown))}")
     return classifier

@@ -1,8 +1,9 @@
-"""The uncertainty of a pose whose matches err alike: what networks get wrong varies slowly over a picture.
+"""The covariance of a pose whose matches have correlated errors.
 
-A thousand matches that share one error are no thousand predictors. Here each match errs independently, and all of them
-by a polynomial of their place in the picture besides; what such a polynomial can imitate (a turn, mostly, and what a
-long lens or a bare road shows of a shift) is known only as well as the polynomial is small.
+Errors of the networks vary slowly over a picture, so a thousand matches are not a thousand independent measurements.
+The model here adds to the independent error of each match a polynomial of its position in the picture, common to all
+matches. Whatever such a polynomial can imitate (mostly a rotation; with a long lens or on a bare road also a
+translation) is determined only to within the size of the polynomial.
 """
 
 from __future__ import annotations
@@ -15,18 +16,18 @@ from calibnet.judging.lens import INDEPENDENT, LEAST_SCALE_PX, view
 from calibnet.trace import Matches
 
 DEGREE = 3
-"""Degree of the polynomial; place is counted in halves of the picture's width from its principal point."""
+"""Degree of the polynomial of the position, which is relative to the principal point, in half widths of the picture."""
 SIGMA_PX = 1.0
-"""Standard deviation of each of its coefficients, pixels of the stage's camera."""
+"""Standard deviation of each coefficient of the polynomial, in pixels of the stage's camera."""
 
 
 def correlated_covariance(matches: Matches, camera: PinholeCamera, prior: Matrix6) -> Matrix6:
-    """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` if matches err independently and alike.
+    """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` if matches have independent and common errors.
 
     Args:
-        matches: of a look.
-        camera: of the stage that looked.
-        prior: information ``[6, 6]`` of the pose without them.
+        matches: of one look.
+        camera: of the stage.
+        prior: information ``[6, 6]`` about the pose before any match is used.
     """
     focal = np.array(camera.focal)
     scale = np.maximum(matches.scale.astype(np.float64), LEAST_SCALE_PX) / focal

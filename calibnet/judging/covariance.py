@@ -1,8 +1,8 @@
-"""The uncertainty of a single frame's result: what the last stage states, made as large as its errors are.
+"""The covariance of a single frame's result: that stated by the last stage, made as large as actual errors.
 
-The inverse of the stage's information counts every match as independent and knows nothing of what the networks get
-wrong alike in a whole picture. It is widened by one factor, and a common part is added. Both are fitted to one set of
-weights, see `calibnet.judging.coefficients`.
+The inverse of the stage's information treats every match as independent and ignores errors that the whole picture has
+in common. It is therefore inflated by one factor, and a common part is added. Both are fitted to one set of weights,
+see `calibnet.judging.coefficients`.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ PIXEL = 2.0
 
 @dataclass(frozen=True)
 class CovarianceModel:
-    """How far results lie from the truth.
+    """How the errors of results are distributed.
 
     Attributes:
-        independent: share of the matches that err independently.
-        common_translation_m: standard deviation, an axis, of what does not follow from the matches' own errors.
-        common_rotation_deg: likewise of the rotation.
+        independent: effective share of the matches whose errors are independent.
+        common_translation_m: standard deviation per axis of the common part, in metres.
+        common_rotation_deg: that of the rotation, in degrees.
     """
 
     independent: float = 1 / 20
@@ -43,10 +43,10 @@ class CovarianceModel:
         """Covariance ``[..., 6, 6]`` of ``(translation m, rotation rad)`` of a run's result, or of several.
 
         Args:
-            information: ``[..., 6, 6]`` as the last stage states it, its prior included.
-            last: its range, from which it takes that prior.
-            searched: the range around the guess: what is known without matches.
-            match_error_px: ``[...]`` that the last stage expects.
+            information: ``[..., 6, 6]`` stated by the last stage, including its prior.
+            last: range of the last stage, which determines that prior.
+            searched: range around the guess, the prior before any match is used.
+            match_error_px: ``[...]`` match error that the last stage expects.
         """
         matches = self.independent * (information - last.information)
         axes = np.repeat([self.common_translation_m, np.radians(self.common_rotation_deg)], 3)
@@ -55,9 +55,9 @@ class CovarianceModel:
 
 
 def covariance(trace: CascadeTrace, model: CovarianceModel) -> Matrix6 | None:
-    """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` of a run on a frame; None where no stage states one.
+    """Covariance ``[6, 6]`` of ``(translation m, rotation rad)`` of a frame's result, perturbed in the camera frame.
 
-    A perturbation of the result in the camera frame.
+    None if the last stage states no information.
     """
     last = trace.stages[-1]
     if last.information is None:

@@ -13,13 +13,13 @@ from calibnet.trace import MARGIN, DriveEstimate
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verdict, Word, moved
 
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
-"""Standard deviations, over all axes, beyond which the frames agree on too little."""
+"""Largest standard deviations, over all axes, of a drive that is judged."""
 FEWEST_JUDGED = 4
-"""Frames that a drive needs to be accepted: of two or three, which mostly show one place, as many end beyond the limits
-as within, and nothing tells which (docs/decisions.md, "Drives")."""
+"""Fewest frames of a drive that can be accepted. Two or three mostly show one place, most such drives end outside the
+limits, and no predictor tells which (docs/decisions.md, "Drives")."""
 HALVES_CM, ALIGNED_CM = 15.0, 7.0
-"""Between the halves of a drive, and between what its networks and its edges say, from which on it is told; turns
-counted as `calibnet.judging.drive_predictors` does."""
+"""Differences between the halves of a drive, and between its networks and its edges, above which the reason mentions
+them; rotations are converted as in `calibnet.judging.drive_predictors`."""
 
 
 def judge_drive(
@@ -29,9 +29,9 @@ def judge_drive(
 
     Args:
         estimate: of the drive.
-        initial: ``camera_from_lidar`` that it started from.
-        searched: the range that was to be searched around it.
-        classifier: as `calibnet.judging.coefficients.Coefficients.for_drive` has it; without one nothing is accepted.
+        initial: ``camera_from_lidar`` that the drive started from.
+        searched: range that was to be searched around the initial extrinsic.
+        classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
     """
     word, reason = _word(estimate, initial, searched, classifier)
     there = estimate.camera_from_lidar
@@ -49,33 +49,34 @@ def _word(
     turned, shifted = moved(initial, estimate.camera_from_lidar)
     if reach(initial, estimate.camera_from_lidar, searched).share > MARGIN:
         return REJECTED, (
-            f"It lies {turned:.2g}° and {shifted:.0f} cm from the start, out of the range that was to be searched, "
-            f"{searched.label}: a wrong lens or late scans look like that. If the start may be that far off, let all "
-            "stages run (--stages 1-5)."
+            f"The result lies {turned:.2g}° and {shifted:.0f} cm from the start, outside the range searched "
+            f"({searched.label}). A wrong lens or a time lag can cause this. If the start may be that far off, run all "
+            "stages (--stages 1-5)."
         )
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
         return CANNOT_TELL, (
-            f"The frames leave it open to {estimate.rotation_deg:.2g}° and {estimate.translation_cm:.0f} cm (one "
-            "standard deviation); more frames of other places help."
+            f"The frames determine the extrinsic only to {estimate.rotation_deg:.2g}° and "
+            f"{estimate.translation_cm:.0f} cm (one standard deviation); add frames of other places."
         )
     if isinstance(classifier, str):
-        return CANNOT_TELL, f"{used} frames agree, but how sure that is cannot be told. {classifier}"
+        return CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}"
     if used < FEWEST_JUDGED:
-        return CANNOT_TELL, f"{used} frames agree; to be sure of a drive takes {FEWEST_JUDGED}, better of other places."
+        needed = f"a drive needs {FEWEST_JUDGED} to be accepted, preferably of different places"
+        return CANNOT_TELL, f"{used} frames agree, but {needed}."
     predictors = drive_predictors(estimate)
     if predictors is None:
-        return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
+        return CANNOT_TELL, "Its frames hold too little information to judge the drive."
     wrong = classifier(predictors)
     if wrong < classifier.accepted_below:
         return ACCEPTED, f"{used} frames agree."
     if math.isnan(wrong):
-        return CANNOT_TELL, "What is told of its frames is not enough to judge the drive."
+        return CANNOT_TELL, "Its frames hold too little information to judge the drive."
     halves, aligned = halves_cm(estimate.looks), aligned_cm(estimate)
-    why = [f"its halves are {halves:.0f} cm apart"] if halves > HALVES_CM else []
+    why = [f"the halves of the drive differ by {halves:.0f} cm"] if halves > HALVES_CM else []
     if aligned > ALIGNED_CM:
-        why.append(f"edges lie {aligned:.0f} cm from what the networks say, and either may be right")
-    return CANNOT_TELL, (  # not rejected: many of those that are off are off by little more
-        f"{used} frames agree, but not as those of drives that end right do (that it is more than "
-        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off is {wrong:.0%} likely)"
+        why.append(f"edges and networks differ by {aligned:.0f} cm, and either may be right")
+    return CANNOT_TELL, (  # not rejected: many drives beyond the limits are only a little beyond them
+        f"{used} frames agree, but less well than in drives with a correct result (probability of being more than "
+        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off: {wrong:.0%})"
         f"{''.join(f'; {one}' for one in why)}."
     )

@@ -1,4 +1,4 @@
-"""What tells right from wrong of a drive: what its frames say together, and whether they say the same."""
+"""Predictors of a wrong result of a drive: how well its frames fit, and whether they agree."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from calibnet.judging.predictors import LEAST
 from calibnet.trace import DriveEstimate, DriveLook
 
 DEGREES_A_CENTIMETRE = 0.3 / 8
-"""Degrees that count as much as a centimetre: as in what a drive may be off."""
+"""Degrees that count as much as one centimetre, by the ratio of the limits of a drive."""
 
 
 @dataclass(frozen=True)
 class DrivePredictors:
-    """Numbers that grow with what speaks against a drive's extrinsic; not a number where it does not tell.
+    """Predictors of a wrong extrinsic of a drive; NaN where the estimate lacks the data.
 
     Attributes:
-        match_error: logarithm of the median match error of the last look, in pixels.
-        aligned: logarithm of how far the alignment of edges went from what the networks say, in centimetres.
+        match_error: logarithm of the frames' median match error in the last look, in pixels.
+        aligned: logarithm of how far the alignment of edges moved the networks' result, in centimetres.
     """
 
     match_error: float
@@ -31,7 +31,7 @@ class DrivePredictors:
 
 
 def drive_predictors(estimate: DriveEstimate) -> DrivePredictors | None:
-    """The predictors of a drive; None where a method tells nothing of its frames."""
+    """The predictors of a drive; None if the method reports no frames."""
     if not estimate.looks:
         return None
     match_error = float(np.median([look.match_error_px for look in estimate.looks]))
@@ -39,13 +39,13 @@ def drive_predictors(estimate: DriveEstimate) -> DrivePredictors | None:
 
 
 def aligned_cm(estimate: DriveEstimate) -> float:
-    """How far the alignment of edges went from what the networks say, in centimetres; 0 where nothing was aligned."""
+    """How far the alignment of edges moved the networks' result, in centimetres; 0 if nothing was aligned."""
     networks = estimate.networks or estimate
     return _distance(networks.camera_from_lidar, estimate.camera_from_lidar)
 
 
 def halves_cm(looks: tuple[DriveLook, ...]) -> float:
-    """How far what the first half of a drive says is from what the second says, in centimetres."""
+    """Distance between the results of the first and the second half of a drive, in centimetres."""
     middle = len(looks) // 2
     return apart(agreed(looks[:middle]), agreed(looks[middle:])) if middle else 0.0
 

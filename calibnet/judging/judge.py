@@ -1,4 +1,4 @@
-"""The verdict on one frame: cheap checks first, then what the run itself tells, then, where that was asked for, why."""
+"""The verdict on one frame: plausibility checks, then the run itself and, on request, the search for causes."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from calibnet.trace import MARGIN, CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
 
 FARTHEST_REACH = 1.6
-"""Ranges searched beyond which a run is surely wrong; between `MARGIN` and this it may have started outside them."""
+"""Reach beyond which a run is certainly wrong; between `MARGIN` and this it may have started outside the range."""
 UNRELATED_PX = 8.0
-"""Expected match error beyond which nothing in the picture belongs to the scan."""
+"""Expected match error beyond which picture and scan have nothing in common."""
 BLANK = 2.0
-"""Standard deviation of each colour under which a picture shows nothing."""
+"""Standard deviation of every colour channel below which a picture counts as blank."""
 
 
 def judge(
@@ -32,27 +32,27 @@ def judge(
     lag: tuple[Search, Measure] | None = None,
     prior: str = "",
 ) -> Verdict:
-    """Judge what a cascade made of a frame; the frame's own extrinsic is not looked at.
+    """Judge the cascade's result for a frame, without using the frame's own extrinsic.
 
     Args:
-        frame: that was calibrated.
-        guess: ``camera_from_lidar`` that it started from, 4x4.
-        trace: of the run; None where it could not be run because too few points fall into the picture.
-        coefficients: that were fitted to the weights; without any nothing is accepted.
-        match_error: given, it is found out why a result is not accepted: where picture and scan do not fit, by this
-            measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by the lens that the matches ask for.
-        lag: where they fit out of the range searched, and no lens explains it: `calibnet.judging.lag.lags` and how
-            far a run goes.
+        frame: the frame that was calibrated.
+        guess: ``camera_from_lidar`` that the run started from, 4x4.
+        trace: of the run; None if too few points fell into the picture to run it.
+        coefficients: fitted to the weights; without any nothing is accepted.
+        match_error: if given, causes are searched for a result that is not accepted: if picture and scan do not fit,
+            with this measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by fitting the lens to the matches.
+        lag: attempts of `calibnet.judging.lag.lags` and their measure, used if picture and scan fit outside the range
+            searched and no fault of the lens explains it.
         prior: what the user knows of the extrinsic beforehand, in words. The classifier was fitted to runs in which all
             six axes are free. Such runs err mostly along axes that a prior may fix, so with a prior it can accept a
             result, but never reject it.
     """
-    # Whether the cloud is several scans was asked, and remarked, when the frame was prepared.
+    # Accumulated clouds were already detected, and remarked on, when the frame was prepared.
     of_scan = ranges(frame.points), up(frame.points)
     checks = [*of_camera(frame.camera), *of_extrinsic(guess), *of_scan, bit_depth(frame.image)]
     seen = [remark for remark in checks if remark is not None]
     said = {remark.name for remark in seen}
-    remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in said)]  # those of when it was read
+    remarks = [*seen, *(remark for remark in frame.remarks if remark.name not in said)]  # found when it was read
     suspects = tuple(map(_suspect, remarks))
 
     def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
@@ -63,7 +63,7 @@ def judge(
 
     if trace is None or not trace.stages:
         causes = why(PICTURE_AND_SCAN, match_error)
-        reason = "Hardly any point of the scan falls into the picture under the extrinsic that the run started from."
+        reason = "Hardly any point of the scan falls into the picture under the initial extrinsic."
         return Verdict(REJECTED, _because(reason, causes), guess, causes=causes)
 
     last = trace.stages[-1]
@@ -75,20 +75,24 @@ def judge(
         )
 
     if float(frame.image[::ROW_STEP].std(axis=(0, 1)).max()) < BLANK:
-        return verdict(REJECTED, "The picture shows nothing.")
+        return verdict(REJECTED, "The picture is blank.")
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)
     if not trace.fits:
         reason = (
-            f"Picture and scan do not fit together: matches are expected to be {last.match_error_px:.1f} px off, "
-            f"at most {trace.match_error_limit_px:g} px are usual."
+            f"Picture and scan do not fit together: the expected match error is {last.match_error_px:.1f} px, where at "
+            f"most {trace.match_error_limit_px:g} px is usual."
         )
         causes = why(PICTURE_AND_SCAN, match_error)
         if not causes and match_error is not None:
             if last.match_error_px > UNRELATED_PX:
-                text = "They seem to be of different places, or the start is far outside the range searched."
+                text = "They seem to show different places, or the start is far outside the range searched."
                 causes = (
-                    Cause("other-picture", text, f"{last.match_error_px:.1f} px, and nothing tried makes them fit"),
+                    Cause(
+                        "other-picture",
+                        text,
+                        f"{last.match_error_px:.1f} px, and no correction that was tried makes them fit",
+                    ),
                 )
             else:
                 causes = why_lens()
@@ -101,28 +105,28 @@ def judge(
     classifier = coefficients.for_frame(last.range)
     if isinstance(classifier, str):
         return verdict(
-            CANNOT_TELL, f"Picture and scan fit together, but how sure that is cannot be told. {classifier}", suspects
+            CANNOT_TELL,
+            f"Picture and scan fit together, but how reliable that is cannot be judged. {classifier}",
+            suspects,
         )
     wrong = classifier(predictors(trace))
     if wrong < classifier.accepted_below:
         return verdict(ACCEPTED, f"Picture and scan fit together (match error {last.match_error_px:.1f} px).")
     if math.isnan(wrong):
-        return verdict(CANNOT_TELL, "What the network tells of its matches is not enough to judge them.", suspects)
-    reason = f"Picture and scan fit, but not as well as in runs that end right (an error is {wrong:.0%} likely)."
+        return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
+    fit = "Picture and scan fit together, but less well than in runs with a correct result"
+    reason = f"{fit} (probability of an error: {wrong:.0%})."
     if prior:
-        reason = (
-            "Picture and scan fit, but not as well as in runs that end right (if no axis were known, an error would be "
-            f"{wrong:.0%} likely; with {prior} it is less so, how much cannot be told)."
-        )
+        reason = f"{fit} (probability of an error: {wrong:.0%} without prior knowledge, less with {prior})."
         return verdict(CANNOT_TELL, reason, why_lens())
     return verdict(REJECTED if wrong > classifier.rejected_above else CANNOT_TELL, reason, why_lens())
 
 
 def _suspect(remark: Implausible) -> Cause:
-    """What is unlikely about a frame, as a cause."""
-    return Cause(remark.name, f"{remark.text[0].upper()}{remark.text[1:]}.", "the numbers as they were given")
+    """An implausible property of a frame, as a cause."""
+    return Cause(remark.name, f"{remark.text[0].upper()}{remark.text[1:]}.", "the numbers in the input")
 
 
 def _because(reason: str, causes: tuple[Cause, ...]) -> str:
-    """The reason, and the likeliest cause."""
+    """The reason, followed by the most likely cause."""
     return f"{reason} {causes[0].text}" if causes else reason

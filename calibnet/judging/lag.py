@@ -1,8 +1,8 @@
-"""Scans that are later or earlier than their pictures: told by how the car moved from one scan to the next.
+"""Scans that are later or earlier than their pictures, recognised by the motion of the car from scan to scan.
 
-A late scan shows the world from where the car is by then. Matches explain that by a camera farther back, and fit.
-Nothing in one frame contradicts them; but put back by the car's own motion, which registering two scans tells, the same
-scan is found where the guess says.
+A late scan shows the world from where the car is by then. Matches explain this by a camera farther back, and they fit:
+nothing in one frame contradicts them. But if the scan is moved back by the car's own motion, which registering two
+scans gives, the result lies near the guess again.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from calibnet.judging.causes import Attempt, Search, scan_moved
 Points = NDArray[np.float32] | NDArray[np.float64]
 
 VOXEL_M = 0.5
-"""Side of the cells in which points are averaged before scans are registered."""
+"""Side of the voxels in which points are averaged before scans are registered."""
 FARTHEST_M = 3.0
-"""Between points that are taken for the same: the car moves that far from scan to scan at 100 km/h."""
+"""Largest distance between corresponding points: at 100 km/h the car moves this far from scan to scan."""
 FEWEST_POINTS = 500
-"""That have to agree for a registration to be believed."""
+"""Fewest inliers of a registration that is trusted."""
 STANDING_M = 0.1
-"""Motion below which a lag makes no difference."""
+"""Motion between scans below which a lag makes no difference."""
 SHARES = (1.0, 0.5)
 """Lags that are tried, as shares of the time between two scans."""
 SHARE, MOST = 0.5, 1.0
-"""See `calibnet.judging.causes.Search`: the result then lies in the range searched, half as far from the guess."""
+"""See `calibnet.judging.causes.Search`: without the lag the result lies within the range, at most half as far away."""
 
 
 def lags(frames: Frames, position: int) -> Search | None:
-    """What undoes a lag of the scan at a position of a drive, by the motion to the scans before and after it.
+    """Attempts to undo a time lag of the scan of one frame, by the motion to the scans before and after it.
 
     Args:
         frames: of the drive, in the order in which they were taken.
         position: of the frame.
 
     Returns:
-        Attempts, to be judged by `calibnet.judging.causes.reach_of`; None where there is no neighbour, or no motion.
+        Attempts whose measure is `calibnet.judging.causes.reach_of`; None if there is no neighbour or no motion.
     """
     beside = {step: _motion(frames, position, step) for step in (-1, 1)}
     attempts: list[Attempt] = []
@@ -54,23 +54,23 @@ def lags(frames: Frames, position: int) -> Search | None:
 
 
 Motion = tuple[Transform | None, float]
-"""From one scan to another, and the seconds between them."""
+"""The motion from one scan to another, and the seconds between them."""
 
 
 def _motion(frames: Frames, position: int, step: int) -> Motion | None:
-    """From the scan at a position to the one so many further; None where there is none, or none that fits."""
+    """The motion to the scan ``step`` frames on; None if there is none or registration fails."""
     if not 0 <= position + step < len(frames):
         return None
     try:
         here, there = frames[position], frames[position + step]
-    except DatasetError:  # of what cannot be read nothing can be learnt
+    except DatasetError:  # an unreadable neighbour tells nothing
         return None
     motion = registered(here.points, there.points)
     return None if motion is None else (motion, abs(there.timestamp - here.timestamp))
 
 
 def _backwards(motion: Motion | None) -> Motion:
-    """The motion to the scan on the other side, if the car goes on as it does."""
+    """The motion to the scan on the other side, at constant velocity."""
     if motion is None or motion[0] is None:
         return None, 0.0
     return invert(motion[0]), motion[1]
@@ -86,14 +86,14 @@ def _attempt(motion: Transform, share: float, seconds: float, word: str) -> Atte
 
 
 def registered(points: Points, onto: Points) -> Transform | None:
-    """The motion that takes one scan onto another, 4x4: points of the first as the LiDAR saw them at the second.
+    """Register one scan onto another: the transform 4x4 of points of the first into the LiDAR's frame at the second.
 
     Args:
         points: ``[N, 3 or more]`` metres.
         onto: ``[M, 3 or more]`` likewise.
 
     Returns:
-        None where too few points agree.
+        None if too few points correspond.
     """
     import small_gicp
 

@@ -1,9 +1,9 @@
-"""Matches fitted with more than a pose: the focal length, principal point and lens that the camera may really have.
+"""Fitting matches with more than a pose: also with another focal length, principal point or lens model.
 
-A wrong camera matrix lets matches fit under a pose that is not believable: a focal length that is too long looks like a
-camera farther back. With the pose held near the guess by the range that was searched, fitting what else can be wrong
-as well and comparing the costs tells which it is. The fit is the weighted Gauss-Newton of `calibnet.network.pose`,
-with the same weights.
+With a wrong camera matrix matches fit an implausible pose: a focal length that is too long looks like a camera farther
+back. The range that was searched is a prior that holds the pose near the guess. Fitting one property of the lens
+together with the pose, and comparing the costs, shows which property is wrong. The fit is the weighted Gauss-Newton of
+`calibnet.network.pose`, with the same weights.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from calibnet.trace import Matches
 
 ITERATIONS = 12
 SETTLED = 3e-4
-"""Share of the cost that a step gains when it is the last: further ones would gain less than that together."""
+"""Iterations stop when a step reduces the cost by less than this share: all further ones together would save less."""
 INDEPENDENT = 1 / 20
-"""Share of matches that err independently: errors of neighbours are correlated over some twenty cells of a row."""
+"""Effective share of independent matches: errors of neighbours are correlated over some twenty cells of a row."""
 LEAST_SCALE_PX = 0.1
-"""No match is known better than that, whatever the network expects."""
+"""Lower limit of a match's standard deviation in pixels, whatever the network expects."""
 
 
 @dataclass(frozen=True)
 class Lens:
-    """What is fitted besides the pose.
+    """What is fitted in addition to the pose.
 
     Attributes:
-        name: of the cause, should it explain the matches.
-        focal: a factor of the focal lengths.
-        center: an offset of the principal point.
-        radial: the first radial coefficient of distortion.
-        equidistant: take the picture for that of an equidistant fisheye lens, with nothing to fit for it.
+        name: name of the cause if this explains the matches.
+        focal: fit a factor of the focal lengths.
+        center: fit an offset of the principal point.
+        radial: fit the first radial coefficient of distortion.
+        equidistant: assume an equidistant fisheye lens, which has nothing to fit.
     """
 
     name: str
@@ -55,8 +55,8 @@ LENSES = (
 )
 """What may be wrong with a camera's calibration, one at a time."""
 LENS_SIGMA = np.array([0.1, 0.1, 0.1, 0.3])
-"""Standard deviations of what is fitted: of the focal length's logarithm, of the principal point in focal lengths
-(x, y), and of the radial coefficient."""
+"""Prior standard deviations of the logarithm of the focal length, of the principal point in focal lengths (x, y), and
+of the radial coefficient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,11 @@ class Fit:
     Attributes:
         lens: what was fitted.
         camera_from_lidar: 4x4.
-        focal: factor of the focal lengths, true by believed.
-        center: ``[2]`` offset of the principal point in pixels of the camera, true minus believed.
-        radial: coefficient k1 of the picture.
-        cost: of all residuals and of the distance from the guess: minus the logarithm of the likelihood.
-        sigma: ``[P]`` standard deviations of the pose and of what was fitted besides, in `Lens`'s order.
+        focal: fitted focal length relative to that of the calibration.
+        center: ``[2]`` fitted principal point minus that of the calibration, in pixels.
+        radial: fitted coefficient k1.
+        cost: negative log posterior: all residuals, and the distance from the guess.
+        sigma: ``[P]`` standard deviations of the pose and of what was fitted with it, in the order of `Lens`.
     """
 
     lens: Lens
@@ -96,12 +96,12 @@ def fit(
     Args:
         matches: of the look.
         before: ``camera_from_lidar`` that the look started from, 4x4.
-        camera: of the stage that looked.
+        camera: of the stage.
         guess: ``camera_from_lidar`` that the run started from.
-        prior: information ``[6, 6]`` of the guess.
-        lens: what to fit besides the pose.
-        start: a fit of the same matches to beat, from whose pose to start; a lens whose steps gain too little to come
-            below its cost is given up. None to start from ``before``.
+        prior: information ``[6, 6]`` about the guess.
+        lens: what to fit in addition to the pose.
+        start: another fit of the same matches, whose pose is the starting point; iterations stop as soon as they
+            cannot get below its cost any more. None to start from ``before``.
     """
     points = matches.points.astype(np.float64)
     scale = np.maximum(matches.scale.T.astype(np.float64), LEAST_SCALE_PX)
@@ -161,17 +161,17 @@ def fit(
 def view(
     moved: Floats, extra: Floats, equidistant: bool, buffer: Floats | None = None
 ) -> tuple[Floats, Floats, Floats]:
-    """Where points are seen, in focal lengths from the principal point.
+    """Project points, in focal lengths from the principal point.
 
     Args:
         moved: ``[N, 3]`` in the camera frame.
         extra: logarithm of the focal length's factor, offset of the principal point (x, y), radial coefficient.
-        equidistant: the lens shows the angle from its axis, not the angle's tangent.
-        buffer: ``[10, 2, N]`` that takes the derivatives in, for whoever calls often; new by default.
+        equidistant: the distance from the principal point is the angle from the optical axis, not its tangent.
+        buffer: ``[10, 2, N]`` to write the derivatives to, for repeated calls; allocated by default.
 
     Returns:
-        Places ``[N, 2]``; their derivative ``[N, 2, 10]`` by a motion ``(translation, rotation)`` and by ``extra``; and
-        1 for the points ahead ``[N]``, 0 for the others.
+        Positions ``[N, 2]``; their derivatives ``[N, 2, 10]`` by a motion ``(translation, rotation)`` and by ``extra``;
+        and ``[N]``, 1 for points in front of the camera, 0 for others.
     """
     depth = moved[:, 2]
     inverse = 1 / np.maximum(depth, MINIMUM_DEPTH)

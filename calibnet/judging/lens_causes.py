@@ -1,4 +1,4 @@
-"""Which fault of the lens a run's matches speak for, and how likely it is.
+"""Which fault of the lens the matches of a run indicate, and with which probability.
 
 No network runs again: `calibnet.judging.lens_predictors` fits the matches of two looks with other lenses besides the
 pose, and a multinomial logistic regression turns these numbers into the probability of each fault, and of none. It is
@@ -16,18 +16,18 @@ from calibnet.verdict import Cause
 
 FOCAL, CENTER, BENT = "focal-length", "principal-point", "distortion"
 FAULTS = (FOCAL, CENTER, BENT)
-"""What is told apart. A picture whose distortion was not undone looks like one of a fisheye lens: both are named."""
+"""Faults that can be distinguished. Distortion that was not removed looks like a fisheye lens, so both are named."""
 FISHEYE = "lens-model"
 
 
 @dataclass(frozen=True)
 class LensOdds:
-    """How likely each of `FAULTS` is, relative to none.
+    """Multinomial logistic regression: the log odds of each of `FAULTS`, relative to no fault.
 
     Attributes:
-        named_from: probability from which on a fault is named.
-        intercepts: of each fault.
-        weights: of each fault, by predictor.
+        named_from: a fault is named if it has at least this probability.
+        intercepts: log odds of each fault if all predictors are 0.
+        weights: change of these log odds per unit of each predictor, by fault and predictor.
     """
 
     named_from: float
@@ -35,7 +35,7 @@ class LensOdds:
     weights: dict[str, dict[str, float]]
 
     def __call__(self, predictors: LensPredictors) -> dict[str, float]:
-        """The probability of each fault; what is missing to 1 is that of none."""
+        """The probability of each fault; the remainder to 1 is the probability of no fault."""
         numbers = asdict(predictors)
         odds = {
             name: intercept + sum(weight * numbers[of] for of, weight in self.weights[name].items())
@@ -47,11 +47,11 @@ class LensOdds:
 
 
 def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]:
-    """The fault of the lens that a run's matches speak for; nothing where none is likely enough.
+    """The fault of the lens that the matches of a run indicate; empty if none is probable enough.
 
     Args:
         trace: of the run.
-        odds: as they were fitted; without them nothing is named.
+        odds: the fitted regression; without it no fault is named.
     """
     looks = lens_fits(trace) if odds else None
     if odds is None or looks is None:
@@ -60,18 +60,18 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
     name = max(found, key=lambda one: found[one])
     if found[name] < odds.named_from:
         return ()
-    evidence = f"{found[name]:.0%} likely, as frames with such a fault have shown"
+    evidence = f"probability {found[name]:.0%}, by a regression fitted to frames with such faults"
     if name == BENT:
         text = (
-            "The picture looks barrel-shaped: its distortion seems not to be undone, or it is one of a fisheye lens "
-            "(equidistant)."
+            "The picture looks barrel-distorted: either its distortion was not removed, or it was taken with a fisheye "
+            "lens (equidistant)."
         )
         return tuple(Cause(one, text, evidence) for one in (BENT, FISHEYE))
     return (Cause(name, _focal_length(fits) if name == FOCAL else _principal_point(fits), evidence),)
 
 
 def _focal_length(fits: LensFits) -> str:
-    longer = fits.focal.focal - 1  # the finest look has the direction right, and says too little rather than too much
+    longer = fits.focal.focal - 1  # the finest look has the right sign, and underestimates rather than overestimates
     return (
         f"The picture looks as if its focal length were more than {abs(longer):.1%} "
         f"{'longer' if longer > 0 else 'shorter'} than camera_matrix says."

@@ -1,7 +1,8 @@
-"""What two looks of a run say of the lens: the finest one, and a coarse one, whose window holds a whole bend.
+"""Predictors of a fault of the lens, from two looks of a run: the finest one and a coarse one.
 
-The finest look sees little of a wrong focal length or principal point, because the looks before have explained most of
-it by a wrong pose, but what it sees has the right direction. A coarse look sees all of it, less sharply.
+The finest look sees little of a wrong focal length or principal point, because earlier looks have compensated most of
+it by a wrong pose; but what remains has the right sign. The window of a coarse look is large enough to show all of it,
+less precisely.
 """
 
 from __future__ import annotations
@@ -13,23 +14,23 @@ from calibnet.judging.lens import LENSES, PINHOLE, Fit, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
 COARSE = 3
-"""From the last stage backwards: the look whose window still holds a whole bend."""
+"""The coarse look is that of the third stage from the end, whose window covers a whole distortion."""
 LEAST_GAIN = -1.0
-"""An equidistant lens that makes matches of a pinhole cost more than twice as much counts as this."""
+"""Lower limit of the gain of an equidistant lens, which is very negative for the matches of a pinhole camera."""
 
 
 @dataclass(frozen=True)
 class LensPredictors:
-    """Numbers of the finest look and of a coarse one, whose matches are fitted with another lens besides the pose.
+    """Results of fitting the matches of the fine and of the coarse look with another lens in addition to the pose.
 
     Attributes:
         fine_focal_gain, coarse_focal_gain: share of the matches' cost that another focal length saves.
-        fine_focal, coarse_focal: logarithm of the factor of that focal length, true by believed.
-        fine_focal_size, coarse_focal_size: its absolute value.
+        fine_focal, coarse_focal: logarithm of the fitted focal length relative to that of the calibration.
+        fine_focal_size, coarse_focal_size: absolute value of this logarithm.
         fine_center_gain, coarse_center_gain: share of the cost that another principal point saves.
-        fine_center_size, coarse_center_size: how far it lies aside, in widths of the picture.
+        fine_center_size, coarse_center_size: horizontal offset of that principal point, in widths of the picture.
         fine_radial_gain, coarse_radial_gain: share of the cost that radial distortion saves.
-        fine_radial, coarse_radial: its coefficient k1.
+        fine_radial, coarse_radial: the fitted coefficient k1.
         fine_equidistant_gain, coarse_equidistant_gain: share of the cost that an equidistant lens saves.
     """
 
@@ -53,12 +54,12 @@ class LensPredictors:
 
 @dataclass(frozen=True, eq=False)
 class LensFits:
-    """A look's matches fitted with the pose alone, and with each of `calibnet.judging.lens.LENSES` besides.
+    """The matches of a look fitted with the pose alone, and with the pose and each of `calibnet.judging.lens.LENSES`.
 
     Attributes:
-        alone: with the pose alone.
-        focal, center, radial, equidistant: with that besides.
-        width: of the picture, pixels.
+        alone: fit of the pose alone.
+        focal, center, radial, equidistant: fits of the pose and that property of the lens.
+        width: width of the picture in pixels.
     """
 
     alone: Fit
@@ -70,7 +71,7 @@ class LensFits:
 
     @classmethod
     def of(cls, look: StageTrace) -> LensFits | None:
-        """Fit a look's matches; None where it has none."""
+        """Fit the matches of a look; None if it has none."""
         matches, prior, origin = look.matches, look.range.information, look.looked_from
         if matches is None or not len(matches.points):
             return None
@@ -81,16 +82,16 @@ class LensFits:
 
     @property
     def aside(self) -> float:
-        """How far to the right the principal point lies, in widths of the picture."""
+        """Offset of the principal point to the right, in widths of the picture."""
         return float(self.center.center[0]) / self.width
 
     def gain(self, other: Fit) -> float:
-        """The share of the cost that a lens saves; negative where it adds some."""
+        """The share of the cost that a lens saves; negative if it increases the cost."""
         return 1 - other.cost / self.alone.cost if self.alone.cost > 0 else 0.0
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Those of `LensPredictors` that are of one look, in its order."""
+        """This look's part of `LensPredictors`, in its order."""
         focal = math.log(self.focal.focal)
         return (
             self.gain(self.focal),
@@ -105,7 +106,7 @@ class LensFits:
 
 
 def lens_fits(trace: CascadeTrace) -> tuple[LensFits, LensFits] | None:
-    """The finest look and the coarse one of a run, fitted; None where it has too few stages, or no matches."""
+    """Fits of a run's finest and coarse look; None if the run has too few stages or a look has no matches."""
     if len(trace.stages) < COARSE:
         return None
     fine, coarse = LensFits.of(trace.stages[-1]), LensFits.of(trace.stages[-COARSE])
@@ -113,5 +114,5 @@ def lens_fits(trace: CascadeTrace) -> tuple[LensFits, LensFits] | None:
 
 
 def lens_predictors(looks: tuple[LensFits, LensFits]) -> LensPredictors:
-    """The predictors of a run, of its looks as `lens_fits` has them."""
+    """The predictors of a run from the two fits that `lens_fits` returns."""
     return LensPredictors(*(number for look in looks for number in look.numbers))

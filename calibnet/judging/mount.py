@@ -1,8 +1,9 @@
-"""Where a mount was over many drives: what one drive leaves open, the drives of a car tell together.
+"""The extrinsic of a car over many drives, and between which of them its mount moved.
 
-Every drive says with a covariance where it finds the extrinsic. While the mount stays where it is they say the same,
-so a car is known better than any of its drives; where they stop saying the same, the mount moved. Stays are found by
-the segmentation of least squared error with a price for each, as `calibnet.drive.changes` finds moves within a drive.
+Every drive contributes an estimate of the extrinsic with a covariance. As long as the mount does not move these
+estimates agree, and their mean is more accurate than each of them; where they stop agreeing, the mount moved. The
+segments between moves are called stays. They are found by least-squares segmentation with a penalty for each segment,
+as `calibnet.drive.changes` finds moves within a drive.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
 from calibnet.verdict import DRIVE_LIMITS
 
 USUAL_EXCESS, USUAL_STEPS = 2.0, 8
-"""How many times larger the squared error of a drive is taken to be than it states, and how many steps from drive to
-drive that counts for against what they say themselves (docs/decisions.md, A mount over many drives)."""
+"""Prior of how many times larger the squared error of a drive is than it states, and the number of steps from drive to
+drive that this prior weighs as much as (docs/decisions.md, A mount over many drives)."""
 FALSE_ALARM = 1e-3
-"""Probability, a mount, of a move where there is none, if errors were as they are modelled."""
+"""Probability per mount of reporting a move that did not happen, if errors are as modelled."""
 COMMON_DEG, COMMON_M = 0.12, 0.03
-"""Standard deviation, an axis, of what all drives of a car get wrong alike: it stays, however many there are. Measured
-on the eight drives of KITTI object/val as taken and through three virtual cameras; what eight drives do not average
-out is in it (docs/decisions.md, A mount over many drives)."""
+"""Standard deviation per axis of the error that all drives of a car have in common, which averaging does not reduce.
+Measured on the eight drives of KITTI object/val as taken and through three virtual cameras; it includes what eight
+drives do not average out (docs/decisions.md, A mount over many drives)."""
 FEWEST = 3
-"""Drives that have to agree before they say more than each by itself."""
+"""Fewest drives that are combined."""
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Where a drive finds the extrinsic.
+    """The estimate of one drive.
 
     Attributes:
         camera_from_lidar: 4x4.
@@ -51,9 +52,9 @@ class Stay:
     """Drives between which the mount did not move.
 
     Attributes:
-        members: their positions among all drives of the mount, ascending.
-        camera_from_lidar: where it was, 4x4.
-        covariance: ``[6, 6]`` of it, with what drives get wrong alike.
+        members: positions of these drives among all drives of the mount, ascending.
+        camera_from_lidar: their common extrinsic, 4x4.
+        covariance: ``[6, 6]`` of it, including the common error of drives.
     """
 
     members: tuple[int, ...]
@@ -62,33 +63,32 @@ class Stay:
 
     @property
     def is_firm(self) -> bool:
-        """Whether so many drives agree that they say more than each by itself."""
+        """Whether there are enough drives to combine."""
         return len(self.members) >= FEWEST
 
 
 @dataclass(frozen=True, eq=False)
 class Mount:
-    """A mount over its drives: it stayed, moved, and stayed again.
+    """A mount over its drives.
 
     Attributes:
-        stays: in their order; none for no drive.
-        apart: positions of drives that say what neither those before nor those after them say, fewer than `FEWEST` in
-            a row.
+        stays: segments without a move, in order; empty without drives.
+        apart: positions of drives that contradict those before and after them, fewer than `FEWEST` in a row.
     """
 
     stays: tuple[Stay, ...] = ()
     apart: tuple[int, ...] = ()
 
     def stay_of(self, position: int) -> Stay | None:
-        """The stay that a drive belongs to; None for one that stands apart."""
+        """The stay that a drive belongs to; None for one that is apart."""
         return next((stay for stay in self.stays if position in stay.members), None)
 
 
 def excess_of(mounts: Iterable[Sequence[Finding]]) -> float:
-    """How many times larger squared errors of drives are than they state, at least 1.
+    """How many times larger the squared errors of drives are than they state, at least 1.
 
-    Measured by the steps from each drive to the next one of the same mount, in the median, which a few moves do not
-    change; over all mounts of a fleet, for one alone has few.
+    Measured by the median squared step from each drive to the next one of the same mount, which a few moves hardly
+    change, over all mounts of a fleet, because a single mount has few drives.
     """
     squares = [_square(*pair) for drives in mounts for pair in pairwise(drives)]
     measured = float(np.median(squares)) / chi2.median(6) if squares else 0.0
@@ -97,11 +97,11 @@ def excess_of(mounts: Iterable[Sequence[Finding]]) -> float:
 
 
 def mount_over(findings: Sequence[Finding], excess: float = USUAL_EXCESS) -> Mount:
-    """Where a mount was.
+    """Segment the drives of a mount into stays.
 
     Args:
-        findings: of its drives, in the order in which they were driven.
-        excess: of their squared errors, `excess_of`.
+        findings: estimates of its drives, in the order in which they were recorded.
+        excess: factor on their stated covariances, see `excess_of`.
     """
     kept = list(range(len(findings)))
     apart: list[int] = []
@@ -117,13 +117,13 @@ def mount_over(findings: Sequence[Finding], excess: float = USUAL_EXCESS) -> Mou
 
 
 def difference(one: Stay, other: Stay) -> tuple[float, float]:
-    """From one stay to another: degrees and centimetres."""
+    """Distance from one stay to another, in degrees and centimetres."""
     error = pose_error(other.camera_from_lidar, one.camera_from_lidar)
     return error.rotation_deg, error.translation_cm
 
 
 class _Said:
-    """What drives say, relative to one of them, with running sums over their normal equations."""
+    """The estimates of drives relative to one of them, with running sums of their normal equations."""
 
     def __init__(self, findings: Sequence[Finding], excess: float) -> None:
         self.origin = findings[len(findings) // 2].camera_from_lidar
@@ -136,7 +136,7 @@ class _Said:
         self._squares = _running(np.einsum("ni,ni->n", informed, self.vectors))
 
     def stays(self) -> list[tuple[int, int]]:
-        """From where to before where the mount stayed: the cheapest way to cut the drives into stays."""
+        """The cheapest segmentation, as ranges ``(start, stop)`` of drives."""
         count = len(self.vectors)
         level = math.log(count / FALSE_ALARM)
         price = 6 + 2 * math.sqrt(6 * level) + 2 * level  # of chi-square with six degrees of freedom, at that level
@@ -151,19 +151,19 @@ class _Said:
         return self._joined(list(pairwise(reversed(borders))))
 
     def stay(self, place: tuple[int, int]) -> Stay:
-        """What the drives of a stay agree on."""
+        """The combined estimate of the drives in a range."""
         start, stop = place
         mean, covariance = self._agreed(start, stop)
         offsets = self.vectors[start:stop] - mean
         squares = float(np.einsum("ni,nij,nj->", offsets, self.informations[start:stop], offsets))
         scatter = max(1.0, squares / (6 * (stop - start - 1))) if stop - start > 1 else 1.0
-        alike = np.repeat([COMMON_M, math.radians(COMMON_DEG)], 3) ** 2
+        common = np.repeat([COMMON_M, math.radians(COMMON_DEG)], 3) ** 2
         return Stay(
-            tuple(range(start, stop)), pose_from_vector(mean) @ self.origin, covariance * scatter + np.diag(alike)
+            tuple(range(start, stop)), pose_from_vector(mean) @ self.origin, covariance * scatter + np.diag(common)
         )
 
     def _joined(self, stays: list[tuple[int, int]]) -> list[tuple[int, int]]:
-        """Without moves that are too small to be one of the mount."""
+        """Merge neighbouring stays that differ by less than the limits of a drive."""
         joined = stays[:1]
         for stay in stays[1:]:
             turn, shift = difference(self.stay(joined[-1]), self.stay(stay))
@@ -178,18 +178,18 @@ class _Said:
         return covariance @ (self._right[stop] - self._right[start]), covariance
 
     def _misfits(self, stop: int) -> Floats:
-        """Squared errors ``[stop]`` of the drives from every start to before ``stop``, against what they agree on."""
+        """Squared error ``[stop]`` of the drives from every start to before ``stop``, relative to their mean."""
         normal, right = self._normal[stop] - self._normal[:stop], self._right[stop] - self._right[:stop]
         solved = np.linalg.solve(normal, right[..., None])[..., 0]
         return np.asarray(self._squares[stop] - self._squares[:stop] - np.einsum("ni,ni->n", right, solved))
 
 
 def _running(values: Floats) -> Floats:
-    """Sums ``[N + 1, ...]`` of the first values."""
+    """Cumulative sums ``[N + 1, ...]``, beginning with 0."""
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
 def _square(one: Finding, other: Finding) -> float:
-    """Squared difference of two findings, in their standard deviations."""
+    """Squared difference of two estimates, normalised by their covariances."""
     offset = pose_vector(other.camera_from_lidar @ invert(one.camera_from_lidar))
     return float(offset @ np.linalg.solve(one.covariance + other.covariance, offset))

@@ -19,20 +19,20 @@ from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
 AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
-"""What the axes of a correction are to a user: turns about the camera's x, y and z, then moves along them."""
+"""Names of a correction's axes for users: rotations about the camera's x, y and z, then translations along them."""
 LEAST = 1e-6
-"""What is smaller counts as this much, so that it has a logarithm."""
+"""Lower limit of values whose logarithm is taken."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """The axis on which a run went farthest, compared with the range that was searched.
+    """How far a run moved the extrinsic, on the axis where that is largest relative to the range searched.
 
     Attributes:
-        share: of the range; 1 is its border.
+        share: distance relative to the range; 1 is its border.
         axis: index into `AXES`.
-        moved: degrees or metres that it went.
-        searched: degrees or metres of the range.
+        moved: distance on that axis, in degrees or metres.
+        searched: half width of the range on that axis, in degrees or metres.
     """
 
     share: float
@@ -50,7 +50,7 @@ class Reach:
 
 
 def reach(before: Extrinsic, after: Extrinsic, range_: MiscalibrationRange) -> Reach:
-    """How far it is from one extrinsic to another, in ranges; the miscalibration is that of ``before``."""
+    """How far ``after`` lies from ``before``, relative to a range."""
     delta = before @ invert(after)
     moved = np.concatenate([np.degrees(euler_xyz(delta[:3, :3])), delta[:3, 3]])
     searched = np.repeat([range_.rotation_deg, range_.translation_m], 3)
@@ -60,15 +60,15 @@ def reach(before: Extrinsic, after: Extrinsic, range_: MiscalibrationRange) -> R
 
 @dataclass(frozen=True)
 class Predictors:
-    """Numbers that grow with what speaks against a result; not a number where a trace does not tell.
+    """Predictors of a wrong result of one frame; NaN where the trace lacks the data.
 
     Attributes:
-        match_error: logarithm of the error, in pixels, that the last stage expects of its matches.
-        misfit: logarithm of what its residuals cost, see `misfits`.
-        lens: logarithm of the least cost of its matches with another lens, relative to that with the pose alone;
-            0 where no lens explains them better.
-        correlated: logarithm of the deviation of the translation, in centimetres, if matches also err alike, see
-            `calibnet.judging.correlated_errors`.
+        match_error: logarithm of the match error that the last stage expects, in pixels.
+        misfit: logarithm of the mean cost of its matches, see `misfits`.
+        lens: logarithm of the lowest cost of its matches with another lens, relative to the cost with the pose alone;
+            0 if no lens explains them better.
+        correlated: logarithm of the standard deviation of the translation, in centimetres, if matches have correlated
+            errors, see `calibnet.judging.correlated_errors`.
     """
 
     match_error: float
@@ -80,7 +80,7 @@ class Predictors:
 def predictors(trace: CascadeTrace) -> Predictors:
     """The predictors of a run of at least one stage.
 
-    Of the last stage they are those of its last look.
+    They are computed from the last look of the last stage.
     """
     last = trace.stages[-1]
     alone, bent = misfits(last)
@@ -93,14 +93,13 @@ def predictors(trace: CascadeTrace) -> Predictors:
 
 
 def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, float]:
-    """What the residuals of a stage's last matches cost, a match, after the pose that fits them best.
+    """Mean cost per match of a stage's last look, at the pose that fits its matches best; NaN without matches.
 
-    Not a number where there are no matches. Between frames it varies as much as with what is wrong; for one frame it is
-    least with the right lens.
+    It varies between frames as much as with faults of the input, but for one frame it is lowest with the right lens.
 
     Returns:
-        The cost with the camera as given, and with whichever other lens explains the matches best, fitted together
-        with the pose; the second is the first where no lens explains them better.
+        The cost with the given camera, and the lowest cost with another lens fitted together with the pose. Both are
+        equal if no lens explains the matches better.
     """
     matches, prior, origin = stage.matches, stage.range.information, stage.looked_from
     if matches is None or not len(matches.points):
@@ -111,7 +110,7 @@ def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, 
 
 
 def _correlated(stage: StageTrace, searched: MiscalibrationRange) -> float:
-    """Logarithm of the deviation of the translation, in centimetres, if a stage's matches also err alike."""
+    """The predictor ``correlated`` from the last look of a stage."""
     if stage.matches is None or not len(stage.matches.points):
         return math.nan
     covariance = correlated_covariance(stage.matches, stage.camera, searched.information)

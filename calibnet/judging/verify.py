@@ -1,4 +1,4 @@
-"""Whether a calibration that somebody has is good: what a frame or a drive finds from there, held against it."""
+"""Whether an existing calibration is good: it is compared with the result of a run that starts from it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Cause, Verdict, Word, moved
 
 SIGNIFICANT = 16.27
-"""99.9 % quantile of chi-square with three degrees of freedom: those of the rotation, or of the translation."""
+"""99.9 % quantile of chi-square with three degrees of freedom, for the rotation or the translation."""
 PROBABLE = 0.95
-"""Probability of being within the tolerance from which on a calibration is accepted."""
+"""A calibration is accepted if it is within the tolerance with at least this probability."""
 BAND = 1.96
 """Standard deviations on either side that hold 95 % of a normal distribution."""
 SAMPLES = 100_000
-"""Draws for that probability: at 95 % it is told to 0.07 %, and drawn alike every time."""
+"""Random draws for that probability, the same every time; at 95 % its standard error is 0.07 %."""
 ROTATION, TRANSLATION = slice(3, 6), slice(0, 3)
 """Rows of a covariance."""
 TURNS = {"pitch_deg": "pitch", "yaw_deg": "yaw", "roll_deg": "roll"}
@@ -29,7 +29,7 @@ SHIFTS = {"x_cm": "x (right)", "y_cm": "y (down)", "z_cm": "z (ahead)"}
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far off a calibration may be to count as good."""
+    """The largest error of a calibration that counts as good."""
 
     rotation_deg: float
     translation_cm: float
@@ -40,13 +40,13 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Standard:
-    """What the calibration of a frame, or of a drive, is held to.
+    """The tolerances that the calibration of a frame, or of a drive, is compared with.
 
     Attributes:
-        tolerances: how far off is good, finest first: the limits that the verdict holds results to, where a result is
-            sure enough to tell so little, and what the others can tell.
-        farthest: how far from the truth a result of several frames is at most that is not sure enough to be accepted;
-            None where that is not known.
+        tolerances: finest first: the limits of the verdict, which are used if the result is certain enough, and coarser
+            ones for other results.
+        farthest: largest error of a result of several frames that is not certain enough to be accepted; None if that is
+            unknown.
     """
 
     tolerances: tuple[Tolerance, ...]
@@ -55,18 +55,22 @@ class Standard:
 
 FRAME = Standard((Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0)))
 DRIVE = Standard((Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0)), Tolerance(1.6, 40.0))
-"""Standards of a single frame, for which no farthest is known, and of a drive: half as far again as the farthest of the
-drives that the verdict was fitted to (1.1°, 26 cm)."""
+"""Standards of a single frame, whose ``farthest`` is unknown, and of a drive, for which it is one and a half times the
+largest error among the drives that the verdict was fitted to (1.1°, 26 cm)."""
 
 
 def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
-    """Hold a calibration against what was found from there.
+    """Compare a calibration with the result of a run that started from it.
 
-    It is rejected if it is off by more than the finest tolerance that the covariance of what was found can tell, in
-    rotation or in translation, and if that is significant (chi-square, 99.9 %). It is accepted if it is within one of
-    the tolerances with a probability of 95 %, and the finest of these is told. Otherwise nobody can tell. Where what
-    was found is not accepted itself, the calibration is rejected if causes are known, for then the input is wrong, or
-    if it is farther from what was found than that can be from the truth; else nobody can tell.
+    If the result is accepted, the calibration is
+
+    - rejected if its rotation or translation is significantly off (chi-square, 99.9 %) by more than the finest
+      tolerance that the covariance of the result can resolve,
+    - accepted if it is within one of the tolerances with a probability of 95 %; the finest such tolerance is named,
+    - *cannot tell* otherwise.
+
+    If the result is not accepted, the calibration is rejected if a cause is known, because the input is wrong then, or
+    if it lies farther from the result than the result can lie from the truth; otherwise it is *cannot tell*.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.
@@ -74,7 +78,7 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         standard: `FRAME` or `DRIVE`.
 
     Returns:
-        A verdict on ``given``. Its ``camera_from_lidar`` is what was found, and ``moved`` leads there from ``given``.
+        A verdict on ``given``. Its ``camera_from_lidar`` is the result, and ``moved`` is its distance from ``given``.
     """
     estimate = found.camera_from_lidar
 
@@ -89,17 +93,19 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
             return verdict(REJECTED, found.reason)
         apart = f"{error.rotation_deg:.1f}° and {error.translation_cm:.0f} cm"
         if few is None and _is_far(error, found, standard):
-            reason = f"The calibration is off by some {apart}, or the input is wrong; how far exactly is not sure."
+            reason = f"The calibration is off by about {apart}, or the input is wrong; the exact amount is uncertain."
             return verdict(REJECTED, f"{reason} {found.reason}")
         if few is None and found.word == CANNOT_TELL:
-            reason = f"The calibration lies {apart} from what is found, which is not sure enough to hold it against."
+            reason = f"The calibration differs by {apart} from the result, which is too uncertain to judge it by."
             return verdict(CANNOT_TELL, f"{reason} {found.reason}")
-        return verdict(CANNOT_TELL, f"There is nothing to hold the calibration against. {found.reason}")
+        return verdict(CANNOT_TELL, f"There is no result to compare the calibration with. {found.reason}")
     if few is not None:
         return verdict(CANNOT_TELL, few)
     if found.covariance is None:
         off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
-        return verdict(CANNOT_TELL, f"The calibration seems to be off by {off}, but nothing states how sure that is.")
+        return verdict(
+            CANNOT_TELL, f"The calibration seems to be off by {off}, but the uncertainty of that is unknown."
+        )
     offset = pose_vector(given @ invert(estimate))
     off = _said(error, offset, found.covariance)
     still = np.zeros(6)
@@ -108,31 +114,31 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         standard.tolerances[-1],
     )
     if _is_beyond(error, offset, found.covariance, told):
-        return verdict(REJECTED, f"The calibration is off by {off}; {told} are tolerated.")
+        return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {told}.")
     for tolerance in standard.tolerances:
         share = probability_within(offset, found.covariance, tolerance)
         if share >= PROBABLE:
-            return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: by {off}.")
+            return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: {off}.")
     return verdict(
-        CANNOT_TELL, f"The calibration is off by {off}; that it is within {tolerance} is {share:.0%} probable."
+        CANNOT_TELL, f"The calibration is off by {off}; the probability that it is within {tolerance} is {share:.0%}."
     )
 
 
 def unfit(given: Extrinsic, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
-    """The verdict where nothing could be found, because picture and scan do not fit together.
+    """The verdict if there is no result, because picture and scan do not fit together.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.
-        reason: why nothing could be found.
-        causes: what is wrong with the input; with any the calibration is rejected, without nobody can tell.
+        reason: why there is no result.
+        causes: what is wrong with the input. With a cause the calibration is rejected, otherwise it is *cannot tell*.
     """
     return Verdict(REJECTED if causes else CANNOT_TELL, reason, given, causes=causes, used=0)
 
 
 def named_cause(error: BaseException | None) -> tuple[Cause, ...]:
-    """What an error that names a cause in its attribute ``cause`` says is wrong with input that can be read.
+    """The cause that an error, or the error it was raised from, names in its attribute ``cause``.
 
-    An error that was raised from such a one is taken for it.
+    Such errors are about input that can be read but cannot be right.
     """
     while error is not None:
         name = getattr(error, "cause", "")
@@ -143,12 +149,12 @@ def named_cause(error: BaseException | None) -> tuple[Cause, ...]:
 
 
 def probability_within(offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> float:
-    """Probability that rotation and translation are both within the tolerance.
+    """Probability that rotation and translation are both within a tolerance.
 
     Args:
         offset: ``(translation m, rotation rad)`` of the calibration against the estimate.
         covariance: ``[6, 6]`` of it.
-        tolerance: how far off is good.
+        tolerance: the largest error that counts as good.
     """
     variances, axes = np.linalg.eigh(covariance)
     draws = offset[:, None] + (axes * np.sqrt(np.maximum(variances, 0.0))) @ _draws()
@@ -164,9 +170,9 @@ def _draws() -> Floats:
 
 
 def _is_far(error: PoseError, found: Verdict, standard: Standard) -> bool:
-    """Whether a calibration is farther from what several frames agree on than they can be from the truth.
+    """Whether a calibration lies farther from the result of several frames than that result can lie from the truth.
 
-    Frames that do not fit are skipped, so those of a drive that leaves the range searched agree, too.
+    Frames that do not fit are skipped, so this holds for a drive that leaves the range searched as well.
     """
     farthest = standard.farthest
     if farthest is None or found.used < FEWEST_JUDGED:
@@ -175,9 +181,9 @@ def _is_far(error: PoseError, found: Verdict, standard: Standard) -> bool:
 
 
 def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> bool:
-    """Whether rotation or translation exceeds the tolerance, significantly by itself.
+    """Whether rotation or translation significantly exceeds the tolerance.
 
-    Each is tested alone: a small turn that is very sure says nothing of a large shift that is not.
+    Each is tested by itself: a small but very certain rotation says nothing about a large, uncertain translation.
     """
     too_far = (
         (ROTATION, error.rotation_deg > tolerance.rotation_deg),
@@ -190,7 +196,7 @@ def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance
 
 
 def _said(error: PoseError, offset: Vector6, covariance: Matrix6) -> str:
-    """How far off, about and along which axis most, and how sure that is."""
+    """The error with its uncertainty, and the axes with the largest shares of it."""
     turn = float(np.degrees(BAND * _deviation(offset[ROTATION], covariance[ROTATION, ROTATION])))
     shift = float(100 * BAND * _deviation(offset[TRANSLATION], covariance[TRANSLATION, TRANSLATION]))
     about, along = _most(error, TURNS), _most(error, SHIFTS)
@@ -201,12 +207,12 @@ def _said(error: PoseError, offset: Vector6, covariance: Matrix6) -> str:
 
 
 def _most(error: PoseError, axes: dict[str, str]) -> str:
-    """The axis with the largest share of an error."""
+    """The axis that contributes most to an error."""
     return max(axes, key=lambda axis: abs(getattr(error, axis)))
 
 
 def _deviation(vector: Floats, covariance: Floats) -> float:
-    """Standard deviation in the direction of a vector, or the largest where it has none."""
+    """Standard deviation in the direction of a vector, or the largest one for a zero vector."""
     length = float(np.linalg.norm(vector))
     if length < 1e-9:
         return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))

@@ -52,7 +52,7 @@ def test_nothing_is_named_that_fits_no_better_or_not_well() -> None:
     halved = replace(constant, attempts=(Attempt(("roll",), "It is rolled.", lambda frame: replace(frame, index=1)),))
     (named,) = cause(halved, FRAME, FRAME.camera_from_lidar, lambda frame, guess: 8.0 - 4 * frame.index)
     assert (named.name, named.text) == ("roll", "It is rolled.")
-    assert named.evidence == "4 px with that undone, instead of 8 px"
+    assert named.evidence == "4 px without this fault, 8 px with it"
     assert cause(halved, FRAME, FRAME.camera_from_lidar, lambda frame, guess: 80.0 - 60 * frame.index) == ()
 
 

@@ -42,7 +42,7 @@ def test_they_are_read_as_they_were_written(folder: Path) -> None:
     assert coefficients.for_drive(RANGES[4]) == DRIVE and coefficients.inflation == 1.25
     assert coefficients.lens == LENS
     without = replace(coefficients, drive=None).for_drive(RANGES[4])
-    assert without == "To drives the verdict has not been fitted."
+    assert without == "The verdict on drives has not been fitted."
     other = coefficients.for_frame(RANGES[3])
     assert isinstance(other, str) and "end with the stage of ±1°/0.1 m" in other
 
@@ -74,9 +74,9 @@ def test_own_weights_without_any_are_told_how_to_get_them_and_a_copy_needs_none(
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("match_error", "matcherror", "no predictor is called matcherror"),
+        ("match_error", "matcherror", "there is no predictor matcherror"),
         ("[covariance]", "[sprawl]", "'covariance'"),
-        ("fine_focal_gain", "fine_focal_loss", "no predictor is called fine_focal_loss"),
+        ("fine_focal_gain", "fine_focal_loss", "there is no predictor fine_focal_loss"),
         ("distortion = -1.0", "astigmatism = -1.0", "faults of the lens are focal-length, principal-point, distortion"),
     ],
 )

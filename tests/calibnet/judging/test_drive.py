@@ -44,13 +44,13 @@ def estimate(
     [
         (estimate(yaw=4.0, ahead=0.4), "accepted", "10 frames agree."),
         (estimate(yaw=5.9), "accepted", "10 frames agree."),  # within 1.2 times the range
-        (estimate(yaw=6.1), "rejected", "out of the range that was to be searched, ±5°/0.5 m"),
-        (estimate(ahead=-0.7), "rejected", "It lies 0° and 70 cm from the start"),
-        (estimate(degrees=0.2), "cannot tell", "leave it open to 0.35° and 5 cm"),  # 0.2 on each of three axes
-        (estimate(centimetres=8.0), "cannot tell", "leave it open to 0.17° and 14 cm"),
-        (estimate(error=2.5), "cannot tell", "10 frames agree, but not as those of drives that end right do"),
-        (estimate(error=4.0), "cannot tell", "(that it is more than 0.3° or 8 cm off is 85% likely)."),
-        (estimate(error=2.5, halves=40), "cannot tell", "likely); its halves are 40 cm apart."),
+        (estimate(yaw=6.1), "rejected", "outside the range searched (±5°/0.5 m)"),
+        (estimate(ahead=-0.7), "rejected", "The result lies 0° and 70 cm from the start"),
+        (estimate(degrees=0.2), "cannot tell", "only to 0.35° and 5 cm"),  # 0.2 on each of three axes
+        (estimate(centimetres=8.0), "cannot tell", "only to 0.17° and 14 cm"),
+        (estimate(error=2.5), "cannot tell", "10 frames agree, but less well than in drives with a correct result"),
+        (estimate(error=4.0), "cannot tell", "(probability of being more than 0.3° or 8 cm off: 85%)."),
+        (estimate(error=2.5, halves=40), "cannot tell", "%); the halves of the drive differ by 40 cm."),
         (estimate(bad=4), "accepted", "6 frames agree."),
         (estimate(bad=5), "rejected", "Only 5 of 10 frames could be used. It is cut short."),
     ],
@@ -67,13 +67,15 @@ def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
     doubtful = estimate(error=2.5)
     networks = replace(doubtful, camera_from_lidar=miscalibration([0, 0, 0], [0, 0.09, 0]) @ doubtful.camera_from_lidar)
     verdict = judge_drive(replace(doubtful, networks=networks), REFERENCE, RANGES[2], CLASSIFIER)
-    assert verdict.reason.endswith("; edges lie 9 cm from what the networks say, and either may be right.")
+    assert verdict.reason.endswith("; edges and networks differ by 9 cm, and either may be right.")
 
 
 def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
     few = replace(estimate(), frames=3, looks=estimate().looks[:3])
     verdict = judge_drive(few, REFERENCE, RANGES[2], CLASSIFIER)
-    assert verdict.word == "cannot tell" and verdict.reason.startswith("3 frames agree; to be sure of a drive takes 4")
+    assert verdict.word == "cannot tell" and verdict.reason.startswith(
+        "3 frames agree, but a drive needs 4 to be accepted"
+    )
     assert judge_drive(replace(few, frames=4), REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"
 
 
@@ -87,7 +89,7 @@ def test_a_start_in_the_corner_of_the_range_is_within_it() -> None:
 def test_by_no_coefficients_no_drive_is_accepted() -> None:
     verdict = judge_drive(estimate(), REFERENCE, RANGES[2], "Nothing was fitted.")
     assert verdict.word == "cannot tell"
-    assert verdict.reason == "10 frames agree, but how sure that is cannot be told. Nothing was fitted."
+    assert verdict.reason == "10 frames agree, but how reliable that is cannot be judged. Nothing was fitted."
     assert judge_drive(estimate(yaw=6.1), REFERENCE, RANGES[2], "Nothing was fitted.").word == "rejected"
 
 

@@ -52,7 +52,7 @@ def test_what_is_known_beforehand_is_never_rejected_by_the_classifier_alone() ->
         judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), CLASSIFIER, prior=fixed) for error in (1.4, 2.0, 4.2)
     ]
     assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, CANNOT_TELL]
-    assert "81% likely; with x, y, z fixed it is less so" in verdicts[2].reason
+    assert "81% without prior knowledge, less with x, y, z fixed" in verdicts[2].reason
     lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), CLASSIFIER, prior=fixed)
     assert lost.word == REJECTED
 
@@ -61,13 +61,13 @@ def test_a_trace_without_matches_cannot_be_told() -> None:
     verdict = judge(
         FRAME, GUESS, run(GUESS, REFERENCE, None, match_error=1.2), fitted(Classifier(0.0, {"misfit": 1.0}, 0.6, 0.8))
     )
-    assert verdict.word == CANNOT_TELL and "not enough" in verdict.reason
+    assert verdict.word == CANNOT_TELL and "too little information" in verdict.reason
 
 
 def test_by_coefficients_of_no_or_of_other_stages_nothing_is_accepted() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=1.2)
-    unfit = judge(FRAME, GUESS, trace, Coefficients(missing="They are of other weights; mend that."))
-    assert unfit.word == CANNOT_TELL and unfit.reason.endswith("cannot be told. They are of other weights; mend that.")
+    unfit = judge(FRAME, GUESS, trace, Coefficients(missing="Other weights; fit it."))
+    assert unfit.word == CANNOT_TELL and unfit.reason.endswith("cannot be judged. Other weights; fit it.")
     short = judge(FRAME, GUESS, replace(trace, stages=trace.stages[:2]), CLASSIFIER)
     assert short.word == CANNOT_TELL and "that end with the stage of ±1°/0.1 m, not with ±2°/0.2 m" in short.reason
     lost = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=9.0), Coefficients())
@@ -78,7 +78,7 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
     trace = run(GUESS, REFERENCE, FITS, match_error=9.0)
     verdict = judge(FRAME, GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and verdict.causes == ()
-    assert verdict.reason.endswith("matches are expected to be 9.0 px off, at most 5.5 px are usual.")
+    assert verdict.reason.endswith("the expected match error is 9.0 px, where at most 5.5 px is usual.")
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
 
     upright = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)
@@ -115,7 +115,7 @@ def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
-    assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The picture shows nothing."
+    assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The picture is blank."
 
 
 def test_what_could_not_be_run_is_rejected_where_it_started() -> None:

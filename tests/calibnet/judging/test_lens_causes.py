@@ -65,7 +65,7 @@ def test_probabilities_are_those_of_the_fitted_odds() -> None:
         (lambda places: 1.03 * places, ["focal-length"], "% longer"),
         (lambda places: places + np.array([0.05, 0]), ["principal-point"], "of the width farther to the right"),
         (lambda places: places - np.array([0.05, 0]), ["principal-point"], "of the width farther to the left"),
-        (barrel, BARREL, "looks barrel-shaped"),
+        (barrel, BARREL, "looks barrel-distorted"),
     ],
 )
 def test_the_likeliest_fault_is_named_with_its_direction(
@@ -73,7 +73,7 @@ def test_the_likeliest_fault_is_named_with_its_direction(
 ) -> None:
     found = lens_causes(seen(bend), LENS_ODDS)
     assert [cause.name for cause in found] == names
-    assert all(text in cause.text and "% likely" in cause.evidence for cause in found)
+    assert all(text in cause.text and "%, by a regression fitted to" in cause.evidence for cause in found)
 
 
 def test_nothing_is_named_that_is_not_likely_enough_or_cannot_be_told() -> None:

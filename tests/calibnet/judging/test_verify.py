@@ -39,7 +39,7 @@ def test_a_calibration_that_is_off_is_rejected_with_axis_and_uncertainty() -> No
     verdict = verify(off(yaw=2.7), found(0.1, 3.0), TIGHT)
     assert verdict.word == "rejected"
     assert verdict.reason.startswith("The calibration is off by 2.70° ± 0.20° (most of it yaw, +2.70°) and ")
-    assert verdict.reason.endswith("0.3° / 8 cm are tolerated.")
+    assert verdict.reason.endswith("the tolerance is 0.3° / 8 cm.")
     assert verdict.moved[0] == pytest.approx(2.7) and verdict.used == 12
     np.testing.assert_array_equal(verdict.camera_from_lidar, REFERENCE)  # where it should be
 
@@ -111,13 +111,13 @@ def test_what_is_far_off_is_rejected_by_a_drive_that_is_not_sure_how_far(
 
 def test_near_says_how_near_though_it_is_not_sure() -> None:
     reason = verify(off(yaw=0.2), unsure(), DRIVE).reason
-    assert reason.startswith("The calibration lies 0.2° and ") and "not sure enough to hold it against" in reason
+    assert reason.startswith("The calibration differs by 0.2° and ") and "too uncertain to judge it by" in reason
 
 
 def test_far_off_says_how_far() -> None:
     reason = verify(off(yaw=3.4), unsure(), DRIVE).reason
-    assert reason.startswith("The calibration is off by some 3.4° and ")
-    assert "or the input is wrong; how far exactly is not sure." in reason
+    assert reason.startswith("The calibration is off by about 3.4° and ")
+    assert "or the input is wrong; the exact amount is uncertain." in reason
 
 
 def test_without_covariance_nobody_can_tell() -> None:
@@ -155,10 +155,15 @@ def test_what_a_drive_and_a_frame_usually_state_is_sure_enough_to_accept_what_is
 @pytest.mark.parametrize(
     ("given", "sure", "word", "end"),
     [
-        (off(), (0.05, 2.0), "accepted", "no more than 0.3° / 8 cm: by"),  # sure enough for the finest
-        (off(), (0.12, 3.5), "accepted", "no more than 0.5° / 15 cm: by"),
-        (off(z=0.10), (0.05, 2.0), "rejected", "0.3° / 8 cm are tolerated."),  # what is sure finds less
-        (off(z=0.09), (0.05, 2.6), "accepted", "no more than 0.5° / 15 cm: by"),  # beyond 8 cm, but at 3.5 sigma only
+        (off(), (0.05, 2.0), "accepted", "no more than 0.3° / 8 cm: 0.00°"),  # sure enough for the finest
+        (off(), (0.12, 3.5), "accepted", "no more than 0.5° / 15 cm: 0.00°"),
+        (off(z=0.10), (0.05, 2.0), "rejected", "the tolerance is 0.3° / 8 cm."),  # what is sure finds less
+        (
+            off(z=0.09),
+            (0.05, 2.6),
+            "accepted",
+            "no more than 0.5° / 15 cm: 0.00°",
+        ),  # beyond 8 cm, but at 3.5 sigma only
         (off(z=0.14), (0.05, 3.5), "cannot tell", "within 0.5° / 15 cm is "),
     ],
 )
