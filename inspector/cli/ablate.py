@@ -43,7 +43,11 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option(
-    "--timed", type=click.IntRange(0), default=3, show_default=True, help="Looks whose median is the latency; 0: none."
+    "--timed",
+    type=click.IntRange(0),
+    default=3,
+    show_default=True,
+    help="Number of timed looks, of which the median is shown; 0 for none.",
 )
 @click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option(
@@ -66,11 +70,11 @@ def ablate(
     json_file: str | None,
     markdown_file: Path | None,
 ) -> None:
-    """Take the network apart: what each of the paper's five ablations and the whole network costs and is worth.
+    """Measure the paper's five ablations and the whole network: cost and errors of each.
 
-    Parameters, multiply-adds, latency and errors stand beside the paper's. Errors are those after one look of the
-    network of --range for the rows that --weights has; latency is of one look, on the first frame of --data.
-    The preset paper has no weights, and takes a minute or two of CPU for its latencies.
+    Parameters, multiply-adds, latency and errors are listed beside the paper's. Errors are those after one look of the
+    network for --range, for the rows whose weights are in --weights. Latency is that of one look on the first frame of
+    --data. The preset paper has no weights; its latencies take a minute or two of CPU time.
 
     \b
     calib-inspect train --ablation aggregation --range 5/0.5 --samples 10000 --uniform --packed PARTS --output ROWS

@@ -52,18 +52,28 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 )
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option(
-    "--most", type=click.IntRange(2), default=12, show_default=True, help="Frames measured of a sequence or a drive."
+    "--most",
+    type=click.IntRange(2),
+    default=12,
+    show_default=True,
+    help="Most frames of a sequence or drive to measure.",
 )
 @click.option(
-    "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame or drive."
+    "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations per frame or drive."
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
-@click.option("--limit", type=click.FloatRange(1), default=300.0, show_default=True, help="Seconds for a row at most.")
-@click.option("--audit/--no-audit", default=True, help="Also with grey and other pictures.  [default: yes]")
+@click.option(
+    "--limit", type=click.FloatRange(1), default=300.0, show_default=True, help="Time limit for a row, in seconds."
+)
+@click.option(
+    "--audit/--no-audit",
+    default=True,
+    help="Also measure with a grey picture and with one of another drive.  [default: yes]",
+)
 @click.option("--preset", default="compact", show_default=True, help="Network of the cascade.")
 @click.option("--weights", type=FOLDER, help="Folder of the weights of other methods.")
 @click.option(
-    "--ours", multiple=True, type=NamedFolder(), help="A further row of the cascade, with weights of DIR. Repeatable."
+    "--ours", multiple=True, type=NamedFolder(), help="Add a row of the cascade with the weights in DIR. Repeatable."
 )
 @click.option("--masks", type=FOLDER, metavar="DIR", help="Masks for calib-anything, as in seq.")
 @click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
@@ -96,11 +106,11 @@ def bench(
     html_file: Path | None,
     markdown_file: Path | None,
 ) -> None:
-    """Measure all methods on the same frames from the same miscalibrations, in the rigs they know and in others.
+    """Measure all methods on the same frames from the same miscalibrations, on rigs they were trained on and on others.
 
-    A row a range and rig: errors, refused runs, success. Beside them what a method costs, what it was trained on, what
-    it makes of grey pictures and of those of another drive, and what its paper claims. A method that cannot run, for
-    want of weights or of motion, is a row that says so.
+    One row per method, range and rig: errors, refused runs, success rates, cost, training data, results with a grey
+    picture and with one of another drive, and the figures of its paper. A method that cannot run, because it lacks
+    weights or because the car stands still, gets a row that says so.
     """
     from calibnet.runtime.writing import Kind
     from inspector.report import bench_page

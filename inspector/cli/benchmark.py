@@ -47,9 +47,9 @@ def benchmark(
 ) -> None:
     """Time the cascade on frames of the synthetic world with a scanner like KITTI's.
 
-    Times are medians of single frames from memory to extrinsic, projection included; besides, each stage's
-    network on several frames at once. A network of another paper is timed in turn with them, so that the ratio
-    holds on a busy machine too.
+    Times are medians over single frames, from a frame in memory to its extrinsic, including the projection; and of each
+    stage's network on several frames at once. A network of another paper is timed alternately with them, so that the
+    ratio is meaningful on a busy machine too.
     """
     prepare_json(json_file)
     import torch

@@ -22,7 +22,10 @@ LIMIT = NumberRange(min=0.0)
 @click.option("--max-sigma-rotation", type=LIMIT, metavar="DEG", help="Largest stated uncertainty of the rotation, 1σ.")
 @click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
 @click.option(
-    "--max-scatter-rotation", type=LIMIT, metavar="DEG", help="Largest rotation of a frame off the frames' median."
+    "--max-scatter-rotation",
+    type=LIMIT,
+    metavar="DEG",
+    help="Largest rotation of a frame from the median of the frames, in degrees.",
 )
 @click.option("--max-scatter-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
 @click.option("--max-unused", type=LIMIT, metavar="PERCENT", help="Largest share of rejected and skipped frames.")
@@ -32,7 +35,7 @@ LIMIT = NumberRange(min=0.0)
     type=click.Choice(["median", "p95", "max", "drive"]),
     default="median",
     show_default=True,
-    help="What must keep the limits: over the frames, or the error of the drive's one extrinsic.",
+    help="Which error the limits apply to: a statistic over the frames, or the error of the drive's extrinsic.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")
@@ -44,12 +47,12 @@ def check(
     junit_file: Path | None,
     **largest: float | None,
 ) -> int:
-    """Hold a recorded run against its verdict and, where they are given, against limits.
+    """Check the verdict of a recorded run and, if given, limits.
 
-    Exits with 1 when the verdict is rejected or a limit is exceeded, and with 4 when it cannot be told. The verdict is
-    that of the drive; of a run without one it is on the frames: rejected if half of them or more are, accepted if
-    more than half are. Errors are those of the frames' corrected extrinsics against the reference. Without a reference
-    there are limits on what the run says of itself: --max-sigma-..., --max-scatter-..., --max-unused and --max-fit.
+    Exits with 1 if the verdict is rejected or a limit is exceeded, and with 4 if the verdict is cannot tell. The
+    verdict is that of the drive or, without one, of the frames: rejected if at least half of them are rejected,
+    accepted if more than half are accepted. Errors compare the frames' corrected extrinsics with the reference. These
+    limits need no reference: --max-sigma-..., --max-scatter-..., --max-unused and --max-fit.
     """
     from inspector.check import KINDS, Limit, check_run, junit, summary
     from inspector.verdicts import line

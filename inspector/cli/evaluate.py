@@ -53,22 +53,25 @@ if TYPE_CHECKING:
 @click.option(
     "--range", "range_", type=RANGE, default="20/1.5", show_default=True, help="Range of the miscalibrations."
 )
-@click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
+@click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations per frame.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
-@click.option("--audit", is_flag=True, help="Measure again with another drive's image, a grey one, and fewer rings.")
+@click.option(
+    "--audit", is_flag=True, help="Repeat the measurement with another drive's image, a grey one, and fewer rings."
+)
 @click.option(
     "--battery",
     is_flag=True,
-    help="Instead: put some 70 faults into every frame, and count what the verdict says of them.",
+    help="Instead, apply some 70 faults to every frame and count the verdicts.",
 )
 @click.option(
     "--virtual",
     type=click.IntRange(1),
     metavar="N",
-    help="Every sequence as N virtual rigs instead: narrower lenses, cameras turned, half of them with half the rings.",
+    help="Replace every sequence by N virtual rigs: narrower lenses, rotated cameras, half of them with half the "
+    "rings.",
 )
 @click.option("--drives/--no-drives", default=True, help="Also solve every drive from all its frames.  [default: yes]")
 @click.option(
@@ -81,7 +84,7 @@ if TYPE_CHECKING:
     "methods",
     multiple=True,
     type=click.Choice(METHODS.names()),
-    help="Another method, on the same single frames or, where it knows whole drives alone, drives. Repeatable.",
+    help="Also measure this method on the same frames, or on drives if it only solves drives. Repeatable.",
 )
 @click.option("--method-weights", type=FOLDER, help="Folder of the weights of --method.  [default: that of --weights]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
@@ -108,7 +111,7 @@ def evaluate(
     method_weights: Path | None,
     json_file: str | None,
 ) -> None:
-    """Measure the cascade: every frame, from seeded random miscalibrations, against the dataset's extrinsic.
+    """Measure the cascade's errors: every frame starts from random miscalibrations (seeded) of the dataset's extrinsic.
 
     Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success
     rates: for the initial error, a classical refinement (edges and reflectance of the scan onto the image's

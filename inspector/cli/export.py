@@ -33,7 +33,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default without a drive]")
 @click.option("--drive", is_flag=True, help="The extrinsic of the drive.  [default where it was solved]")
-@click.option("--force", is_flag=True, help="Write it although it is rejected.")
+@click.option("--force", is_flag=True, help="Write a rejected extrinsic all the same.")
 @click.option("--camera", metavar="NAME", help="The camera of a rig.  [default: all, into the folder --output]")
 @click.option(
     "--output",
@@ -65,16 +65,15 @@ def export(
     lidar_frame: str,
     parent: str,
 ) -> int:
-    """Write the corrected extrinsic in the format of another tool, or as a calibration.yaml of ours.
+    """Write the corrected extrinsic in the format of another tool, or as a calibration.yaml.
 
-    By default that of the whole drive; of a run without one, the median of all frames: the rotation and the
-    translation with the smallest sum of distances to those of the frames, which outliers hardly move. Every file says
-    its convention.
+    By default that of the whole drive or, without one, the geometric median of all frames, which is robust against
+    outliers. Every file states its convention.
 
-    What is rejected is not written, and the exit code is 1, unless --force is given. What is rejected or cannot be told
-    says so on stderr and in the file.
+    A rejected extrinsic is not written, and the exit code is 1, unless --force is given. A warning on stderr and in the
+    file marks one that is rejected or cannot tell.
 
-    Of the recording of a rig, --output is a folder in which every camera gets a file of its name; --camera chooses one.
+    For the recording of a rig, --output is a folder with one file per camera, named like it; --camera chooses one.
     """
     if (recording is None) == (folder is None):
         raise click.UsageError("Give a recording or --from FOLDER.")

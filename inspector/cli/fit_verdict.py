@@ -31,34 +31,39 @@ MOST_WORKERS = 8
     "--data",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
-    help="Frames whose own extrinsic is true and that were not trained on. Repeatable; many rigs are better.",
+    help="Frames with a correct extrinsic that were not trained on. Repeatable; many rigs are better.",
 )
 @click.option(
     "--drive-data",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
-    help="Drives besides those of --data. Repeatable. Good ones are needed: eight frames and more on a known mount.",
+    help="Further drives, in addition to those of --data, best of eight or more frames. Repeatable.",
 )
 @click.option(
     "--synthetic",
     type=click.IntRange(0),
     default=3,
     show_default=True,
-    help="Drives of the synthetic world besides, each with sensors of its own.",
+    help="Synthetic drives to add, each with other sensors.",
 )
-@click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Frames to calibrate and fit to.")
+@click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Number of runs on single frames.")
 @click.option(
-    "--lenses", type=click.IntRange(0), default=400, show_default=True, help="Frames to fit faults of the lens to."
+    "--lenses", type=click.IntRange(0), default=400, show_default=True, help="Number of runs with faults of the lens."
 )
-@click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Drives to solve and fit to.")
+@click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Number of runs on drives.")
 @click.option(
     "--minutes",
     type=click.FloatRange(0, min_open=True),
-    help="Stop there if --runs and --drives are not done by then; what was run is kept, and counts the next time.",
+    help="Stop after this time even if --runs and --drives are not finished; the runs made so far are kept for the "
+    "next call.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of everything random.")
 @click.option(
-    "--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run, from their first's range."
+    "--stages",
+    type=STAGES,
+    default="3-5",
+    show_default=True,
+    help="Stages to run; guesses are drawn from the range of the first.",
 )
 @click.option(
     "--workers", type=click.IntRange(0), help="Processes, of one thread each.  [default: as many as cores, 8 at most]"
@@ -77,12 +82,12 @@ def fit_verdict(
     stages: tuple[int, ...],
     workers: int | None,
 ) -> None:
-    """Fit the verdict to weights of your own: without that, none of their results is accepted.
+    """Fit the verdict to your own weights; without that, none of their results is accepted.
 
-    Calibrates frames of a known extrinsic from random guesses, half of them with one of the battery's faults, and fits
-    what tells right from wrong. Writes PRESET-verdict.toml beside the weights, for these weights alone: fit it again
-    after training on. Runs are kept in PRESET-verdict.jsonl as they are made; the same
-    command goes on from there.
+    Calibrates frames with known extrinsics from random guesses, half of them with one of the battery's faults, and fits
+    a classifier of right and wrong results. Writes PRESET-verdict.toml beside the weights. It is valid for these
+    weights only: fit it again after further training. Runs are appended to PRESET-verdict.jsonl as they are made, and
+    the same command continues from there.
 
     \b
     calib-inspect fit-verdict --weights runs --data kitti-raw:KITTI/raw:2011_09_26/0048 --data folder:RIGS

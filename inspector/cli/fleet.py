@@ -35,14 +35,16 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
 
 @click.command()
 @click.argument("sources", nargs=-1, required=True, metavar="DRIVES.csv | FOLDER...")
-@click.option("--out", required=True, metavar="DIR|URL", help="Folder of all results; the same one to go on.")
+@click.option(
+    "--out", required=True, metavar="DIR|URL", help="Folder of all results; give the same folder to continue."
+)
 @click.option(
     "--workers",
     type=click.IntRange(0, 1024),
     metavar="N",
     help="Processes on this machine; 0 does the drives in this one, without Dask.  [default: half of the cores]",
 )
-@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Do it on a Dask cluster that runs already.")
+@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Use this running Dask cluster.")
 @click.option(
     "--memory",
     type=SIZE,
@@ -59,7 +61,7 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
     metavar="TEXT",
     help="Further options of `verify` for every drive, for instance '--seed 1'.",
 )
-@click.option("--force", is_flag=True, help="Do again what is done.")
+@click.option("--force", is_flag=True, help="Repeat finished drives.")
 @overwrite_option
 def fleet(
     sources: tuple[str, ...],
@@ -72,13 +74,13 @@ def fleet(
     options: str,
     force: bool,
 ) -> int:
-    """Calibrate many drives, each as one, and verify the calibration that it had.
+    """Calibrate many drives, and verify the calibration that each came with.
 
-    DRIVES.csv has a row a drive: path, and optionally car, drive, date, dataset, sequence, camera, frames and options.
-    A FOLDER is a drive of its own, with images/, clouds/ and calibration.yaml.
+    DRIVES.csv has one row per drive: path, and optionally car, drive, date, dataset, sequence, camera, frames and
+    options. A FOLDER is a drive of its own, with images/, clouds/ and calibration.yaml.
 
-    Each drive gets a folder with its report, recording and verdict, and a row in fleet.parquet. The same call again
-    does only what is missing or has changed. Ends with 0 when every drive has its row, whatever it says.
+    Each drive gets a folder with its report, recording and verdict, and a row in fleet.parquet. Repeating the command
+    runs only drives that are missing or have changed. Exits with 0 if every drive has a row, whatever its verdict.
     """
     from calibnet.runtime.claim import Claim
     from calibnet.runtime.writing import Kind

@@ -39,9 +39,9 @@ def simulate(count: int, out: Path, frames: int, seed: int) -> None:
 @click.argument("folder", type=FOLDER, metavar="DIR")
 @overwrite_option
 def report(folder: Path) -> None:
-    """Write a page of a fleet: its cars with the moves of their mounts, and every drive, worst first.
+    """Write a page about a fleet: its cars, moves of their mounts, and every drive, worst first.
 
-    DIR is what --out of `fleet` named. Each drive leads to its own report and recording.
+    DIR is the folder given to `fleet --out`. Each drive links to its report and recording.
     """
     from inspector.fleet.page import write_page
     from inspector.fleet.table import TABLE, read_table
@@ -54,7 +54,7 @@ def report(folder: Path) -> None:
 @click.option("--serve", "in_browser", is_flag=True, help="Offer the viewer as a web page, on this machine only.")
 @click.option("--headless", is_flag=True, help="Open no window.")
 def view(folder: Path, in_browser: bool, headless: bool) -> None:
-    """Serve all recordings of a fleet as one table of Rerun's, on this machine, until Ctrl-C.
+    """Serve all recordings of a fleet as one table in the Rerun viewer, on this machine, until Ctrl-C.
 
     The table sorts and filters by verdict, cause and how far the calibration was off; a row opens its drive.
     """

@@ -197,11 +197,13 @@ KNOWN_OPTIONS = (
     click.option(
         "--fix",
         type=AXES,
-        help="Axes of the start that are known exactly, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z keep the "
-        "camera's place as seen from the LiDAR.",
+        help="Axes of the initial extrinsic that are exact, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z fix "
+        "the camera's position relative to the LiDAR.",
     ),
-    click.option("--prior-translation", type=LENGTH, help="The camera's place is known to this, on each axis."),
-    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this, about each axis."),
+    click.option(
+        "--prior-translation", type=LENGTH, help="The camera's position is known to this standard deviation per axis."
+    ),
+    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this standard deviation per axis."),
 )
 """Options of every command that starts from an extrinsic of which something may be known."""
 METHOD_OPTIONS = (
@@ -210,15 +212,15 @@ METHOD_OPTIONS = (
         type=click.Choice((CASCADE, *METHODS.names())),
         default=CASCADE,
         show_default=True,
-        help="What calibrates: the cascade, or another method, whose results nothing judges.",
+        help="Method to calibrate with. Only results of the cascade are judged.",
     ),
     click.option(
         "--masks",
         type=FOLDER,
         metavar="DIR",
-        help="Masks for calib-anything: for each picture a folder of its name with a PNG for each mask.  "
+        help="Masks for calib-anything: one folder per picture, named like it, with one PNG per mask.  "
         "[default: segments of the picture]",
     ),
-    click.option("--intrinsics", is_flag=True, help="Let pcba adjust the camera's focal length and centre as well."),
+    click.option("--intrinsics", is_flag=True, help="Let pcba adjust focal length and principal point as well."),
 )
 """Options of every command that calibrates with any method."""

@@ -13,11 +13,11 @@ from inspector.cli.options import FOLDER, SIZE
 
 @click.command("pack-training")
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Real frames, as in train. Repeatable.")
-@click.option("--validate", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames that are left out.")
+@click.option("--validate", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames to leave out.")
 @click.option("--synthetic", type=click.FloatRange(0, 1), default=TrainingOptions.synthetic, show_default=True)
 @click.option("--scenes", type=click.IntRange(1), default=500, show_default=True, help="Synthetic scenes to pack.")
 @click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
-@click.option("--after", type=FOLDER, help="Weights whose residuals travel too; measuring them takes minutes.")
+@click.option("--after", type=FOLDER, help="Weights whose residuals are measured, which takes minutes, and packed too.")
 @click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
@@ -36,8 +36,8 @@ def pack_training(
 ) -> None:
     """Pack training frames into a few files that `train --packed` reads.
 
-    For a machine with a GPU and little else: pictures and scans at the resolution training needs, synthetic scenes
-    included, in parts of bounded size, each of which is of use alone.
+    For machines with a GPU but little storage: pictures and scans at the resolution that training needs, including
+    synthetic scenes, in parts of limited size, each of which can be used without the others.
 
     \b
     calib-inspect pack-training --data kitti-raw:KITTI/raw --data folder:RIGS --out packed

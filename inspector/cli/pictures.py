@@ -55,10 +55,10 @@ def pictures(
 ) -> None:
     """Take a picture of every tab of a recording in the real viewer, without a window.
 
-    FILE.rrd is the recording of a run, a rig, a comparison, a training or of `watch`; --animate takes that of a run.
+    FILE.rrd is the recording of a run, a rig, a comparison, a training or of `watch`; --animate needs that of a run.
 
-    That needs a Vulkan driver; Mesa's software one will do (Debian: mesa-vulkan-drivers). --animate needs none, and
-    takes no pictures of the tabs unless --out is given as well.
+    Pictures of tabs need a Vulkan driver; Mesa's software driver will do (Debian: mesa-vulkan-drivers). --animate needs
+    none, and without --out takes no pictures of tabs.
     """
     if out is None and animate is None:
         raise click.UsageError("Give --out DIR for pictures of the tabs, --animate FILE for one that moves, or both.")

@@ -34,18 +34,19 @@ if TYPE_CHECKING:
 @click.option(
     "--tolerance",
     type=TOLERANCE,
-    help="As --rigid, but each camera may be off its place on the rig by this, one standard deviation an axis; for "
+    help="As --rigid, but each camera may deviate from its place on the rig by this standard deviation per axis, for "
     "instance 0.5deg/2cm.",
 )
 @click.option(
     "--miscalibrate",
     "miscalibration",
     type=MISCALIBRATION,
-    help="Put this on the rig, in the first camera's axes, and take the extrinsics given for the truth.",
+    help="Apply this miscalibration to the rig, in the axes of the first camera, and use the given extrinsics as the "
+    "reference.",
 )
-@click.option("--fix", type=AXES, help="Axes that are known exactly, of each camera, or of the first with --rigid.")
-@click.option("--prior-translation", type=LENGTH, help="The place is known to this, on each axis.")
-@click.option("--prior-rotation", type=ANGLE, help="The rotation is known to this, about each axis.")
+@click.option("--fix", type=AXES, help="Axes that are exact, of each camera or, with --rigid, of the first camera.")
+@click.option("--prior-translation", type=LENGTH, help="The position is known to this standard deviation per axis.")
+@click.option("--prior-rotation", type=ANGLE, help="The rotation is known to this standard deviation per axis.")
 @click.option("--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to use.")
 @click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
     "--output",
     type=FOLDER,
     metavar="DIR",
-    help="Write a calibration.yaml with what was found for each camera there, NAME.yaml; not what is rejected.",
+    help="Write a calibration file NAME.yaml for each camera that is not rejected to this folder.",
 )
 @viewing_options
 def rig(
@@ -76,12 +77,12 @@ def rig(
 
     FOLDER holds cameras/NAME/ for each camera, with images/ and calibration.yaml, and clouds/ for those that have none
     themselves. Or give a plain folder for each camera. Without --rigid each camera is solved on its own, from all its
-    frames; with it all frames of all cameras say where the one rig is, and with --tolerance each camera's besides where
-    it is on the rig.
+    frames; with it one pose of the rig is solved from all frames of all cameras, and with --tolerance also the pose of
+    each camera on the rig.
 
     The recording shows all cameras side by side; `report` makes a page of it, and `export` files for other tools.
 
-    Exits with 0 if everything is accepted, 1 if something is rejected, 4 if something cannot be told.
+    Exits with 0 if everything is accepted, 1 if something is rejected, else 4 (cannot tell).
     """
     from calibnet.cascade.cascade import Cascade
     from calibnet.geometry.prior import Prior

@@ -44,10 +44,13 @@ def start_options(given: bool, every: str) -> tuple[Decorator, ...]:
         click.option(
             "--range",
             type=RANGE,
-            help=f"Draw the miscalibration from ± these degrees and metres.  [default: {undisturbed}]",
+            help=f"Draw a random miscalibration within ± these degrees and metres.  [default: {undisturbed}]",
         ),
         click.option(
-            "--miscalibrate", "miscalibration", type=MISCALIBRATION, help="This miscalibration, instead of drawing one."
+            "--miscalibrate",
+            "miscalibration",
+            type=MISCALIBRATION,
+            help="Use this miscalibration instead of a random one.",
         ),
         click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
         *KNOWN_OPTIONS,
@@ -65,7 +68,7 @@ BAD_FRAME_OPTION: Decorator = click.option(
     type=click.Choice(["skip", "stop"]),
     default="skip",
     show_default=True,
-    help="What to do at a frame that cannot be read or calibrated; half of them or more end the run anyway.",
+    help="What to do with a frame that cannot be read or calibrated. The run always ends if half of the frames fail.",
 )
 RECORDING_OPTIONS: tuple[Decorator, ...] = (
     click.option(
@@ -87,10 +90,14 @@ RECORDING_OPTIONS: tuple[Decorator, ...] = (
         type=COLORING,
         default="depth",
         show_default=True,
-        help="Colour of the points on the image; edge: depth edges stand out; error: pixels off the reference.",
+        help="Colour of the points on the image; edge highlights depth edges, error is the distance from the "
+        "reference in pixels.",
     ),
     click.option(
-        "--report", type=FOLDER, metavar="DIR", help="Make a report of the run there, as `calib-inspect report` does."
+        "--report",
+        type=FOLDER,
+        metavar="DIR",
+        help="Write a report of the run to this folder, as `calib-inspect report` does.",
     ),
 )
 """What is recorded of each frame, and the report."""
@@ -100,7 +107,7 @@ PER_FRAME_OPTION: Decorator = click.option(
 DRIVE_OPTION: Decorator = click.option(
     "--drive/--no-drive",
     default=None,
-    help="After the frames, solve the one extrinsic of the whole drive from all of them: the best there is.  "
+    help="After the single frames, solve one extrinsic from all of them, which is the most accurate.  "
     "[default: with several frames on one mount]",
 )
 JSON_OPTION: Decorator = click.option(

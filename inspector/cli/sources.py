@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 KITTI = "{} is unpacked (from cvlibs.net/datasets/kitti)"
 AS_GIVEN = (
-    "Without --range and --miscalibrate its calibration is what is to be corrected, and there is no reference; with "
-    "them it is the reference."
+    "Without --range and --miscalibrate the data's calibration is the one to correct, and there is no reference; with "
+    "one of them it is the reference."
 )
 CAMERA = click.Option(
     ["--camera"], type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
@@ -32,15 +32,17 @@ GUESS = click.Option(
     ["--guess"],
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Start from the extrinsic of this calibration file; needed where the data's own has none.",
+    help="Start from the extrinsic in this calibration file; required if the data contain none.",
 )
 CAMERA_OF_FILE = click.Option(
-    ["--camera"], metavar="NAME", help="Camera of a calibration file of several, for instance cam0."
+    ["--camera"], metavar="NAME", help="Camera to use from a calibration file with several, for instance cam0."
 )
 CAMERA_FRAME = click.Option(
-    ["--camera-frame"], metavar="NAME", help="The camera's optical frame, among many in a calibration file or a bag."
+    ["--camera-frame"],
+    metavar="NAME",
+    help="Name of the camera's optical frame, if the calibration file or bag has several frames.",
 )
-LIDAR_FRAME = click.Option(["--lidar-frame"], metavar="NAME", help="The LiDAR's frame, likewise.")
+LIDAR_FRAME = click.Option(["--lidar-frame"], metavar="NAME", help="Name of the LiDAR's frame, if there are several.")
 
 SOURCES = (
     published(
@@ -108,7 +110,7 @@ SOURCES = (
                 ["--compensate/--as-taken"],
                 default=True,
                 show_default=True,
-                help="Move each scan to the time of its image, by the car's poses.",
+                help="Move each scan to the time of its image by the car's poses, or leave it as taken.",
             ),
         ),
         variable="NUSCENES",
@@ -126,7 +128,7 @@ SOURCES = (
                 type=click.Choice([name for name in dataset_names() if name not in PUBLISHED]),
                 default="folder",
                 show_default=True,
-                help="What the folder holds; packages can add to these.",
+                help="Kind of data in the folder; other packages can add kinds.",
             ),
             GUESS,
             CAMERA_OF_FILE,
@@ -164,20 +166,21 @@ SOURCES = (
                 ["--every"],
                 type=click.FloatRange(min=0, min_open=True),
                 metavar="S",
-                help="A frame in so many seconds, at a standstill where there is one.  [default: about 40 frames]",
+                help="Take one frame per this many seconds, at a standstill if there is one.  [default: about 40 "
+                "frames]",
             ),
             click.Option(
                 ["--accumulate"],
                 type=click.IntRange(1, 100),
                 default=1,
                 metavar="N",
-                help="Put N scans together at a standstill, for scanners that do not repeat their pattern (Livox).",
+                help="Accumulate N scans at standstills, for scanners with a non-repeating pattern (Livox).",
             ),
             click.Option(
                 ["--max-time-difference"],
                 type=click.FloatRange(min=0, min_open=True),
                 metavar="MS",
-                help="Milliseconds that an image and its scan may be apart.  [default: 50]",
+                help="Largest time difference between an image and its scan, in milliseconds.  [default: 50]",
             ),
         ),
         open=open_bag,

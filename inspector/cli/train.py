@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 @click.option(
     "--ablation",
     type=click.Choice(list(ABLATIONS)),
-    help="Row of the paper's ablation: the preset without one of its modules, in a folder of its own within --output.",
+    help="Row of the paper's ablation: the preset without one of its modules; written to a subfolder of --output.",
 )
 @click.option(
     "--image-encoder",
     type=click.Choice(["own", "efficientnet-lite0"]),
-    help="Image encoder instead of the preset's: own starts from nothing, the other from ImageNet.",
+    help="Image encoder instead of the preset's: own starts from random weights, the other from ImageNet.",
 )
 @click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     "--all",
     "every_stage",
     is_flag=True,
-    help="Train all five stages, one after the other; --minutes or --samples is the budget of all. Stages whose "
-    "weights are in --output already are done.",
+    help="Train all five stages one after the other, within --minutes or --samples in total. Stages whose weights are"
+    " in --output are skipped.",
 )
 @click.option(
     "--data",
@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     "--validate",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
-    help="Held-out frames; never trained on, also if --data covers them.",
+    help="Held-out frames, which are never trained on even if --data contains them.",
 )
 @click.option(
     "--synthetic",
@@ -79,11 +79,11 @@ if TYPE_CHECKING:
     show_default=True,
     help="Synthetic scenes, each rendered once.",
 )
-@click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
+@click.option("--scene-cache", type=FOLDER, help="Folder for rendered scenes.  [default: the temporary folder]")
 @click.option("--minutes", type=NumberRange(0, min_open=True), help="Budget of training time, over all resumed runs.")
 @click.option("--samples", type=click.IntRange(1), help="Budget in samples instead: exactly repeatable.")
 @click.option(
-    "--batch", type=click.IntRange(1), default=TrainingOptions.batch, show_default=True, help="Samples a step."
+    "--batch", type=click.IntRange(1), default=TrainingOptions.batch, show_default=True, help="Samples per step."
 )
 @click.option(
     "--learning-rate",
@@ -106,7 +106,7 @@ if TYPE_CHECKING:
 @click.option(
     "--uniform",
     is_flag=True,
-    help="Draw miscalibrations from the range alone, as comparisons need it. Always so for --method.",
+    help="Draw miscalibrations from the range only, for comparisons. Always so with --method.",
 )
 @click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Seed of everything random.")
 @click.option(
@@ -117,14 +117,14 @@ if TYPE_CHECKING:
 @click.option(
     "--train-image-branch",
     is_flag=True,
-    help="Also train the image branch of an initialised stage, but for its finest pretrained levels.  "
+    help="Also train the image branch of an initialised stage, except its finest pretrained levels.  "
     "[default: frozen, as all stages share it]",
 )
 @click.option(
     "--after",
     type=FOLDER,
-    help="Folder of the stages before: most miscalibrations are then what they leave behind, and what the first look "
-    "of --initialize does where that is this stage's.",
+    help="Folder with the weights of the stages before: most miscalibrations are then drawn from their residuals, and"
+    " from those of the first look of --initialize if that is this stage.",
 )
 @click.option(
     "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."
@@ -169,8 +169,7 @@ def train(
 ) -> None:
     """Train one stage of the cascade, or all of them, and write the weights.
 
-    Uses CUDA, and several GPUs, where there are any. Checkpoints twice a minute; an interrupted run
-    continues with --resume.
+    Uses CUDA and several GPUs if available. Writes a checkpoint twice a minute; --resume continues an interrupted run.
 
     \b
     calib-inspect train --range 5/0.5 --minutes 60 \\

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 @click.group()
 def verify() -> None:
-    """Say whether the calibration that you have is good.
+    """Judge whether an existing calibration is good.
 
-    It starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), solves the
-    drive where there are several frames, and holds what it finds against it. A drive tolerates 0.5° and 15 cm, a single
-    frame 1.5° and 40 cm.
+    It starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), solves all
+    frames as one drive if there are several, and compares the result with the calibration. The tolerance of a drive is
+    0.3° and 8 cm, or 0.5° and 15 cm if the result is less certain; of a single frame 1° and 25 cm, or 1.5° and 40 cm.
 
-    One sentence; exits with 0 for accepted, 1 for rejected, 4 for cannot tell. Input that can be read but does not fit
-    is a verdict as well. Nothing is recorded or shown without --save, --report, --serve or --connect, and nothing is
-    ever exported.
+    Prints one sentence, and exits with 0 for accepted, 1 for rejected, 4 for cannot tell. Input that can be read but
+    does not fit gets a verdict as well. Nothing is recorded or shown without --save, --report, --serve or --connect,
+    and nothing is ever exported.
     """
 
 

@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 @click.group()
 def watch() -> None:
-    """Say whether the mount moved during a drive.
+    """Detect whether the mount moved during a drive.
 
     Starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), lets every
     frame say where the extrinsic is, and finds steps and slow drift. It needs 16 frames at least, in the order in
     which they were taken.
 
-    One sentence a change, with its frame, size and confidence; exits with 0 for no change, 1 for changed, 4 for cannot
-    tell. With --save, --serve or --connect a recording shows the estimate over the drive, with its band.
+    Prints one sentence per change, with its frame, size and confidence, and exits with 0 for no change, 1 for changed,
+    4 for cannot tell. With --save, --serve or --connect a recording shows the estimate over the drive, with its band.
     """
 
 
