@@ -60,7 +60,9 @@ class Cascade:
             prior: what is known beforehand of the extrinsics that calibrations start from; nothing by default.
         """
         self.coefficients = coefficients or Coefficients()
-        self.stages, self.skipped, self.wider = list(stages), list(skipped), list(wider)
+        model = self.coefficients.covariance
+        self.stages, self.wider = ([replace(one, covariance_model=model) for one in some] for some in (stages, wider))
+        self.skipped = list(skipped)
         if not stages:
             reasons = " ".join(stage.reason for stage in skipped)
             raise WeightsError(f"No stage of the cascade can run. {reasons}".strip())

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from calibnet.geometry import transform
-from calibnet.geometry.prior import inverse
 from calibnet.geometry.se3 import pose_from_vector, pose_vector
 from calibnet.geometry.types import Rotation
 from calibnet.judging.covariance import CovarianceModel
@@ -33,26 +32,24 @@ def seen_by_camera(look: StageTrace, face_from_camera: Rotation) -> StageTrace:
     )
 
 
-def joined(looks: Sequence[StageTrace], limit_px: float) -> StageTrace:
+def joined(looks: Sequence[StageTrace], limit_px: float, model: CovarianceModel) -> StageTrace:
     """Join looks of one stage through faces, all as `seen_by_camera` gives them, to one.
 
-    Each is weighted by the covariance that results of such looks were measured to have, which is larger than the one
-    their networks state. A face that does not fit the scan, such as one filled by the bonnet, is left out where another
-    one fits.
+    Each is weighted by its covariance, as measured, which is larger than the one its network states. A face that does
+    not fit the scan, such as one filled by the bonnet, is left out where another one fits.
 
     Args:
         looks: at least one; camera, details and matches are those of the first that is used.
         limit_px: largest match error at which a look is believed.
+        model: of the covariance that results of such looks were measured to have.
     """
     fitting = [look for look in looks if not look.match_error_px > limit_px] or list(looks)
     first = fitting[0]
     if len(fitting) == 1:
         return first
-    firmness = [_firmness(look) for look in fitting]
-    moment = sum(
-        (firm @ pose_vector(look.correction) for firm, look in zip(firmness, fitting, strict=True)), np.zeros(6)
-    )
-    correction = pose_from_vector(np.linalg.solve(np.sum(firmness, axis=0), moment))
+    weights = np.array([model.weight(look) for look in fitting])
+    vectors = np.array([pose_vector(look.correction) for look in fitting])
+    correction = pose_from_vector(np.linalg.solve(weights.sum(axis=0), np.einsum("nij,nj->i", weights, vectors)))
     stated = [look.information for look in fitting if look.information is not None]
     prior = first.range.information
     matches = [1 if look.matches is None else len(look.matches.points) for look in fitting]
@@ -64,10 +61,3 @@ def joined(looks: Sequence[StageTrace], limit_px: float) -> StageTrace:
         match_error_px=float(np.average([look.match_error_px for look in fitting], weights=matches)),
         milliseconds={part: sum(look.milliseconds.get(part, 0.0) for look in looks) for part in first.milliseconds},
     )
-
-
-def _firmness(look: StageTrace) -> np.ndarray:
-    """Information ``[6, 6]`` of a look, by the covariance that such results were measured to have."""
-    if look.information is None:
-        return np.eye(6)
-    return inverse(CovarianceModel().covariance(look.information, look.range, look.range, look.match_error_px))

@@ -19,7 +19,7 @@ from calibnet.datasets.images.files import resize_image
 from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform
-from calibnet.geometry.prior import PosePrior, inverse
+from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.judging.covariance import CovarianceModel
 from calibnet.network.batch import Cut, lidar_input, make_batch
@@ -55,6 +55,7 @@ class Stage:
         network: in evaluation mode.
         settings: image size, looks and gain.
         match_error_limit_px: largest match error at which the stage is believed, in pixels of its image.
+        covariance_model: how far its results were measured to lie from the truth.
     """
 
     number: int
@@ -62,6 +63,7 @@ class Stage:
     network: CalibrationNetwork
     settings: StageSettings = field(default_factory=StageSettings)
     match_error_limit_px: float = math.inf
+    covariance_model: CovarianceModel = field(default_factory=CovarianceModel)
 
     @property
     def device(self) -> torch.device:
@@ -144,7 +146,7 @@ class Stage:
             trace = self._look_at_faces(frame, view, before, detail)
         else:
             trace = self._look(frame, view, before, detail)
-        return trace if pose_prior is None else with_prior(trace, pose_prior)
+        return trace if pose_prior is None else with_prior(trace, pose_prior, self.covariance_model)
 
     def _look_at_faces(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         """One look through each face that shows enough of the scan, as one."""
@@ -159,7 +161,7 @@ class Stage:
             looks.append(seen_by_camera(look, face.face_from_camera))
         if not looks and failure is not None:
             raise failure
-        return joined(looks, self.match_error_limit_px)
+        return joined(looks, self.match_error_limit_px, self.covariance_model)
 
     def _look(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         clock, camera = Clock(self.device), self.camera(frame)
@@ -211,16 +213,12 @@ class Stage:
         return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
 
 
-def with_prior(look: StageTrace, pose_prior: PosePrior) -> StageTrace:
+def with_prior(look: StageTrace, pose_prior: PosePrior, model: CovarianceModel) -> StageTrace:
     """A look whose correction is fused with the user's prior; its information stays what the network states.
 
-    The network's correction is weighted by the covariance that its results were measured to have, see
-    `CovarianceModel`, which is larger than the one it states.
+    The network's correction is weighted by its covariance, as measured, which is larger than the one it states.
     """
-    firm = None
-    if look.information is not None:
-        firm = inverse(CovarianceModel().covariance(look.information, look.range, look.range, look.match_error_px))
-    correction = pose_prior.corrected(look.correction, firm, look.before)
+    correction = pose_prior.corrected(look.correction, model.weight(look), look.before)
     return replace(look, correction=correction, after=correction @ look.before)
 
 

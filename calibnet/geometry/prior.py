@@ -127,16 +127,15 @@ class PosePrior:
                 break
         return correction, inverse(normal)
 
-    def corrected(self, correction: Transform, information: Matrix6 | None, before: Extrinsic) -> Transform:
+    def corrected(self, correction: Transform, information: Matrix6, before: Extrinsic) -> Transform:
         """A measured correction of ``before``, 4x4, fused with the prior.
 
         Args:
             correction: 4x4, as measured.
-            information: ``[6, 6]`` of it; None for the identity, where the measurement states none.
+            information: ``[6, 6]`` of it.
             before: ``camera_from_lidar`` that is corrected, 4x4.
         """
-        firm = np.eye(6) if information is None else information
-        return pose_from_vector(self.fused(pose_vector(correction), firm, before)[0])
+        return pose_from_vector(self.fused(pose_vector(correction), information, before)[0])
 
     def narrowed(self, covariance: Matrix6, after: Extrinsic) -> Matrix6:
         """The covariance ``[6, 6]`` of a result ``after`` once the prior is counted, which makes it smaller."""

@@ -12,9 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.prior import inverse
 from calibnet.geometry.types import Floats, Matrix6
-from calibnet.trace import CascadeTrace
+from calibnet.trace import CascadeTrace, StageTrace
 
+UNSTATED = 1 / 3
+"""Share of its range by which a look that states no information is taken to err."""
 PIXEL = 2.0
 """Expected match error, in pixels, to which the common part of `CovarianceModel` refers; it grows in proportion."""
 
@@ -52,6 +55,13 @@ class CovarianceModel:
         axes = np.repeat([self.common_translation_m, np.radians(self.common_rotation_deg)], 3)
         sigma = axes * np.asarray(match_error_px)[..., None] / PIXEL
         return np.asarray(np.linalg.inv(matches + searched.information) + sigma[..., None] ** 2 * np.eye(6), np.float64)
+
+    def weight(self, look: StageTrace) -> Matrix6:
+        """What the correction of a look counts beside other knowledge: the inverse ``[6, 6]`` of its covariance."""
+        range_ = look.range
+        if look.information is None:
+            return range_.information / UNSTATED**2
+        return inverse(self.covariance(look.information, range_, range_, look.match_error_px))
 
 
 def covariance(trace: CascadeTrace, model: CovarianceModel) -> Matrix6 | None:

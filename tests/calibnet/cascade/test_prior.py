@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from calibnet.cascade import Cascade, Stage
+from calibnet.cascade.stage import with_prior
 from calibnet.datasets.frame import Frame
-from calibnet.geometry import RANGES, euler_xyz, invert, miscalibration
+from calibnet.geometry import RANGES, euler_xyz, invert, miscalibration, pose_error
 from calibnet.geometry.prior import AXES, Prior
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.coefficients import Coefficients
+from calibnet.judging.covariance import CovarianceModel
+from calibnet.trace import StageTrace
+from tests.support.drive import CAMERA
 from tests.support.scene import REFERENCE, make_frame
 from tests.support.tiny import tiny_network
 
@@ -70,3 +75,22 @@ def test_the_covariance_of_a_frame_knows_what_is_fixed(frame: Frame) -> None:
     assert verdict is not None
     if verdict.covariance is not None:
         assert np.sqrt(np.trace(verdict.covariance[:3, :3])) < 1e-4
+
+
+def test_networks_count_as_much_against_a_prior_as_their_results_were_measured_to_be_worth(frame: Frame) -> None:
+    prior = Prior.of((), 0.1, np.radians(2))
+    exact, vague = (
+        cascade(prior).with_coefficients(Coefficients(covariance=CovarianceModel(share, metres, degrees)))
+        for share, metres, degrees in ((1.0, 1e-3, 1e-2), (1e-4, 1.0, 30.0))
+    )
+    assert np.abs(vague.calibrate(frame, INITIAL).arrived - INITIAL).max() < 0.01
+    assert np.abs(exact.calibrate(frame, INITIAL).arrived - INITIAL).max() > 0.05
+
+
+def test_a_head_that_states_no_information_is_not_drowned_by_a_prior() -> None:
+    """It counts as one that errs by a third of its range, ±5° here: more than a prior of 5°."""
+    correction = miscalibration([2.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+    look = StageTrace(3, RANGES[2], CAMERA, INITIAL, correction @ INITIAL, correction)
+    fused = with_prior(look, Prior.of((), None, np.radians(5)).about(INITIAL), CovarianceModel())
+    turned = pose_error(fused.correction, np.eye(4)).rotation_deg
+    assert 0.8 * 2.0 < turned < 2.0
