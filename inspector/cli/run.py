@@ -85,8 +85,11 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
     for line in summary.lines():
         tell(line)
     if outputs.file is not None and summary.frames:
-        tell(size_line(outputs.file, summary.frames))
-        for line in [*saved_lines(outputs, summary.frames), *next_lines(outputs.file)]:
+        for line in [
+            *size_lines(outputs.file, summary.frames),
+            *saved_lines(outputs, summary.frames),
+            *next_lines(outputs.file),
+        ]:
             tell(line)
         if report is not None:
             from inspector.cli.report import write_report_of
@@ -106,9 +109,9 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
     return ExitCode.OK
 
 
-def size_line(file: Path, frames: int) -> str:
-    """What a frame's bytes go to."""
+def size_lines(file: Path, frames: int) -> list[str]:
+    """The line that says what a frame's bytes go to; none for a recording without an index."""
     from inspector.read.sizes import sizes_by_group
 
     parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
-    return f"Kilobytes a frame: {', '.join(parts)}."
+    return [f"Kilobytes a frame: {', '.join(parts)}."] if parts else []

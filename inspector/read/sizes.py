@@ -11,9 +11,13 @@ RAW_VOLUMES = ("cost_volume", "probability", "slices", "marks")
 
 
 def sizes_by_group(file: Path) -> dict[str, int]:
-    """Bytes on disk of every group of entities, largest first."""
+    """Bytes on disk of every group of entities, largest first; empty for a recording without a footer."""
+    try:
+        store = RrdReader(file).store()
+    except RuntimeError:  # there was no room for a footer, or Ctrl-C came before it
+        return {}
     # Private in this version of Rerun, but the only way to the footer, which is read in milliseconds.
-    index = RrdReader(file).store()._chunk_index().to_arrow()
+    index = store._chunk_index().to_arrow()
     sizes: defaultdict[str, int] = defaultdict(int)
     for entity, size in zip(index["chunk_entity_path"].to_pylist(), index["chunk_byte_size"].to_pylist(), strict=True):
         sizes[group_of(entity.lstrip("/"))] += size

@@ -13,6 +13,7 @@ from rerun.chunk import RrdReader
 
 from inspector.cli.errors import run
 from inspector.cli.main import cli
+from inspector.record import indexing, stream
 from tests.support.bags import write_bag
 from tests.support.folder import write_folder
 
@@ -216,6 +217,21 @@ def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke
     assert "Kilobytes a frame: " in out
     assert "3D scene" in out
     assert "hourglass" not in out
+
+
+def test_a_run_without_room_for_an_index_ends_with_its_result_and_report(
+    invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_room(file: Path, *_: Any) -> None:
+        raise indexing.NotIndexedError(file, "for which the disk lacks 3 MB", "with more room")
+
+    monkeypatch.setattr(stream, "index", no_room)
+    code, out, err = invoke("folder", str(own_folder), "--save", "own.rrd", "--report", "page")
+    assert code == 0, err
+    assert "own.rrd has no index, for which the disk lacks 3 MB" in err.replace("\n", " ")
+    assert "Saved own.rrd" in out and "Kilobytes a frame" not in out
+    assert out.splitlines()[-1].startswith("Verdict: ")
+    assert Path("page/index.html").is_file()
 
 
 def test_a_bag_is_calibrated_from_its_transforms(invoke: Invoke, tmp_path: Path, fakes: ModuleType) -> None:
