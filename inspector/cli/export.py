@@ -9,20 +9,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from calibnet.runtime.writing import Kind
+from calibnet.runtime.text import file_name
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
 from inspector.cli.output import overwrite_option, say, write
 from inspector.cli.recordings import RECORDING, open_run
-from inspector.export.registry import FORMATS, export_as
+from inspector.export.registry import FORMATS, export_as, kind_of_export, suffix_of
 
 if TYPE_CHECKING:
     from inspector.export.exported import Exported, FrameNames
 
-SUFFIXES = {"json": "json", "koide3": "json", "urdf": "urdf"} | dict.fromkeys(
-    ("ros", "yaml", "opencv", "autoware"), "yaml"
-)
-"""Suffixes of the files of a rig's cameras, by format."""
 ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
 
@@ -110,7 +106,7 @@ def put_out(exported: Exported, form: str, force: bool, output: Path | None) -> 
     elif output.is_dir():
         raise click.UsageError(f"--output {output} is a folder; name a file.")
     else:
-        write(output, text.encode(), Kind.JSON if text.startswith("{") else Kind.EXPORT)
+        write(output, text.encode(), kind_of_export(text))
         say(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
     return ExitCode.OK
 
@@ -133,12 +129,16 @@ def export_rig(
         raise click.UsageError(f"--output {output} is no folder, and the rig has several cameras; or choose --camera.")
     output.mkdir(parents=True, exist_ok=True)
     codes = []
-    for solved in rig.solved.cameras:
-        said = re.sub(r"[^A-Za-z0-9_]", "_", solved.name)
+    for solved, said in zip(rig.solved.cameras, ros_names([one.name for one in rig.solved.cameras]), strict=True):
         named = replace(exported_camera(solved), frames=frames._replace(camera=f"{said}_{frames.camera}"))
-        file = output / f"{re.sub(r'[^A-Za-z0-9_.-]', '_', solved.name)}.{SUFFIXES.get(form, 'txt')}"
-        codes.append(put_out(named, form, force, file))
+        codes.append(put_out(named, form, force, output / f"{file_name(solved.name)}.{suffix_of(form)}"))
     return max(codes)
+
+
+def ros_names(names: list[str]) -> list[str]:
+    """Names with the characters that ROS allows, all different."""
+    said = [re.sub(r"[^A-Za-z0-9_]", "_", name) for name in names]
+    return [one if said.count(one) == 1 else f"{one}_{number}" for number, one in enumerate(said)]
 
 
 def may_be_written(exported: Exported, force: bool) -> bool:

@@ -24,7 +24,7 @@ from inspector.cli.preparing import UNJUDGED, announce, open_other
 from inspector.cli.recordings import OUTPUT_FILE
 from inspector.cli.run import checked
 from inspector.cli.sequences import Opening, over_sequences
-from inspector.export.registry import FORMATS
+from inspector.export.registry import FORMATS, suffix_of
 from inspector.run.options import DEFAULT_RANGE
 
 if TYPE_CHECKING:
@@ -39,22 +39,33 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         type=RANGE,
         help=f"Begin with a miscalibration drawn from ± these, and let the sliders reach so far.  [{DEFAULT_RANGE}]",
     ),
-    click.option("--miscalibrate", "miscalibration", type=MISCALIBRATION, help="Begin with this one."),
+    click.option(
+        "--miscalibrate",
+        "miscalibration",
+        type=MISCALIBRATION,
+        help="Begin with this miscalibration, instead of drawing one.",
+    ),
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     *KNOWN_OPTIONS,
     *METHOD_OPTIONS,
-    click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]"),
+    click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]"),
     click.option(
         "--output",
         type=OUTPUT_FILE,
-        default=Path("calibration.corrected.yaml"),
-        show_default=True,
         metavar="FILE",
-        help="Where an accepted calibration goes; never the file that was read.",
+        help="Where an accepted calibration goes; never the file that was read.  [default: calibration.corrected.yaml, "
+        "or with the ending of --format]",
     ),
-    click.option("--format", "form", type=click.Choice(FORMATS.names()), default="yaml", show_default=True),
+    click.option(
+        "--format",
+        "form",
+        type=click.Choice(FORMATS.names()),
+        default="yaml",
+        show_default=True,
+        help="Format of an accepted calibration, as of `calib-inspect export`.",
+    ),
     overwrite_option,
     click.option("--native", is_flag=True, help="Rerun's own window and the keys of this terminal, instead of a page."),
     click.option(
@@ -68,7 +79,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
 class Keeping:
     """Where an accepted calibration goes, and where the session is shown."""
 
-    output: Path
+    output: Path | None
     form: str
     native: bool
     connect: str | None
@@ -137,7 +148,8 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     if keeping.native:
         check_window(keeping.connect)
     options = checked(sequence, asked)
-    target = Target(keeping.output, keeping.form)
+    output = keeping.output or Path(f"calibration.corrected.{suffix_of(keeping.form)}")
+    target = Target(output, keeping.form)
     target.check()
     method: Calibrator
     if options.method == CASCADE:

@@ -10,6 +10,7 @@ import click
 import numpy as np
 
 from calibnet.geometry.types import Transform
+from calibnet.runtime.text import file_name
 from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES
 from inspector.cli.options import ANGLE, AXES, FOLDER, LENGTH, MISCALIBRATION, STAGES, TOLERANCE
@@ -99,7 +100,7 @@ def rig(
         raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")
     cameras = open_rig(folders)
     prepare_json(json_file)
-    files = {camera: output / f"{camera}.yaml" for camera in cameras} if output is not None else {}
+    files = {camera: output / f"{file_name(camera)}.yaml" for camera in cameras} if output is not None else {}
     for file in files.values():
         prepare(file, Kind.EXPORT)
     name = f"rig/{folders[0].resolve().name}" if len(folders) == 1 else f"rig/{'+'.join(cameras)}"

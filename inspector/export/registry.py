@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from calibnet.errors import ConfigError
 from calibnet.runtime.plugins import Registry
 from calibnet.runtime.text import one_line
+from calibnet.runtime.writing import Kind
 
 if TYPE_CHECKING:
     from inspector.export.exported import Exported
@@ -30,6 +31,20 @@ FORMATS = Registry(
         "koide3": "inspector.export.robots:as_koide3",
     },
 )
+SUFFIXES = {"json": "json", "koide3": "json", "urdf": "urdf"} | dict.fromkeys(
+    ("ros", "yaml", "opencv", "autoware"), "yaml"
+)
+"""What names of files end with, by format."""
+
+
+def suffix_of(form: str) -> str:
+    """What the name of a format's file ends with, without the dot."""
+    return SUFFIXES.get(form, "txt")
+
+
+def kind_of_export(text: str) -> Kind:
+    """What the text of a file is, as `calibnet.runtime.writing` tells one file from another."""
+    return Kind.JSON if text.startswith("{") else Kind.EXPORT
 
 
 def export_as(name: str, exported: Exported) -> str:

@@ -9,10 +9,11 @@ import numpy as np
 
 from calibnet.datasets.frame import Frame
 from calibnet.geometry.types import Extrinsic
-from calibnet.runtime.writing import Kind, check_output, write_whole
+from calibnet.runtime.writing import check_output, write_whole
 from calibnet.verdict import ACCEPTED, Verdict
+from inspector.export.conformance import example
 from inspector.export.exported import Exported
-from inspector.export.registry import export_as
+from inspector.export.registry import export_as, kind_of_export
 from inspector.live.tries import Try
 from inspector.verdicts import explained
 
@@ -35,11 +36,7 @@ class Target:
         Raises:
             OutputError: it may not.
         """
-        check_output(self.file, self._kind)
-
-    @property
-    def _kind(self) -> Kind:
-        return Kind.JSON if self.form == "json" else Kind.EXPORT
+        check_output(self.file, kind_of_export(export_as(self.form, example())))
 
     def write(self, frame: Frame, extrinsic: Extrinsic, origin: str, verdict: Verdict | None) -> str:
         """Write it, and say so in a sentence.
@@ -51,7 +48,8 @@ class Target:
         exported = Exported(
             extrinsic, frame.as_taken.camera, f"{origin}; {doubt}" if doubt else origin, verdict=verdict
         )
-        replaced = write_whole(self.file, export_as(self.form, exported).encode(), self._kind)
+        text = export_as(self.form, exported)
+        replaced = write_whole(self.file, text.encode(), kind_of_export(text))
         return f"{'Replaced' if replaced else 'Wrote'} {self.file.resolve()}."
 
 

@@ -62,6 +62,7 @@ class Answers:
         self._workspace, self.stream, self._method, self._worker = workspace, stream, method, worker
         self._tell_try = tell_try
         self._newest: tuple[int, Observation] | None = None
+        self._unrecorded: set[int] = set()
         self._ready = False
         self.recorded: Callable[[], Awaitable[None]] = _nothing
 
@@ -113,8 +114,8 @@ class Answers:
         async def finish(result: tuple[CascadeTrace, float]) -> None:
             trace, milliseconds = result
             made = self._workspace.keep(lambda number: Try.of_trace(number, frame.index, trace, milliseconds))
-            await self._tell_try(made)
             self._record(made, method, frame, Observation(frame, trace, reference))
+            await self._tell_try(made)
 
         self._worker.ask(Job("running all stages" if number is None else f"running stage {number}", compute, finish))
 
@@ -132,9 +133,12 @@ class Answers:
             return seen[0]
 
         async def finish(observation: Observation) -> None:
-            self._newest = made.number, observation
+            self._unrecorded.discard(made.number)
+            if self._newest is None or made.number > self._newest[0]:  # the newest is recorded first
+                self._newest = made.number, observation
             await self.recorded()
 
+        self._unrecorded.add(made.number)
         self._worker.ask_later(Job(f"recording try {made.number}", compute, finish))
 
     def drive(self) -> None:
@@ -194,8 +198,10 @@ class Answers:
             found: told how many metres away the point is.
 
         Raises:
-            ConfigError: it is not the newest one of this frame, or no point lies there.
+            ConfigError: it is not the newest one of this frame, is still being recorded, or no point lies there.
         """
+        if made.number in self._unrecorded:
+            raise ConfigError(f"Try {made.number} is still being recorded; click again in a moment.")
         number, observation = self._newest or (-1, None)
         if observation is None or number != made.number or observation.frame is not self._workspace.frame:
             raise ConfigError("Only the newest try on this frame still has its cost volumes; run again from there.")

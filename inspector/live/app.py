@@ -64,23 +64,26 @@ class LiveApp:
     async def _control(self, window: WebSocket) -> None:
         """Messages of a window, as JSON."""
         await window.accept()
-        await window.send_json(self._session.hello())
-        self._windows.add(window)
+        hello = self._session.hello()
+        self._windows.add(window)  # before anything else can be told: what hello lacks is heard after it
+        await window.send_json(hello)
         self._session.opened()
         try:
             while True:
                 message = json.loads(await window.receive_text())
-                if isinstance(message, dict):
-                    await self._session.act(message)
+                answer = await self._session.act(message) if isinstance(message, dict) else None
+                if answer is not None:
+                    await window.send_json(answer)
         except (WebSocketDisconnect, json.JSONDecodeError):
             pass
         finally:
             self._windows.discard(window)
 
     async def _stream(self, viewer: WebSocket) -> None:
-        """All pieces of the recording, and then each as it comes; the viewer says nothing."""
+        """The pieces of the recording that the viewer has not had, and then each as it comes; it says nothing."""
         await viewer.accept()
-        more, sent = asyncio.Event(), 0
+        had = viewer.query_params.get("from", "0")
+        more, sent = asyncio.Event(), int(had) if had.isdecimal() else 0
         self._viewers.add(more)
         gone = asyncio.create_task(_until_gone(viewer))
         gone.add_done_callback(lambda _: more.set())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import sys
 from collections.abc import Callable, Iterator
@@ -49,11 +50,11 @@ def keyboard(descriptor: int | None = None) -> Iterator[Read]:
             termios.tcsetattr(terminal, termios.TCSADRAIN, before)
 
 
+_KEY = re.compile(r"\x1b\[\[.|\x1b\[[0-?]*[ -/]*[@-~]|\x1bO.|\x1b[^\x1b]|.", re.DOTALL)
+"""F1 of Linux's console; a control sequence of ECMA-48, such as ``ESC [ C`` for the right arrow and ``ESC [ 15 ~`` for
+F5; a key of the keypad; a key with Alt; any other character."""
+
+
 def split_keys(text: str) -> list[str]:
-    """Characters, and what a terminal sends for one key, such as ``ESC [ C`` for the right arrow, in one piece."""
-    keys: list[str] = []
-    while text:
-        length = 3 if text[0] == "\x1b" and text[1:2] in ("[", "O") and len(text) >= 3 else 1
-        keys.append(text[:length])
-        text = text[length:]
-    return keys
+    """What a terminal sends, in one piece for each key."""
+    return _KEY.findall(text)

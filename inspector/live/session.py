@@ -56,7 +56,7 @@ class LiveSession:
         self._worker = Worker(self._tell_state, self._tell_problem)
         self._answers = Answers(workspace, self.stream, method, self._worker, self._tell_try)
         self.tell: Tell = _nobody
-        self._actions: dict[str, Callable[[dict[str, Any]], Awaitable[None]]] = {
+        self._actions: dict[str, Callable[[dict[str, Any]], Awaitable[dict[str, Any] | None]]] = {
             "pose": self._pose,
             "undo": self._undo,
             "redo": self._redo,
@@ -73,17 +73,22 @@ class LiveSession:
             "stop": self._stop,
         }
 
-    async def act(self, message: dict[str, Any]) -> None:
-        """Do what a message asks for; what cannot be done is told in a sentence."""
+    async def act(self, message: dict[str, Any]) -> dict[str, Any] | None:
+        """Do what a message asks for; what cannot be done is told in a sentence.
+
+        Returns:
+            A question for whoever sent the message, and nobody else; None for most messages.
+        """
         try:
             action = self._actions.get(str(message.get("do")))
             if action is None:
-                raise ConfigError(f"The page asks for {message.get('do')!r}, which there is not; reload it.")
-            await action(message)
+                raise ConfigError(f"Unknown request {message.get('do')!r}; reload the page.")
+            return await action(message)
         except CalibnetError as error:
             await self._tell_problem(str(error))
         except (KeyError, TypeError, ValueError, IndexError):
             await self._tell_problem(f"The page sent {message!r}, which cannot be read; reload it.")
+        return None
 
     def hello(self) -> dict[str, Any]:
         """What a window needs that opens."""
@@ -219,20 +224,18 @@ class LiveSession:
 
     # ---- keeping ------------------------------------------------------------------------------------------------
 
-    async def _accept(self, message: dict[str, Any]) -> None:
+    async def _accept(self, message: dict[str, Any]) -> dict[str, Any] | None:
         """Write an extrinsic as calibration; one that is not accepted only when that is confirmed."""
         by_hand = message.get("try") is None
         extrinsic = self.workspace.extrinsic if by_hand else self._step(message)
         verdict = verdict_on(extrinsic, self.workspace.tries)
         doubt = doubts(verdict)
         if doubt and not message.get("sure"):
-            await self.tell(
-                {"is": "sure?", "text": f"{doubt[0].upper()}{doubt[1:]}", "again": {**message, "sure": True}}
-            )
-            return
+            return {"is": "sure?", "text": f"{doubt[0].upper()}{doubt[1:]}", "again": {**message, "sure": True}}
         origin = f"{self.workspace.name}, frame {self.workspace.frame.index}, accepted in calib-inspect live"
         text = self._target.write(self.workspace.frame, np.array(extrinsic), origin, verdict)
         await self.tell({"is": "said", "text": text})
+        return None
 
     # ---- telling ------------------------------------------------------------------------------------------------
 

@@ -97,7 +97,7 @@ class Terminal:
         if self._asked is not None:
             again, self._asked = self._asked, None
             if key == "y":
-                await self._session.act(again)
+                await self._act(again)
             else:
                 self._say("Left as it is.")
         elif (pose := self._turned(key)) is not None:
@@ -126,7 +126,7 @@ class Terminal:
     def _turned(self, key: str) -> Pose | None:
         """The pose after a key that moves it; None where the key does something else."""
         for keys, axis in AXES.items():
-            if key.lower() in keys:
+            if key.lower() in (*keys,):
                 step = STEPS[self._steps][axis in ("x", "y", "z")] * (0.1 if key.isupper() else 1.0)
                 value = getattr(self._workspace.pose, axis) + (step if key.lower() == keys[0] else -step)
                 return self._workspace.pose._replace(**{axis: value})
@@ -141,9 +141,15 @@ class Terminal:
         """Take or keep the last answer; without one, what is kept is the pose."""
         if self._workspace.tries:
             made = self._workspace.tries[-1]
-            await self._session.act({"do": what, "try": made.number, "step": len(made.steps) - 1})
+            await self._act({"do": what, "try": made.number, "step": len(made.steps) - 1})
         elif what == "accept":
-            await self._session.act({"do": what})
+            await self._act({"do": what})
+
+    async def _act(self, message: dict[str, Any]) -> None:
+        """Ask for something that may be answered with a question."""
+        answer = await self._session.act(message)
+        if answer is not None:
+            await self._hear(answer)
 
     async def _hold(self) -> None:
         """Let the window follow, where the pose or the frame is another one."""

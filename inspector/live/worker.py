@@ -71,7 +71,7 @@ class Worker:
         self._wake()
 
     def ask_later(self, job: Job) -> None:
-        """Run a job when nothing else waits; it is not forgotten, and runs again after it made room for another."""
+        """Run a job when nothing else waits, the newest first; it runs again after it made room for another."""
         self._later.append(job)
         self._wake()
 
@@ -104,7 +104,7 @@ class Worker:
             if self._next is None and not self._later:
                 break  # closed meanwhile
             can_wait = self._next is None
-            job, self._next = self._next or self._later.pop(0), None
+            job, self._next = self._next or self._later.pop(), None
             self.busy, self.progress = job.name, None
             self._stop.clear()
             await self._changed()
@@ -120,13 +120,15 @@ class Worker:
             try:
                 await job.finish(await loop.run_in_executor(self._thread, job.compute, tell))
             except YieldedError:
-                self._later.insert(0, job)
+                self._later.append(job)
             except StoppedError:
                 await self._failed(f"Stopped: {job.name}.")
             except CalibnetError as error:
                 await self._failed(str(error))
             except Exception as error:  # a fault of ours: the page goes on, and says it
-                await self._failed(f"A fault of calib-inspect ({type(error).__name__}: {error}). Please report it.")
+                await self._failed(
+                    f"Internal error in calib-inspect ({type(error).__name__}: {error}). Please report it."
+                )
             finally:
                 self.busy, self.progress = "", None
-        await self._changed()
+            await self._changed()

@@ -5,6 +5,7 @@ Only the server's own thread touches it; what takes long gets its input from her
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from collections.abc import Sequence as Positions
 from typing import Protocol, runtime_checkable
@@ -12,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from calibnet.calibrator import DriveCalibrator
-from calibnet.datasets.frame import Frame, Frames, Sequence
+from calibnet.datasets.frame import Frame, Sequence
 from calibnet.datasets.selection import PickedFrames
 from calibnet.geometry import MiscalibrationRange, sample_miscalibration
 from calibnet.geometry.types import Extrinsic
@@ -38,10 +39,25 @@ class StagedCalibrator(DriveCalibrator, Protocol):
         ...
 
 
+class ReadByOne(PickedFrames):
+    """Frames that one thread reads at a time: the server and the worker share the file of a bag."""
+
+    def __init__(self, sequence: Sequence, positions: Positions[int]) -> None:
+        super().__init__(sequence, positions)
+        self._reading = threading.Lock()
+
+    def __getitem__(self, position: int) -> Frame:
+        """Read a frame when no other is being read."""
+        with self._reading:
+            return super().__getitem__(position)
+
+
 class Workspace:
     """The state of a live session.
 
     Attributes:
+        name: of the sequence.
+        frames: the chosen frames.
         frame: at hand.
         position: of it among the chosen frames.
         pose: that is tried, relative to `guess`.
@@ -57,23 +73,14 @@ class Workspace:
             start: gives the guess of each frame and, where it is known, the reference.
             seed: of random poses.
         """
-        self._sequence, self._positions, self._start = sequence, list(positions), start
+        self._start = start
+        self.name, self.frames = sequence.name, ReadByOne(sequence, list(positions))
         self._random = np.random.default_rng(seed)
         self._undone: list[Pose] = []
         self._done: list[Pose] = []
         self.pose = Pose()
         self.tries: list[Try] = []
-        self.show(0, sequence[self._positions[0]])
-
-    @property
-    def frames(self) -> Frames:
-        """The chosen frames."""
-        return PickedFrames(self._sequence, self._positions)
-
-    @property
-    def name(self) -> str:
-        """Name of the sequence."""
-        return self._sequence.name
+        self.show(0, self.frames[0])
 
     def show(self, position: int, frame: Frame) -> None:
         """Put another frame on the workspace; the pose stays, for the mount is the same."""

@@ -5,7 +5,7 @@ import { at, live, shownTry } from "./workspace.js";
 import { legend } from "./colours.js";
 import { fit, forgetFrame, pixelUnder, redraw, showFrame } from "./picture.js";
 import { extrinsicOf } from "./poses.js";
-import { answered, makeSliders, showPose, turned } from "./sliders.js";
+import { answered, makeSliders, release, showPose, turned } from "./sliders.js";
 import { connect, say, send } from "./wire.js";
 
 // ---- what is heard ------------------------------------------------------------------------------------------------
@@ -26,6 +26,7 @@ const heard = {
     setState(message.state);
     show(live.tries.length - 1, live.tries.length ? live.tries.at(-1).steps.length - 1 : 0);
     showLegend();
+    if (live.held) release(); // the connection was lost before the server had the pose
   },
   state(message) {
     const moved = message.pose.some((value, i) => value !== live.pose[i]);
@@ -35,7 +36,7 @@ const heard = {
     redraw();
   },
   try(message) {
-    live.tries.push(message);
+    live.tries[message.number] = message;
     answered();
     walk(message.number);
   },

@@ -4,6 +4,7 @@ import { colours } from "./colours.js";
 import { extrinsicOf, figures, off } from "./poses.js";
 
 const NEAREST = 0.1; // metres before the camera
+const RETRY_MILLISECONDS = 2000; // until a picture that did not come is asked for again
 const canvas = at("canvas"), context = canvas.getContext("2d");
 let scan = null, image = null, loaded = -1;
 let buffer = null, pixels = null, depths = null, layer = null, due = false;
@@ -13,12 +14,18 @@ export async function showFrame() {
   const { position, reference, camera } = live.state.frame;
   if (loaded === position) return redraw();
   loaded = position;
-  const [blob, bytes] = await Promise.all([
-    fetch(`picture.jpg?${position}`).then((answer) => answer.blob()),
-    fetch(`points.bin?${position}`).then((answer) => answer.arrayBuffer()),
-  ]);
+  let bitmap, bytes;
+  try {
+    [bitmap, bytes] = await Promise.all([
+      fetched(`picture.jpg?${position}`).then((answer) => answer.blob()).then(createImageBitmap),
+      fetched(`points.bin?${position}`).then((answer) => answer.arrayBuffer()),
+    ]);
+  } catch {
+    if (loaded === position) setTimeout(retry, RETRY_MILLISECONDS);
+    return;
+  }
   if (loaded !== position) return;
-  image = await createImageBitmap(blob);
+  image = bitmap;
   scan = unpack(bytes);
   if (reference) {
     scan.truth = new Float32Array(2 * scan.count).fill(NaN);
@@ -32,6 +39,17 @@ export async function showFrame() {
 }
 
 export const forgetFrame = () => (loaded = -1);
+
+async function fetched(path) {
+  const answer = await fetch(path);
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  return answer;
+}
+
+function retry() {
+  forgetFrame();
+  showFrame();
+}
 
 function unpack(bytes) {
   const count = new Uint32Array(bytes, 0, 1)[0];

@@ -2,7 +2,7 @@
 import { showSteps, stopWalking } from "./answer.js";
 import { at, live } from "./workspace.js";
 import { redraw } from "./picture.js";
-import { send } from "./wire.js";
+import { forgetLater, send, sendLater } from "./wire.js";
 
 const AXES = [
   { name: "roll", unit: "°", keys: "qa", digits: 3 },
@@ -14,7 +14,7 @@ const AXES = [
 ];
 const STEPS = { coarse: [0.25, 0.02], fine: [0.02, 0.002] }; // degrees, metres; with Shift a tenth
 const RELEASE_MILLISECONDS = 300; // as long as keys come faster, nobody has let go
-let letGo = 0, asked = null;
+let asked = null;
 
 export function makeSliders([degrees, metres]) {
   for (const [i, axis] of AXES.entries()) {
@@ -52,9 +52,14 @@ export function showPose() {
   }
 }
 
-function release() {
+function poseMessage() {
   asked = performance.now();
-  send({ do: "pose", pose: live.pose, run: at("auto").checked });
+  return { do: "pose", pose: live.pose, run: at("auto").checked };
+}
+
+export function release() {
+  forgetLater(); // the pose of keys is the pose as well
+  send(poseMessage());
 }
 
 // An answer is here: note how long it took, if it was to letting go.
@@ -69,7 +74,6 @@ export function turned(key, fine) {
   if (axis < 0) return false;
   const size = STEPS[at("steps-size").value][axis < 3 ? 0 : 1] * (fine ? 0.1 : 1);
   move(axis, live.pose[axis] + (AXES[axis].keys[0] === key ? size : -size));
-  clearTimeout(letGo);
-  letGo = setTimeout(release, RELEASE_MILLISECONDS);
+  sendLater(poseMessage, RELEASE_MILLISECONDS);
   return true;
 }

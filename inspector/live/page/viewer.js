@@ -59,6 +59,16 @@ async function take(piece) {
 }
 
 window.pieces = 0;
-const socket = new WebSocket(new URL("../stream", location.href).href.replace(/^http/, "ws"));
-socket.binaryType = "arraybuffer";
-socket.onmessage = (message) => take(message.data);
+let received = 0;
+
+function connect() {
+  const address = new URL(`../stream?from=${received}`, location.href).href.replace(/^http/, "ws");
+  const socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = (message) => {
+    received += 1;
+    take(message.data);
+  };
+  socket.onclose = () => setTimeout(connect, 2000);
+}
+connect();

@@ -4,7 +4,32 @@ import { at } from "./workspace.js";
 const SOON = 2000; // milliseconds until a lost connection is tried again
 let socket = null;
 
-export const send = (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+let later = null, timer = 0;
+
+// Send a message, after the one that was left for later: what is asked for now is asked of the pose that is seen.
+export function send(message) {
+  const waiting = later;
+  forgetLater();
+  if (waiting) transmit({ ...waiting(), run: false });
+  transmit(message);
+}
+
+// Send what `make` gives once nothing else was asked for in so many milliseconds.
+export function sendLater(make, milliseconds) {
+  forgetLater();
+  later = make;
+  timer = setTimeout(() => { forgetLater(); transmit(make()); }, milliseconds);
+}
+
+export function forgetLater() {
+  clearTimeout(timer);
+  later = null;
+}
+
+function transmit(message) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  else say("Not connected to calib-inspect, so nothing was done; trying to connect again.", true);
+}
 
 // Messages go to the function of their name in `heard`.
 export function connect(heard) {

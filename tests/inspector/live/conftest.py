@@ -30,12 +30,14 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Make]:
-    """A session: ``make(length=3, as_is=False, cascade=None, stream=None)``."""
+    """A session: ``make(length=3, as_is=False, cascade=None, target=None, stream=None)``."""
     made: list[LiveSession] = []
 
-    def session(length: int = 3, as_is: bool = False, cascade: Any = None, **given: Any) -> LiveSession:
+    def session(
+        length: int = 3, as_is: bool = False, cascade: Any = None, target: Target | None = None, **given: Any
+    ) -> LiveSession:
         workspace = Workspace(FakeSequence(length, first=4), range(length), Start(RANGE, 1, as_is=as_is))
-        target = Target(tmp_path / "out" / "calibration.corrected.yaml")
+        target = target or Target(tmp_path / "out" / "calibration.corrected.yaml")
         made.append(LiveSession(workspace, cascade or FakeCascade(), target, RANGE, **given))
         return made[-1]
 
@@ -57,7 +59,8 @@ def heard_after() -> Callable[..., list[dict[str, Any]]]:
         async def say() -> None:
             session.tell = hear
             for message in messages:
-                await session.act(message)
+                answer = await session.act(message)
+                heard.extend([answer] if answer is not None else [])
                 await session.idle()
 
         asyncio.run(say())

@@ -174,6 +174,61 @@ def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession]
     answered(page)
 
 
+PRESS = "(key, more) => document.body.dispatchEvent(new KeyboardEvent('keydown', {key, bubbles: true, ...more}))"
+
+
+def test_what_is_asked_right_after_a_key_is_asked_of_the_pose_that_it_made(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    session = make()
+    page = opened(browser, serve(session))
+    page.locator("#auto").uncheck()
+    page.evaluate(f"() => {{ const press = {PRESS}; press('q'); press('Enter'); }}")
+    answered(page)
+    (made,) = session.workspace.tries
+    np.testing.assert_allclose(made.steps[0].camera_from_lidar, session.workspace.extrinsic)
+    assert session.workspace.pose.roll == pytest.approx(0.25)
+    page.evaluate(f"() => {{ const press = {PRESS}; press('q'); press('z', {{ctrlKey: true}}); }}")
+    page.wait_for_function("live.pose[0] === 0.25 && live.held === null && !document.getElementById('redo').disabled")
+    page.wait_for_timeout(500)  # longer than keys are waited for
+    assert page.evaluate("live.pose[0]") == session.workspace.pose.roll == pytest.approx(0.25)
+
+
+def test_a_pose_that_was_set_without_a_connection_is_sent_when_there_is_one(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    session = make()
+    sockets: list[Any] = []
+    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    page.route_web_socket(re.compile("/control$"), lambda socket: (sockets.append(socket), socket.connect_to_server()))
+    page.goto(serve(session))
+    page.wait_for_function("document.getElementById('caption').textContent !== ''")
+    page.locator("#auto").uncheck()
+    sockets[0].close()
+    says(page, "#said", re.compile("connection to calib-inspect is gone"))
+    page.locator("#number-z").fill("0.123")
+    page.keyboard.press("Tab")
+    says(page, "#said", re.compile("Not connected"))
+    page.wait_for_function("live.held === null && live.pose[5] === 0.123")
+    assert session.workspace.pose.z == pytest.approx(0.123) and len(sockets) == 2
+
+
+def test_a_picture_that_did_not_come_is_asked_for_again(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    asked: list[str] = []
+
+    def fail_first(route: Any) -> None:
+        asked.append(route.request.url)
+        route.fulfill(status=503) if len(asked) == 1 else route.continue_()
+
+    page.route("**/picture.jpg*", fail_first)
+    page.goto(serve(make()))
+    page.wait_for_function("document.getElementById('caption').textContent !== ''", timeout=PATIENCE)
+    assert len(asked) == 2
+
+
 def test_two_windows_show_the_same_and_one_may_close(
     browser: Browser, make: Callable[..., LiveSession], serve: Open
 ) -> None:

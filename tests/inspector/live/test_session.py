@@ -13,6 +13,7 @@ import pytest
 from calibnet.datasets.folder import read_calibration_of
 from calibnet.errors import CalibrationError
 from calibnet.geometry import miscalibration
+from inspector.live.accept import Target
 from inspector.live.answers import detailed
 from inspector.live.session import LiveSession
 from inspector.live.worker import YieldedError
@@ -135,6 +136,36 @@ def test_what_is_accepted_is_written_as_a_calibration(make: Make, heard_after: H
     assert told(heard_after(session, {"do": "accept", "try": 0, "step": 3}), "said")[0]["text"].startswith("Replaced")
 
 
+@pytest.mark.parametrize(("form", "name"), [("koide3", "calib.json"), ("json", "calib.json"), ("urdf", "calib.urdf")])
+def test_what_is_accepted_again_replaces_what_was(
+    make: Make, heard_after: HeardAfter, tmp_path: Path, form: str, name: str
+) -> None:
+    session = make(target=Target(tmp_path / name, form))
+    for word in ("Wrote", "Replaced"):
+        heard = heard_after(session, MOVE, {"do": "accept", "try": 0, "step": 3})
+        assert told(heard, "said")[0]["text"].startswith(word)
+    Target(tmp_path / name, form).check()  # so does the next session
+
+
+def test_a_click_on_a_try_that_is_not_recorded_yet_says_so(make: Make) -> None:
+    session, heard = make(), []
+
+    async def say() -> None:
+        async def hear(message: dict[str, Any]) -> None:
+            heard.append(message)
+            if message["is"] == "try":
+                await session.act({"do": "look", "try": 0, "step": 3, "pixel": [0, 0]})
+
+        session.tell = hear
+        await session.act(MOVE)
+        await session.idle()
+
+    asyncio.run(say())
+    assert [one["text"] for one in told(heard, "problem")] == [
+        "Try 0 is still being recorded; click again in a moment."
+    ]
+
+
 @pytest.mark.parametrize(
     ("cascade", "message", "words"),
     [
@@ -168,8 +199,8 @@ def test_another_file_is_not_replaced(make: Make, heard_after: HeardAfter, tmp_p
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ({"do": "fly"}, "'fly', which there is not"),
-        ({}, "None, which there is not"),
+        ({"do": "fly"}, "Unknown request 'fly'; reload the page"),
+        ({}, "Unknown request None"),
         ({"do": "pose", "pose": [0, 0, 0]}, "cannot be read"),
         ({"do": "pose", "pose": "abcdef"}, "cannot be read"),
         ({"do": "pose", "pose": [float("nan")] * 6}, "within ±180°"),

@@ -127,6 +127,30 @@ def test_the_window_follows_the_hand_then_shows_the_stages_then_the_details(
     assert Image.open(io.BytesIO(bytes(picture))).size == (400, 120)
 
 
+@pytest.mark.parametrize(
+    ("sent", "keys"),
+    [
+        ("\x1b[15~", ["\x1b[15~"]),  # F5
+        ("\x1b[1;2C", ["\x1b[1;2C"]),  # Shift and the right arrow
+        ("\x1b[1;5Cq", ["\x1b[1;5C", "q"]),  # Ctrl and it
+        ("\x1bOP", ["\x1bOP"]),  # F1
+        ("\x1b[[A", ["\x1b[[A"]),  # F1 of Linux's console
+        ("\x1bq", ["\x1bq"]),  # Alt and q
+        ("\x1b", ["\x1b"]),
+        ("\x1b\x1b", ["\x1b", "\x1b"]),
+        ("q\x1b[Da\n", ["q", "\x1b[D", "a", "\n"]),
+    ],
+)
+def test_what_a_terminal_sends_for_one_key_is_one_key(sent: str, keys: list[str]) -> None:
+    assert split_keys(sent) == keys
+
+
+def test_keys_that_mean_nothing_do_nothing(window: Callable[..., Window]) -> None:
+    one = window()
+    assert one.press("\x1b[15~", "\x1b[1;5C", "\x1bq", "\x1b[3~") == []
+    assert one.workspace.position == 0 and not any(one.workspace.pose) and not one.workspace.tries
+
+
 def test_keys_are_read_as_they_come() -> None:
     assert split_keys("qW\x1b[C\x1b") == ["q", "W", "\x1b[C", "\x1b"]
     out, into = os.pipe()

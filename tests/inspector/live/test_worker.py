@@ -43,7 +43,7 @@ def job(name: str, done: list[str], until: threading.Event | None = None) -> Job
     return Job(name, compute, finish)
 
 
-def test_of_those_that_wait_only_the_newest_runs_and_later_ones_all() -> None:
+def test_of_those_that_wait_only_the_newest_runs_and_later_ones_all_the_newest_first() -> None:
     async def scenario(worker: Worker, done: list[str], _: list[str]) -> None:
         go = threading.Event()
         worker.ask(job("first", done, go))
@@ -54,7 +54,7 @@ def test_of_those_that_wait_only_the_newest_runs_and_later_ones_all() -> None:
         worker.ask(job("new", done))
         go.set()
 
-    assert run(scenario)[0] == ["first", "new", "later 1", "later 2"]
+    assert run(scenario)[0] == ["first", "new", "later 2", "later 1"]
 
 
 def test_what_can_wait_makes_room_and_runs_again() -> None:
@@ -77,6 +77,25 @@ def test_what_can_wait_makes_room_and_runs_again() -> None:
         worker.ask(job("answer", done))
 
     assert run(scenario) == (["answer", "recorded"], [])
+
+
+def test_that_a_job_is_done_is_told_before_the_next_may_begin() -> None:
+    busy: list[str] = []
+
+    async def all_of_it() -> None:
+        async def changed() -> None:
+            busy.append(worker.busy)
+
+        async def failed(_: str) -> None: ...
+
+        worker = Worker(changed, failed)
+        worker.ask_later(job("recording", []))
+        worker.ask(job("answer", []))
+        await worker.idle()
+        worker.close()
+
+    asyncio.run(all_of_it())
+    assert busy == ["answer", "", "recording", ""]
 
 
 def test_a_job_that_tells_how_far_it_is_can_be_stopped() -> None:
@@ -113,4 +132,4 @@ def test_a_fault_is_said_and_the_next_job_runs() -> None:
 
     done, problems = run(scenario)
     assert done == ["good"]
-    assert problems == ["A fault of calib-inspect (ZeroDivisionError: by zero). Please report it."]
+    assert problems == ["Internal error in calib-inspect (ZeroDivisionError: by zero). Please report it."]
