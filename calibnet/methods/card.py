@@ -6,8 +6,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
-_RENAMED = {"kitti-object/train": "KITTI object detection"}
-"""Names that older training records give to rigs, and the names that datasets give them."""
+_FOLDER = "folder/"
+"""Records of weights that were trained on packed frames name a rig by its sequence; a folder's begins with this."""
+_AS_DATASETS_SAY = {
+    "kitti-object/train": "KITTI object detection",
+    "folder/kitti360-image00": "KITTI-360, camera 0",
+    "folder/nuscenes-n015a-front": "nuScenes, CAM_FRONT",
+    "folder/nuscenes-n015a-front-left": "nuScenes, CAM_FRONT_LEFT",
+    "folder/nuscenes-n015a-front-right": "nuScenes, CAM_FRONT_RIGHT",
+    "folder/nuscenes-n015a-back": "nuScenes, CAM_BACK",
+    "folder/nuscenes-n015a-back-left": "nuScenes, CAM_BACK_LEFT",
+    "folder/nuscenes-n015a-back-right": "nuScenes, CAM_BACK_RIGHT",
+}
+"""What such records name, and the rig as the dataset names it that these frames are from."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +29,7 @@ class MethodCard:
         parameters: of its networks, of all stages that run; 0 without networks.
         multiply_adds: of its networks for one frame, likewise.
         samples_trained: that its networks have seen, all stages together.
-        trained_on: the rigs of these, as `Sequence.rig` begins, for instance ``("KITTI 2011_09_26",)``.
+        trained_on: the rigs of these, `Sequence.rig`, with or without the camera: ``("KITTI 2011_09_26",)``.
     """
 
     parameters: int = 0
@@ -36,13 +47,21 @@ class MethodCard:
             records: training records of the networks, as `calibnet.weights.read_record` reads them.
         """
         records = list(records)
-        rigs = (_RENAMED.get(rig, rig) for record in records for rig in record.get("rigs", ()))
+        rigs = (rig for record in records for said in record.get("rigs", ()) for rig in _rigs(said))
         samples = sum(int(record.get("samples", 0)) for record in records)
         return cls(parameters, multiply_adds, samples, tuple(dict.fromkeys(rigs)))
 
     def knows(self, rig: str) -> bool:
-        """Whether it was trained on a rig."""
-        return any(rig.startswith(one) for one in self.trained_on)
+        """Whether it was trained on a rig, `Sequence.rig`; a record may leave the camera out."""
+        return any(rig == known or rig.startswith(f"{known}, ") for known in self.trained_on)
+
+
+def _rigs(said: str) -> list[str]:
+    """The names that datasets give to a rig of a record: of a folder its own, and that of the dataset it is from."""
+    folder, dataset = said.removeprefix(_FOLDER), _AS_DATASETS_SAY.get(said)
+    if dataset is None:
+        return [folder]
+    return [folder, dataset] if folder != said else [dataset]
 
 
 @runtime_checkable

@@ -9,12 +9,11 @@ them takes longer than a short training has.
 
 from __future__ import annotations
 
-import re
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Interval
@@ -42,6 +41,7 @@ LARGEST_BYTES = 4 << 30
 """Largest size of a part."""
 LARGEST_SCAN = 1 << 28
 """Bytes of a scan, unpacked: some forty million points."""
+REMEDY = "pack them again"
 
 
 def unpack_scan(data: bytes) -> NDArray[np.float32]:
@@ -62,19 +62,11 @@ def unpack_scan(data: bytes) -> NDArray[np.float32]:
     return points
 
 
-def rig_of(name: str) -> str:
-    """The rig of a packed source as its dataset names it, if its name tells: of KITTI's drives it is their day."""
-    if name.startswith("kitti-object/"):
-        return "KITTI object detection"
-    day = re.search(r"kitti.*(\d{4}_\d\d_\d\d)", name)
-    return f"KITTI {day[1]}" if day else name
-
-
 class PackedSequence:
     """The packed frames of one source, in all parts that are there."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self.rig = name, rig_of(name)
+    def __init__(self, name: str, rig: str) -> None:
+        self.name, self.rig = name, rig
         self._frames: list[tuple[Part, int]] = []
 
     def take(self, part: Part, position: int) -> None:
@@ -95,11 +87,12 @@ class PackedSequence:
 
 @dataclass(frozen=True)
 class SourceOfPart:
-    """What a part says of one of its sources, see `Source`."""
+    """What a part says of one of its sources, see `Source`; the rig is empty in parts of versions that left it out."""
 
     name: str
     weight: Annotated[float, Interval(ge=0, le=1)]
     synthetic: bool
+    rig: str = ""
 
 
 @dataclass(frozen=True)
@@ -123,17 +116,10 @@ class Part:
         Raises:
             DatasetError: it is cut short, or no packed frames at all.
         """
-        origin, remedy = f"Packed training frames {path}", "pack them again"
-        require_file(path, origin, LARGEST_BYTES, DatasetError, remedy)
-        try:
-            with safe_open(path, framework="pt") as file:
-                tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a dict
-                about = parse_json((file.metadata() or {}).get(KEY, ""))
-        except (SafetensorError, OSError, ValueError) as error:
-            raise DatasetError(f"{origin} cannot be read ({one_line(error, 200)}); {remedy}.") from None
-        part = cls(path, validated(list[SourceOfPart], about, origin, DatasetError, remedy), tensors)
+        tensors, about = _read_tensors(path)
+        part = cls(path, validated(list[SourceOfPart], about, _origin(path), DatasetError, REMEDY), tensors)
         if not part._is_whole():
-            raise DatasetError(f"{origin} do not fit together; {remedy}.")
+            raise DatasetError(f"{_origin(path)} do not fit together; {REMEDY}.")
         return part
 
     def _is_whole(self) -> bool:
@@ -176,7 +162,7 @@ def read_packed(folder: Path) -> list[Source]:
         DatasetError: there are none, or one cannot be read.
     """
     parts = [Part.read(path) for path in _parts(folder)]
-    sequences = [PackedSequence(source.name) for source in parts[0].sources]
+    sequences = [PackedSequence(source.name, source.rig or source.name) for source in parts[0].sources]
     for part in parts:
         if part.sources != parts[0].sources:
             raise DatasetError(f"{part.path} is of another packing than {parts[0].path}; keep one in a folder.")
@@ -190,10 +176,30 @@ def read_packed(folder: Path) -> list[Source]:
 
 
 def packed_residuals(folder: Path, stage: MiscalibrationRange) -> list[Transform]:
-    """The residuals that travelled with the frames, 4x4 each; none if none did."""
+    """The residuals that travelled with the frames, 4x4 each; none if none did.
+
+    Raises:
+        DatasetError: there are no parts, or one cannot be read.
+    """
     name = f"residuals.{stage}"
-    parts = (Part.read(path).tensors for path in _parts(folder))
-    return [delta for part in parts if name in part for delta in part[name].numpy()]
+    return [delta for path in _parts(folder) for delta in _read_tensors(path, name)[0].get(name, ())]
+
+
+def _origin(path: Path) -> str:
+    return f"Packed training frames {path}"
+
+
+def _read_tensors(path: Path, *names: str) -> tuple[dict[str, Tensor], Any]:
+    """The tensors of these names that a part has, or all of them, and what it says of its sources."""
+    require_file(path, _origin(path), LARGEST_BYTES, DatasetError, REMEDY)
+    try:
+        with safe_open(path, framework="pt") as file:
+            there = [name for name in file.keys() if not names or name in names]  # noqa: SIM118 - not a dict
+            tensors = {name: file.get_tensor(name) for name in there}
+            about = parse_json((file.metadata() or {}).get(KEY, ""))
+    except (SafetensorError, OSError, ValueError) as error:
+        raise DatasetError(f"{_origin(path)} cannot be read ({one_line(error, 200)}); {REMEDY}.") from None
+    return tensors, about
 
 
 def _parts(folder: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -25,7 +25,7 @@ from calibnet.runtime.writing import Kind, write_whole
 from calibnet.training.build import open_draws, open_frames
 from calibnet.training.data import Source, training_sources
 from calibnet.training.options import TrainingOptions
-from calibnet.training.packed import FARTHEST_M, KEY, PATTERN, STEPS_PER_METRE
+from calibnet.training.packed import FARTHEST_M, KEY, PATTERN, STEPS_PER_METRE, SourceOfPart
 from calibnet.training.recipe import RECIPE, Recipe
 from calibnet.weights.manifest import load_manifest
 
@@ -116,7 +116,10 @@ class Packer:
         if next(folder.glob(PATTERN.replace("{:03d}", "*")), None):
             raise ConfigError(f"{folder} holds packed frames already; give another folder, or remove them first.")
         self.folder, self.largest, self.parts, self.size = folder, largest, 0, 0
-        self.about = [{"name": s.sequence.name, "weight": s.weight, "synthetic": s.synthetic} for s in sources]
+        self.about = [
+            asdict(SourceOfPart(source.sequence.name, source.weight, source.synthetic, source.sequence.rig))
+            for source in sources
+        ]
         self.residuals = residuals
         self.frames: list[Packed] = []
 

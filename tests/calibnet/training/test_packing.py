@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,6 @@ from calibnet.training.options import TrainingOptions
 from calibnet.training.packed import (
     KEY,
     STEPS_PER_METRE,
-    PackedSequence,
     packed_residuals,
     read_packed,
     unpack_scan,
@@ -109,6 +109,7 @@ def test_sources_come_back_with_names_weights_and_frames(pack: Callable[..., Pat
     assert (real.weight, real.synthetic, len(real.sequence)) == (0.75, False, 3)
     assert (synthetic.weight, synthetic.synthetic, len(synthetic.sequence)) == (0.25, True, 2)
     assert real.sequence.name == Scenes.name
+    assert real.sequence.rig == Scenes.rig, "by which the weights are known to know it"
     frames = {round(frame.points[0, 3] * 255): frame for frame in real.sequence}
     for seed in range(3):
         frame = smaller(make_frame(seed))
@@ -225,13 +226,11 @@ def test_an_empty_folder_says_how_to_fill_it(tmp_path: Path) -> None:
         read_packed(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("name", "rig"),
-    [
-        ("kitti-raw/2011_09_26_drive_0005", "KITTI 2011_09_26"),
-        ("kitti-object/train", "KITTI object detection"),
-        ("folder/opencalib-a", "folder/opencalib-a"),
-    ],
-)
-def test_packed_sources_are_of_the_rig_that_their_dataset_names(name: str, rig: str) -> None:
-    assert PackedSequence(name).rig == rig
+def test_parts_of_versions_that_left_the_rig_out_are_read(pack: Callable[..., Path], tmp_path: Path) -> None:
+    (path,) = pack(tmp_path).iterdir()
+    with safe_open(path, "pt") as file:
+        about = json.loads(file.metadata()[KEY])
+    for source in about:
+        del source["rig"]
+    save_file(load_file(path), path, metadata={KEY: json.dumps(about)})
+    assert [source.sequence.rig for source in read_packed(tmp_path)] == [Scenes.name, Scenes.name]
