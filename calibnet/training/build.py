@@ -21,6 +21,7 @@ from calibnet.methods.learned.weights import load_method_network, method_setting
 from calibnet.network.ablations import ablated
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.text import LONGEST, one_line
 from calibnet.training.data import Source, training_sources, validation_sequences
 from calibnet.training.devices import launch
 from calibnet.training.draws import Draws
@@ -34,7 +35,7 @@ from calibnet.training.residuals import residual_errors, stages_before
 from calibnet.training.samples import TrainingSamples
 from calibnet.training.trained import TrainedNetwork, TrainedStage
 from calibnet.training.validation import Validation
-from calibnet.weights import load_network
+from calibnet.weights import load_network, read_record
 from calibnet.weights.manifest import load_manifest
 
 
@@ -49,6 +50,7 @@ class Training:
         stage: to be trained; its network is on the CPU, and what is not trained of it needs no gradient.
         samples: what it is trained on.
         validation: measures it on held-out frames, if there are any.
+        inherited_licence: what the weights that it starts from say of theirs; empty where it starts from nothing.
     """
 
     options: TrainingOptions
@@ -57,6 +59,7 @@ class Training:
     stage: TrainedStage
     samples: TrainingSamples | DeviceSamples
     validation: Validation | None
+    inherited_licence: str = ""
 
 
 def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
@@ -88,7 +91,16 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
         stage,
         samples,
         Validation(held_out, stage, recipe.pace.validation_draws, options.seed) if held_out else None,
+        inherited_licence(options),
     )
+
+
+def inherited_licence(options: TrainingOptions) -> str:
+    """What the weights that a run starts from say of their licence; read now, as they may be gone at its end."""
+    if not options.initialize:
+        return ""
+    said = read_record(Path(options.initialize)).get("licence_note")
+    return one_line(said or "It is not said what these were trained on.", 10 * LONGEST)
 
 
 def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNetwork:

@@ -14,12 +14,16 @@ from calibnet.training.recipe import RECIPE, changed_knobs
 from calibnet.training.validation import ValidationFigures
 from calibnet.weights.manifest import Manifest, StageEntry, load_manifest, manifest_path
 
+ENCODER_LICENCE = "EfficientNet-Lite0 (Apache-2.0)"
+"""What a pretrained image encoder is, and its licence."""
+
 
 def training_record(
     training: Training, samples: int, minutes: float, figures: ValidationFigures | None
 ) -> dict[str, Any]:
     """Options, samples, minutes, commit, validation figures and changed knobs of a finished run, as JSON."""
     options = training.options
+    rigs = sorted({source.sequence.rig for source in training.samples.frames.sources if not source.synthetic})
     described = asdict(options) | {
         "output": None,
         "scene_cache": None,
@@ -33,15 +37,25 @@ def training_record(
         "options": {key: value for key, value in described.items() if value is not None},
         "recipe": _changes(training),
         "samples": samples,
-        "rigs": sorted({source.sequence.rig for source in training.samples.frames.sources if not source.synthetic}),
+        "rigs": rigs,
         "minutes": round(minutes, 1),
         "device": training.fabric.device.type,
         "torch": torch.__version__,
         "commit": _commit(),
         "validation": figures._asdict() if figures else None,
-        "licence_note": "Trained on KITTI (CC BY-NC-SA 3.0), nuScenes, RELLIS-3D and other frames, the image branch "
-        "of compact from EfficientNet-Lite0 (Apache-2.0): see docs/weights.md.",
+        "licence_note": licence_note(rigs, training),
     }
+
+
+def licence_note(rigs: list[str], training: Training) -> str:
+    """Whose licences the weights are under: those of the real frames, and of the weights that the run started from."""
+    frames = (
+        f"Trained on frames of {', '.join(rigs)}, whose licences apply." if rigs else "Trained on synthetic scenes."
+    )
+    options, config, before = training.options, training.stage.network.config, training.inherited_licence
+    if options.initialize:
+        return before if frames in before else f"{frames} Started from {Path(options.initialize).name}: {before}"
+    return frames if config.image_encoder == "own" else f"{frames} The image branch started from {ENCODER_LICENCE}."
 
 
 def manifest_with(training: Training, weights: Path, samples: int, figures: ValidationFigures | None) -> Manifest:

@@ -11,19 +11,21 @@ from lightning_fabric import Fabric
 
 from calibnet.cascade.stage import Stage
 from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
-from calibnet.training.build import Training
+from calibnet.training.build import Training, inherited_licence
 from calibnet.training.data import Source
 from calibnet.training.draws import Draws
 from calibnet.training.frames import TrainingFrames
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE, Recipe
-from calibnet.training.record import manifest_with, recipe_sentence, training_record
+from calibnet.training.record import licence_note, manifest_with, recipe_sentence, training_record
 from calibnet.training.samples import TrainingSamples
 from calibnet.training.validation import ValidationFigures
+from calibnet.weights import save_network
 from calibnet.weights.manifest import Manifest, StageEntry, StageSettings, load_manifest, manifest_path
 from tests.support.scene import Scenes
 from tests.support.tiny import tiny_network
 
+SHIPPED = "Trained on KITTI (CC BY-NC-SA 3.0)."
 FIGURES = ValidationFigures(4.7, 48.0, 1.2, 20.0, 3.0, 52)
 OPTIONS = TrainingOptions(
     preset="compact",
@@ -49,7 +51,8 @@ def training(recipe: Recipe = RECIPE, residuals: int = 0, **changes: Any) -> Tra
     draws = Draws(RANGES[2], recipe.draws, [miscalibration([1, 0, 0], [0, 0, 0])] * residuals, 0.4)
     stage = Stage(3, RANGES[2], network, StageSettings(1.4, 2, 1.5))
     samples = TrainingSamples(frames, draws, network.config.scales)
-    return Training(options, recipe, Fabric(accelerator="cpu", devices=1), stage, samples, None)
+    fabric = Fabric(accelerator="cpu", devices=1)
+    return Training(options, recipe, fabric, stage, samples, None, SHIPPED if options.initialize else "")
 
 
 def record(recipe: Recipe = RECIPE) -> dict[str, Any]:
@@ -65,7 +68,26 @@ def test_the_record_says_what_the_weights_come_from() -> None:
     assert made["options"]["data"] == ["kitti-raw:raw:2011_09_26/0048", "folder:rigs", "kitti-object:object:train"]
     assert made["options"]["initialize"] == "compact-10deg-1m.safetensors"
     assert made["commit"] is None or re.fullmatch("[0-9a-f]{7,40}", made["commit"])
-    assert "KITTI" in made["licence_note"]
+    assert made["licence_note"] == (
+        f"Trained on frames of {Scenes.rig}, whose licences apply. Started from compact-10deg-1m.safetensors: {SHIPPED}"
+    )
+
+
+def test_the_licence_is_that_of_what_was_trained_on_and_of_nothing_else() -> None:
+    anew = replace(training(initialize=None), inherited_licence="")
+    assert licence_note(["robot"], anew) == "Trained on frames of robot, whose licences apply."
+    assert licence_note([], anew) == "Trained on synthetic scenes."
+    again = replace(training(), inherited_licence=licence_note(["robot"], training()))
+    assert licence_note(["robot"], again) == again.inherited_licence, "a run that goes on with the same says no more"
+
+
+def test_the_licence_of_weights_to_start_from_is_read_at_the_start(tmp_path: Path) -> None:
+    network = tiny_network()
+    for name, record in (("a", {"licence_note": "Ours alone."}), ("b", {})):
+        save_network(tmp_path / name, network, network.state_dict(), record)
+    assert inherited_licence(replace(OPTIONS, initialize=str(tmp_path / "a"))) == "Ours alone."
+    assert "not said" in inherited_licence(replace(OPTIONS, initialize=str(tmp_path / "b")))
+    assert inherited_licence(replace(OPTIONS, initialize=None)) == ""
 
 
 def test_the_record_names_no_folder_of_the_machine() -> None:
