@@ -92,24 +92,28 @@ class BusyError(OutputError):
 
 
 @contextlib.contextmanager
-def locked(path: Path) -> Iterator[None]:
+def locked(path: Path, patience_s: float = PATIENCE_S) -> Iterator[None]:
     """Be the only process that writes a file, which is replaced as a whole again and again, while this lasts.
 
+    Args:
+        path: the file.
+        patience_s: how long another process is waited for.
+
     Raises:
-        BusyError: another process has it.
+        BusyError: another process has it, for longer than that.
         OutputError: the folder cannot be written.
     """
-    lock = _lock(path)
+    lock = _lock(path, patience_s)
     try:
         yield
     finally:
         _unlock(lock)
 
 
-def _lock(path: Path) -> FileLock:
+def _lock(path: Path, patience_s: float = PATIENCE_S) -> FileLock:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=PATIENCE_S)
+        lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=patience_s)
         lock.acquire()
     except Timeout:
         raise BusyError(f"{path} is being written by another run; choose another name, or wait for it.") from None
@@ -120,6 +124,11 @@ def _lock(path: Path) -> FileLock:
 
 
 def _unlock(lock: FileLock) -> None:
+    """Release a lock and leave no file of it.
+
+    The file goes while the lock is still held, and all work under it is done. Whoever had opened it before then gets a
+    lock on a file without a name, which filelock (from 3.21 on) notices, and it opens a new one.
+    """
     with contextlib.suppress(OSError):
-        Path(lock.lock_file).unlink()  # while it is held: whoever waits for it opens a new one
+        Path(lock.lock_file).unlink()
     lock.release()

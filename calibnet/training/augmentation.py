@@ -112,6 +112,9 @@ def augment(
 ) -> Frame:
     """All of the above, drawn at random, at the network's input size.
 
+    The result is a pinhole's picture: it has neither the faces of a wide lens nor the picture as it was taken, for
+    these were not changed with it.
+
     Args:
         frame: as the dataset has it.
         height: of the result's image, pixels.
@@ -122,6 +125,7 @@ def augment(
             where a cell is on a known rig need not look at what is in it.
         magnification: how much larger than to fill that size the picture is on average, and cut.
     """
+    frame = replace(frame, faces=(), original=None)
     if generator.random() < recipe.camera.mirrored:
         frame = mirror(frame)
     frame = virtual_camera(frame, height, width, generator, recipe.camera, magnification)

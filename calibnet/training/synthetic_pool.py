@@ -1,11 +1,19 @@
-"""The synthetic world as training data: scenes rendered once and kept on disk."""
+"""The synthetic world as training data: scenes rendered once and kept on disk.
+
+Files are named after the sources of `calibnet.datasets.synthetic` as well: where the world has changed, its scenes are
+rendered anew.
+"""
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import io
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile
 
@@ -40,7 +48,8 @@ class SyntheticPool:
     def __getitem__(self, position: int) -> Frame:
         """Scene ``position``; rendered if no earlier run left it in the folder."""
         robot = position % ROBOT_EVERY == ROBOT_EVERY - 1
-        path = self.folder / f"{self.seed}-{position:06d}{'-robot' if robot else ''}.npz"
+        kind = "robot" if robot else "car"
+        path = self.folder / f"{world_version()}-{self.seed}-{position:06d}-{kind}.npz"
         if os.path.lexists(path):
             try:
                 return _unpack(path)
@@ -57,6 +66,30 @@ class SyntheticPool:
         frame = (sample_robot_frame if robot else sample_frame)(self.seed * 1_000_000 + position)
         write_whole(path, _pack(frame))  # several processes may draw the same scene
         return frame
+
+
+@cache
+def world_version() -> str:
+    """Eight digits that change with the code that renders scenes."""
+    folder = resources.files("calibnet.datasets.synthetic")
+    sources = (entry for entry in folder.iterdir() if entry.name.endswith(".py"))
+    return version_of({source.name: source.read_text(encoding="utf-8") for source in sources})
+
+
+def version_of(sources: Mapping[str, str]) -> str:
+    """Eight digits of Python sources by the names of their files; comments and docstrings do not count."""
+    digest = hashlib.sha256()
+    for name in sorted(sources):
+        tree = ast.parse(sources[name])
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                node.body = [statement for statement in node.body if not _is_docstring(statement)]
+        digest.update(f"{name}\n{ast.dump(tree)}\n".encode())
+    return digest.hexdigest()[:8]
+
+
+def _is_docstring(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
 def _pack(frame: Frame) -> bytes:

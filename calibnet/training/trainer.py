@@ -33,6 +33,8 @@ from calibnet.training.validation import ValidationFigures
 from calibnet.weights import save_network, weights_path
 from calibnet.weights.manifest import manifest_path
 
+MANIFEST_PATIENCE_S = 60.0
+"""How long a run waits for others, which write their stages into the same manifest in milliseconds."""
 STOPPING = "Stopping after this step; once more stops at once."
 
 
@@ -208,6 +210,7 @@ class Trainer:
         if self.fabric.is_global_zero:
             record = training_record(self.training, self.samples, self.seconds / 60, figures)
             save_network(path, self.network, self.average.module.state_dict(), record)
-            manifest = manifest_with(self.training, path, self.samples, figures)
-            manifest.write(manifest_path(self.options.preset, self.folder))
+            manifest = manifest_path(self.options.preset, self.folder)
+            with locked(manifest, MANIFEST_PATIENCE_S):  # of another stage's run that ends at the same time
+                manifest_with(self.training, path, self.samples, figures).write(manifest)
         return path

@@ -55,17 +55,17 @@ class FrameStore:
             DatasetError: one cannot be read.
         """
         places = [(source.sequence, position) for source in sources for position in range(len(source.sequence))]
-        with ThreadPoolExecutor(os.cpu_count()) as threads:
-            frames = list(threads.map(lambda place: place[0][place[1]], places))
         lengths = [len(source.sequence) for source in sources]
-        height, width = (max(frame.image.shape[side] for frame in frames) for side in (0, 1))
-        most = max(len(frame.points) for frame in frames)
-        size = len(frames) * (3 * height * width + 16 * most)
-        if size > LARGEST_BYTES:
-            raise ConfigError(
-                f"The {len(frames):,d} training frames would take {size / 2**30:.0f} GiB of the device's memory, more "
-                f"than {LARGEST_BYTES >> 30}; pack fewer, or train without --on-device."
-            )
+        frames, height, width, most = list[Frame](), 0, 0, 0
+        threads = ThreadPoolExecutor(os.cpu_count())
+        try:
+            for frame in threads.map(lambda place: place[0][place[1]], places):
+                frames.append(frame)
+                height, width = max(height, frame.image.shape[0]), max(width, frame.image.shape[1])
+                most = max(most, len(frame.points))
+                require_room(len(places), height, width, most)
+        finally:
+            threads.shutdown(cancel_futures=True)
         pictures = torch.zeros(len(frames), height, width, 3, dtype=torch.uint8, device=device)
         scans = torch.zeros(len(frames), 4, most, device=device)
         for number, frame in enumerate(frames):
@@ -77,6 +77,20 @@ class FrameStore:
             [frame.camera for frame in frames],
             [frame.camera_from_lidar for frame in frames],
             [0, *np.cumsum(lengths)[:-1].tolist()],
+        )
+
+
+def require_room(frames: int, height: int, width: int, points: int) -> None:
+    """Check that so many frames fit onto the device, each with the picture and scan of the largest.
+
+    Raises:
+        ConfigError: they do not.
+    """
+    size = frames * (3 * height * width + 16 * points)
+    if size > LARGEST_BYTES:
+        raise ConfigError(
+            f"The {frames:,d} training frames would take {size / 2**30:.0f} GiB of the device's memory, more "
+            f"than {LARGEST_BYTES >> 30}; pack fewer, or train without --on-device."
         )
 
 

@@ -12,6 +12,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import PinholeCamera, project, rotation_from_euler_xyz, transform
 from calibnet.training.augmentation import augment, mirror, photometric, thin_scan, virtual_camera
 from calibnet.training.recipe import RECIPE
+from tests.support.wide import make_wide
 
 WIDTH, HEIGHT = 620, 188
 STEP = 100.0  # pixels from black to white
@@ -180,3 +181,12 @@ def ring(elevation_deg: float) -> NDArray[np.float64]:
     azimuth = np.linspace(-np.pi, np.pi, 3600, endpoint=False)
     height = np.full(3600, np.tan(np.radians(elevation_deg)))
     return 20 * np.column_stack([np.cos(azimuth), np.sin(azimuth), height])
+
+
+def test_a_wide_lens_is_augmented_as_the_pinhole_in_its_middle() -> None:
+    """Its faces were not mirrored and turned with it, so nobody may look through them."""
+    frame = make_wide()
+    assert len(frame.faces) == 3 and frame.original is not None
+    for seed in range(3):
+        after = augment(frame, HEIGHT, WIDTH, np.random.default_rng(seed), RECIPE)
+        assert after.faces == () and after.original is None and after.image.shape == (HEIGHT, WIDTH, 3)

@@ -8,7 +8,8 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 import pytest
 
-from calibnet.training.synthetic_pool import SyntheticPool
+from calibnet.training import synthetic_pool
+from calibnet.training.synthetic_pool import SyntheticPool, version_of
 from tests.support.scene import make_frame
 
 
@@ -85,3 +86,23 @@ def test_one_scene_of_four_is_a_robots(tmp_path: Path, monkeypatch: pytest.Monke
     list(SyntheticPool(8, 2, tmp_path))
     assert [seed for name, seed in drawn if name == "sample_robot_frame"] == [2_000_003, 2_000_007]
     assert len(drawn) == 8
+
+
+def test_scenes_of_another_world_are_rendered_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from calibnet.datasets import synthetic
+
+    drawn: list[int] = []
+    monkeypatch.setattr(synthetic, "sample_frame", lambda seed: drawn.append(seed) or make_frame(1))
+    for version, expected in (("old", 1), ("old", 1), ("new", 2), ("old", 2)):
+        monkeypatch.setattr(synthetic_pool, "world_version", lambda version=version: version)
+        SyntheticPool(5, 2, tmp_path)[0]
+        assert len(drawn) == expected
+
+
+def test_the_version_of_the_world_changes_with_its_code_and_not_with_its_comments() -> None:
+    code = {"a.py": "def wall(height):\n    return 2 * height\n", "b.py": "TALL = 3\n"}
+    commented = code | {"a.py": 'def wall(height):\n    """Twice."""\n    return 2 * height  # metres\n'}
+    changed = code | {"a.py": code["a.py"].replace("2", "3")}
+    assert version_of(commented) == version_of(code) != version_of(changed)
+    assert version_of(code) != version_of({"b.py": code["a.py"], "a.py": code["b.py"]})
+    assert len(synthetic_pool.world_version()) == 8

@@ -28,7 +28,7 @@ from calibnet.training.losses import cosines_loss
 from calibnet.training.recipe import RECIPE
 from calibnet.training.samples import collate, make_sample
 from calibnet.weights import load_network, read_record
-from calibnet.weights.manifest import load_manifest
+from calibnet.weights.manifest import Manifest, load_manifest, manifest_path
 from tests.calibnet.training.tiny_run import BATCH, Watcher, options, trainer_of
 from tests.support.scene import Scenes, make_frame
 from tests.support.tiny import TINY
@@ -273,6 +273,26 @@ def test_a_budget_that_ends_within_the_warm_up_writes_no_weights(tiny_world: Sce
         trainer_of(short).run()
     assert not list(tmp_path.glob("*.safetensors"))
     assert list(tmp_path.glob("*.checkpoint"))
+
+
+def test_the_manifest_is_locked_while_a_stage_is_written_into_it(
+    tiny_world: Scenes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two stages that end at once would each write the manifest that they read, without the other."""
+    path, seen = manifest_path("tiny", tmp_path / "runs"), []
+    of_this_stage = trainer_module.manifest_with
+
+    def during(*arguments: Any) -> Manifest:
+        with pytest.raises(BusyError), locked(path):
+            pass
+        seen.append(path)
+        return of_this_stage(*arguments)
+
+    monkeypatch.setattr(trainer_module, "manifest_with", during)
+    trainer_of(options(tmp_path / "runs")).run()
+    assert seen == [path] and path.is_file()
+    with locked(path):
+        pass
 
 
 def test_the_weights_stand_in_the_folder_s_manifest(tiny_world: Scenes, tmp_path: Path) -> None:

@@ -161,6 +161,24 @@ def test_more_frames_than_a_device_holds_are_one_sentence(monkeypatch: pytest.Mo
         FrameStore.load([Source(Scenes(), 1.0)], CPU)
 
 
+def test_frames_are_read_only_until_they_are_too_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is read would fill the host's memory before it is refused."""
+
+    class OneByOne:
+        def __init__(self, count: int | None) -> None: ...
+
+        map = staticmethod(map)
+
+        def shutdown(self, cancel_futures: bool) -> None: ...
+
+    scenes = Scenes(30)
+    monkeypatch.setattr(store_module, "ThreadPoolExecutor", OneByOne)
+    monkeypatch.setattr(store_module, "LARGEST_BYTES", 1000)
+    with pytest.raises(ConfigError, match="The 30 training frames would take"):
+        FrameStore.load([Source(scenes, 1.0)], CPU)
+    assert scenes.reads == 1
+
+
 def test_a_run_on_device_resumes_to_the_very_same_weights(tiny_world: Scenes, tmp_path: Path) -> None:
     def run(folder: str, **changes: Any) -> dict[str, torch.Tensor]:
         return load_file(trainer_of(options(tmp_path / folder, on_device=True, **changes), resume=True).run())
