@@ -229,7 +229,7 @@ def _on_drive(drive: FrameSequence, method: Calibrator, initial: Extrinsic) -> t
 
 
 def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> float | None:
-    """Median milliseconds of a method on a frame; of one that knows drives alone, those of a drive by its frames."""
+    """Median milliseconds of a method on a frame; None of one that solves drives alone, or that solves no frame."""
     sequence = bench.sequences[0]
     if drives_only(method):
         return None

@@ -82,10 +82,15 @@ def rotation_jacobian(vector: ArrayLike) -> Floats:
 
 
 def rotation_vector(rotation: NDArray[np.floating]) -> Vector3:
-    """The vector, in radians, of ``rotation_from_vector`` (for angles below 180 degrees)."""
-    axis = _sine_axis(rotation)
-    sine = float(np.linalg.norm(axis))
-    return axis * (rotation_angle(rotation) / sine) if sine > 1e-12 else axis
+    """The vector, in radians, of ``rotation_from_vector``; of a half turn one of the two that there are."""
+    sine_axis, angle = _sine_axis(rotation), rotation_angle(rotation)
+    if angle < 3.0:
+        sine = float(np.linalg.norm(sine_axis))
+        return sine_axis * (angle / sine) if sine > 1e-12 else sine_axis
+    # near half a turn the sine has few digits left, but the even part is (1 - cos) times axis by axis
+    even = 0.5 * (rotation + rotation.T) - np.cos(angle) * np.eye(3)
+    axis = even[:, int(even.diagonal().argmax())]
+    return np.copysign(angle, axis @ sine_axis) * axis / np.linalg.norm(axis)
 
 
 def pose_vector(correction: Transform) -> Vector6:

@@ -176,7 +176,10 @@ class GeometricHead(nn.Module):
 
 
 def rotation_vector(rotation: Tensor) -> Tensor:
-    """Small-angle rotation vector ``[B, 3]`` of ``[B, 3, 3]`` (exact to third order: enough for a prior)."""
+    """Rotation vector ``[B, 3]`` of small rotations ``[B, 3, 3]``: its length is the sine of their angle.
+
+    It is short by the third power of the angle / 6, 2 % of 20 degrees: enough for a prior.
+    """
     difference = rotation - rotation.transpose(1, 2)
     return 0.5 * torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)
 

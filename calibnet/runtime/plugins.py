@@ -1,4 +1,4 @@
-"""What other packages add by entry points: datasets, heads, methods and export formats, without a change here.
+"""What other packages add by entry points: datasets, heads, methods, their networks and export formats.
 
 A package that registers ``[project.entry-points."calib_inspect.datasets"] mine = "my_package:MyDataset"`` in its
 ``pyproject.toml`` is found by the name ``mine`` as if it were ours. Nothing of it is imported before it is asked for.
@@ -15,7 +15,7 @@ from typing import Any
 from calibnet.errors import ConfigError
 
 PREFIX = "calib_inspect."
-GROUPS = ("datasets", "heads", "methods", "exports")
+GROUPS = ("datasets", "heads", "methods", "networks", "exports")
 OURS = {"calibnet", "inspector"}
 
 

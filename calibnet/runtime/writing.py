@@ -11,8 +11,8 @@ import glob
 import hashlib
 import os
 import re
+import secrets
 import stat
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -123,14 +123,12 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         check_output(path, kind)
-        descriptor, name = tempfile.mkstemp(prefix=_before(path), suffix=PARTIAL, dir=path.parent)
-        os.close(descriptor)
-        partial = Path(name)
+        partial, mode = _begin(path)
         if isinstance(write, bytes):
             partial.write_bytes(write)
         else:
             write(partial)
-        partial.chmod(_usual_mode())
+        partial.chmod(mode)  # safetensors makes a file of its own there, and keeps it to its owner
         _settle(partial)
         replaced = check_output(path, kind)
         partial.replace(path)
@@ -145,6 +143,18 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
     return replaced
+
+
+def _begin(path: Path) -> tuple[Path, int]:
+    """An empty file of a new name beside ``path``, with the permissions of a file that is simply opened."""
+    while True:
+        partial = path.with_name(f"{_before(path)}{secrets.token_hex(4)}{PARTIAL}")
+        with contextlib.suppress(FileExistsError):
+            descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+            try:
+                return partial, stat.S_IMODE(os.fstat(descriptor).st_mode)
+            finally:
+                os.close(descriptor)
 
 
 def remove_partials(path: Path) -> None:
@@ -207,10 +217,3 @@ def kind_of_file(path: Path) -> Kind:
             return kind_of_content(file.read(HEAD_BYTES))
     except OSError:
         return Kind.OTHER  # what cannot be read is not known to be ours
-
-
-def _usual_mode() -> int:
-    """The permissions of a file that is simply opened: temporary files are kept to their owner, a result is not."""
-    umask = os.umask(0)
-    os.umask(umask)
-    return 0o666 & ~umask

@@ -63,11 +63,8 @@ def save_network(path: Path, network: Saveable, state: dict[str, Tensor], record
         for name, tensor in _unique(state).items()
     }
 
-    def write(partial: Path) -> None:
-        save_file(tensors, partial, metadata={HEADER: json.dumps(header)})
-        partial.chmod(0o644)  # safetensors keeps its files to their owner, which a package must not
-
-    write_whole(path, write, Kind.WEIGHTS)
+    metadata = {HEADER: json.dumps(header)}
+    write_whole(path, lambda partial: save_file(tensors, partial, metadata=metadata), Kind.WEIGHTS)
 
 
 def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -32,7 +32,7 @@ class Solution:
 
     Attributes:
         x: the parameters.
-        normal: sparse ``J^T W J`` there.
+        normal: sparse ``J^T W J`` where the last step began, from which it gained next to nothing.
         cost: sum of the robust losses.
     """
 

@@ -18,6 +18,7 @@ from calibnet.geometry import (
     transform,
     transform_points,
 )
+from calibnet.geometry.se3 import rotation_vector
 
 
 def about(axis: int, angle: float) -> np.ndarray:
@@ -34,6 +35,25 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 def random_rigid(generator: np.random.Generator) -> np.ndarray:
     return transform(cv2.Rodrigues(generator.normal(size=3))[0], generator.normal(size=3))
+
+
+@pytest.mark.parametrize("axis", [[1, 0, 0], [0, 1, 0], [0, 0, -1], [1, -2, 3], [-3, 1, 1e-9]])
+@pytest.mark.parametrize("short_of_half_a_turn", [0.0, 1e-13, 1e-9, 1e-6, 0.1, 0.2])
+def test_a_rotation_vector_is_as_long_as_the_angle_up_to_half_a_turn(
+    axis: list[float], short_of_half_a_turn: float
+) -> None:
+    vector = (np.pi - short_of_half_a_turn) * np.array(axis) / np.linalg.norm(axis)
+    rotation = cv2.Rodrigues(vector)[0]
+    found = rotation_vector(rotation)
+    assert np.linalg.norm(found) == pytest.approx(rotation_angle(rotation), abs=1e-12)
+    assert_allclose(cv2.Rodrigues(found)[0], rotation, atol=1e-14 if short_of_half_a_turn > 0.01 else 1e-9)
+    if short_of_half_a_turn > 1e-8:
+        assert_allclose(found, vector, atol=1e-7)
+
+
+def test_half_turns_about_the_axes() -> None:
+    assert_allclose(rotation_vector(np.diag([1.0, -1.0, -1.0])), [np.pi, 0, 0])
+    assert_allclose(np.abs(rotation_vector(np.diag([-1.0, -1.0, 1.0]))), [0, 0, np.pi])
 
 
 ANGLES = np.random.default_rng(0).uniform(-1.4, 1.4, (20, 3))

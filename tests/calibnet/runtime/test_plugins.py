@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from calibnet.errors import ConfigError
-from calibnet.runtime.plugins import Registry, plugins
+from calibnet.methods.learned.networks import NETWORKS
+from calibnet.runtime.plugins import Registry, package_at_fault, plugins
 from tests.support.toy_package import install, install_toys
 
 DATASETS = Registry("datasets", "dataset", {"folder": "calibnet.datasets.folder:Folder"})
@@ -55,3 +56,11 @@ def test_a_broken_package_is_one_sentence() -> None:
 def test_an_unknown_name_lists_those_there_are() -> None:
     with pytest.raises(ConfigError, match="There is no dataset 'tay'; choose one of folder, broken, toy"):
         DATASETS.load("tay")
+
+
+def test_a_network_of_another_package_is_a_plugin_as_its_method_is(tmp_path: Path) -> None:
+    code = "def net():\n    raise ValueError('no layers')\n"
+    install(tmp_path, "their_networks", code, "[calib_inspect.networks]\nnet = their_networks:net\n")
+    with pytest.raises(ValueError, match="no layers") as raised:
+        NETWORKS.load("net")()
+    assert package_at_fault(raised.value) == "their_networks"

@@ -163,3 +163,11 @@ def test_results_have_the_permissions_of_any_file(tmp_path: Path) -> None:
     (tmp_path / "plain").touch()
     write_whole(tmp_path / "out.json", b"{}", Kind.JSON)
     assert (tmp_path / "out.json").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_the_permissions_of_other_threads_files_stay_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mask is the whole process's: a file that a thread made while it was 0 could be written by anybody."""
+    monkeypatch.setattr(os, "umask", lambda mask: pytest.fail("the mask was changed"))
+    write_whole(tmp_path / "out.json", b"{}", Kind.JSON)
