@@ -61,7 +61,7 @@ class BadFrame:
     """A frame that could not be used.
 
     Attributes:
-        frame: its index or, where it could not even be read, its position in the sequence.
+        frame: its number, `calibnet.datasets.frame.Frame.index`.
         why: one sentence.
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from calibnet.cascade.upright import Upright
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame, Frames, index_of
 from calibnet.datasets.plausibility import several
 from calibnet.geometry.visibility import as_one_scan
 
@@ -28,6 +28,10 @@ class PreparedFrames:
 
     def __len__(self) -> int:
         return len(self.frames)
+
+    def index_of(self, position: int) -> int:
+        """The number of a frame."""
+        return index_of(self.frames, position)
 
     def __getitem__(self, position: int, /) -> Frame:
         """Read one frame."""

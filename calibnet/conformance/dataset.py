@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from calibnet.conformance.requirement import require, require_rigid
-from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.frame import Frame, Sequence, index_of
 
 
 def check_dataset(open_: Callable[[], Sequence]) -> None:
@@ -31,6 +31,9 @@ def check_dataset(open_: Callable[[], Sequence]) -> None:
     for frame in frames:
         check_frame(frame)
     _check_order(frames)
+    for position, frame in enumerate(frames):
+        told = index_of(sequence, position)
+        require(told == frame.index, f"Frame {frame.index} is called {told} before it is read: see `Numbered`.")
     _check_reading(sequence, frames)
     _same(frames[0], open_()[0], "opened again")
 

@@ -91,8 +91,25 @@ class Frames(Protocol):
 
 
 @runtime_checkable
+class Numbered(Protocol):
+    """Frames that know how each is numbered before it is read."""
+
+    def index_of(self, position: int, /) -> int:
+        """`Frame.index` of the frame at a position."""
+        ...
+
+
+def index_of(frames: Frames, position: int) -> int:
+    """How a frame that may be unreadable is numbered: by `Frame.index`, or its position where the frames do not say."""
+    return frames.index_of(position) if isinstance(frames, Numbered) else position
+
+
+@runtime_checkable
 class Sequence(Protocol):
     """Frames of one camera and one LiDAR on one mount, read lazily.
+
+    One whose frames are not numbered by their positions is `Numbered` too, so that a frame that cannot be read is named
+    as the others are.
 
     Attributes:
         name: for titles and file names, for instance ``"kitti-odometry/04"``.

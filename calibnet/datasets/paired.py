@@ -87,6 +87,10 @@ class PairedSequence(ABC):
         """Number of frames."""
         return len(self.files)
 
+    def index_of(self, position: int) -> int:
+        """The number of a frame, as its files have it."""
+        return self.files[position].index
+
     def __iter__(self) -> Iterator[Frame]:
         """Read the frames in order."""
         return (self[position] for position in range(len(self)))

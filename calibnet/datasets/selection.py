@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Sized
 from collections.abc import Sequence as Positions
 
-from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.frame import Frame, Sequence, index_of
 from calibnet.errors import ConfigError, DatasetError
 
 _NUMBER = r"([+-]?\d+)"
@@ -65,6 +65,10 @@ class PickedFrames:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def index_of(self, position: int) -> int:
+        """The number of the frame at one of the chosen positions."""
+        return index_of(self.sequence, self.positions[position])
 
     def __getitem__(self, position: int) -> Frame:
         """Read the frame at one of the chosen positions."""

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibnet.alignment import Evidence, align
+from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.prior import PosePrior, inverse
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vector6
@@ -36,7 +37,7 @@ class Consensus:
     def __init__(
         self,
         before: Extrinsic,
-        range_information: Matrix6,
+        range_: MiscalibrationRange,
         pose_prior: PosePrior | None = None,
         common_error: Matrix6 | None = None,
     ) -> None:
@@ -44,13 +45,13 @@ class Consensus:
 
         Args:
             before: ``camera_from_lidar`` that all corrections are relative to.
-            range_information: inverse covariance of the range the stage was trained for. Every frame's information
-                contains it; the estimate counts it once.
+            range_: that the stage was trained for. Every frame's information contains the range's own; the estimate
+                counts it once.
             pose_prior: what is known of the extrinsic beforehand, counted once as well.
             common_error: covariance of what the networks get wrong in all frames alike; added to that of the frames
-                where they are weighed against the prior.
+                where they are weighed against the prior, and where edges are aligned.
         """
-        self.before, self.range_information, self.pose_prior = before, range_information, pose_prior
+        self.before, self.range, self.pose_prior = before, range_, pose_prior
         self.common_error = np.zeros((6, 6)) if common_error is None else common_error
         self._vectors: list[Vector6] = []
         self._informations: list[Matrix6] = []
@@ -61,7 +62,7 @@ class Consensus:
     def add(self, correction: Transform, information: Matrix6 | None) -> None:
         """Take in one frame: its correction, and its information; None where the network states none."""
         self._vectors.append(pose_vector(correction))
-        self._informations.append(FIRM * self.range_information if information is None else information)
+        self._informations.append(FIRM * self.range.information if information is None else information)
 
     def estimate(self) -> Estimate:
         """The estimate from the frames so far and from what is known beforehand.
@@ -91,7 +92,7 @@ class Consensus:
             covariance = covariance * max(1.0, float((weights * distances).sum() / max(freedom, 1.0)))
         return mean, covariance
 
-    def aligned(self, evidence: Sequence[Evidence], common_error: Matrix6, starts: Sequence[Estimate] = ()) -> Estimate:
+    def aligned(self, evidence: Sequence[Evidence], starts: Sequence[Estimate] = ()) -> Estimate:
         """The estimate from the frames and the evidence of some of them, their edges and reflectance.
 
         Its covariance includes the common error of the networks, as far as the evidence does not determine it. Frames
@@ -99,14 +100,13 @@ class Consensus:
 
         Args:
             evidence: of any of the frames, gathered under ``before``.
-            common_error: covariance of what the networks get wrong in all frames alike.
             starts: where the alignment starts, of which the best result is taken; at what the frames agree on by
                 default.
         """
         known = self.estimate()
         others = [pose_vector(one.camera_from_lidar @ invert(self.before)) for one in starts]
         likely, covariance = self.agreed()
-        covariance = covariance + common_error
+        covariance = covariance + self.common_error
         if self.pose_prior is not None:
             likely, covariance = self.pose_prior.fused(likely, inverse(covariance), self.before)
         if known.rotation_deg > FARTHEST_ROTATION_DEG or known.translation_cm > 100 * FARTHEST_TRANSLATION_M:
@@ -117,5 +117,6 @@ class Consensus:
     def _solve(self, vectors: Floats, informations: Floats, weights: Floats) -> tuple[Matrix6, Vector6]:
         """Summed normal equations of vectors ``[N, 6]`` and informations ``[N, 6, 6]``: matrix and solution."""
         weighted = weights[:, None, None] * informations
-        normal = weighted.sum(0) - weights.sum() * self.range_information + self.range_information
+        of_range = self.range.information
+        normal = weighted.sum(0) - weights.sum() * of_range + of_range
         return normal, np.linalg.solve(normal, np.einsum("nij,nj->i", weighted, vectors))

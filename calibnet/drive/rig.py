@@ -8,8 +8,8 @@ the rig's frame. In the end edges of all cameras are aligned by that one pose.
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -20,19 +20,27 @@ import numpy as np
 from calibnet.alignment import gather
 from calibnet.alignment.evidence import Evidence, InRig, Term
 from calibnet.alignment.solve import align
-from calibnet.datasets.frame import Frame
 from calibnet.datasets.rig import RigCamera
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.drive.consensus import FARTHEST_ROTATION_DEG, FARTHEST_TRANSLATION_M, Consensus
 from calibnet.drive.convergence import Due
+from calibnet.drive.readings import Observed, Readings
 from calibnet.drive.rig_pose import CameraConsensus, rig_correction
-from calibnet.drive.solve import FRAMES_ALIGNED, FRAMES_UNTIL_LAST_LOOK, LOOKS, DriveStage, agree, drive_look
+from calibnet.drive.solve import (
+    FRAMES_ALIGNED,
+    FRAMES_UNTIL_LAST_LOOK,
+    LOOKS,
+    DriveLooks,
+    DriveStage,
+    agree,
+    drive_look,
+)
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import is_finest
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
-from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
+from calibnet.trace import DriveEstimate, DriveLook, Estimate
 from calibnet.verdict import BadFrame
 
 
@@ -108,24 +116,19 @@ def solve_rig(
         CalibrationError: no frame of any camera could be calibrated.
         DatasetError: none could be read.
     """
-    some = [evenly_spaced(len(camera.frames), FRAMES_UNTIL_LAST_LOOK) for camera in cameras]
-    everything = [list(range(len(camera.frames))) for camera in cameras]
-    total, number = LOOKS * len(stages) * sum(map(len, some)) + sum(map(len, everything)), itertools.count()
-
-    def read(camera: RigCamera, position: int) -> Frame:
-        if observer is not None:
-            observer(next(number), total)
-        return camera.frames[position]
-
+    counts = [len(camera.frames) for camera in cameras]
+    until_last = sum(min(count, FRAMES_UNTIL_LAST_LOOK) for count in counts)
+    readings = Readings(observer, LOOKS * len(stages) * until_last + sum(counts))
+    cameras = [replace(camera, frames=Observed(camera.frames, readings)) for camera in cameras]
     rig, places = initial, {camera.name: camera.camera_from_rig for camera in cameras}
     for stage in stages:
         for _ in range(LOOKS):
-            agreed = _look(stage, cameras, some, places, rig, common_error, read)
+            agreed = _agreed(cameras, partial(_look_at_some, stage, rig, places), common_error)
             rig = pose_from_vector(rig_correction(agreed, rig, pose_prior, tolerance)[0]) @ rig
             places |= {one.camera.name: one.placed(rig, tolerance) for one in agreed}
     aligns = is_finest(stages[-1].range)
-    last = _LastLook(cameras, aligns)
-    agreed = _look(stages[-1], cameras, everything, places, rig, common_error, read, last)
+    last = _LastLook(stages[-1], rig, places, max(1, FRAMES_ALIGNED // len(cameras)) if aligns else 0)
+    agreed = _agreed(cameras, last.at, common_error)
     mean, covariance = rig_correction(agreed, rig, pose_prior, tolerance)
     of_networks = Estimate(pose_from_vector(mean) @ rig, covariance, len(last.looks))
     if aligns:
@@ -135,8 +138,7 @@ def solve_rig(
         )
         mean, covariance = align(() if too_far else [Evidence((term,)) for term in last.terms], mean, covariance)
     found = Estimate(pose_from_vector(mean) @ rig, covariance, len(last.looks))
-    if observer is not None:
-        observer(total, total)
+    readings.end()
     return RigEstimate(
         found.camera_from_lidar,
         found.covariance,
@@ -150,8 +152,30 @@ def solve_rig(
     )
 
 
+def _agreed(
+    cameras: Sequence[RigCamera], look_at: Callable[[RigCamera], Consensus], common_error: Matrix6
+) -> list[CameraConsensus]:
+    """What the frames of each camera agree on in one look, without cameras of which no frame can be used."""
+    found = list[CameraConsensus]()
+    failure: CalibnetError | None = None
+    for camera in cameras:
+        try:
+            found.append(CameraConsensus.of(camera, look_at(camera), common_error))
+        except (CalibrationError, DatasetError) as error:
+            failure = error
+    if failure is not None and not found:
+        raise failure
+    return found
+
+
+def _look_at_some(stage: DriveStage, rig: Extrinsic, places: dict[str, Transform], camera: RigCamera) -> Consensus:
+    """Look at some frames of a camera, which is at its place on the rig (``camera_from_rig``)."""
+    some = evenly_spaced(len(camera.frames), FRAMES_UNTIL_LAST_LOOK)
+    return agree(DriveLooks(stage, camera.frames, some, places[camera.name] @ rig))
+
+
 class _LastLook:
-    """What the last look, at all frames, leaves behind.
+    """The last look, at all frames, and what it leaves behind.
 
     Attributes:
         skipped: frames that could not be read or calibrated.
@@ -160,62 +184,29 @@ class _LastLook:
         terms: edges and reflectance of the frames to align, as terms of the rig's pose.
     """
 
-    def __init__(self, cameras: Sequence[RigCamera], aligns: bool) -> None:
-        """Collect from these cameras; with ``aligns``, what is to be aligned as well."""
+    def __init__(self, stage: DriveStage, rig: Extrinsic, places: dict[str, Transform], aligned: int) -> None:
+        """Look with ``stage`` from ``rig``, and collect edges of ``aligned`` frames of each camera."""
+        self.stage, self.rig, self.places, self.aligned = stage, rig, places, aligned
         self.skipped, self.looks, self.terms = list[BadFrame](), list[DriveLook](), list[Term]()
-        self.of_camera: dict[str, list[DriveLook]] = {camera.name: [] for camera in cameras}
-        self._aligned = max(1, FRAMES_ALIGNED // len(cameras)) if aligns else 0
+        self.of_camera = defaultdict[str, list[DriveLook]](list)
 
-    def of(self, camera: RigCamera, place: Transform) -> Callable[[int, Frame, StageTrace, Consensus], None]:
-        """What takes in the frames of a camera, which is at ``place`` on the rig (``camera_from_rig``)."""
-        due = Due(evenly_spaced(len(camera.frames), self._aligned) if self._aligned else [])
-
-        def taken_in(position: int, frame: Frame, trace: StageTrace, consensus: Consensus) -> None:
-            look = drive_look(frame, position, trace)
-            self.of_camera[camera.name].append(look)
-            self.looks.append(in_rig(look, place))
-            if due.reached(position):
-                self.terms.append(InRig(gather(frame, consensus.before), place))
-
-        return taken_in
-
-
-def _look(
-    stage: DriveStage,
-    cameras: Sequence[RigCamera],
-    positions: Sequence[list[int]],
-    places: dict[str, Transform],
-    rig: Extrinsic,
-    common_error: Matrix6,
-    read: Callable[[RigCamera, int], Frame],
-    last: _LastLook | None = None,
-) -> list[CameraConsensus]:
-    """What the frames of each camera agree on in one look, without cameras of which no frame can be used.
-
-    Args:
-        stage: that looks.
-        cameras: of the rig.
-        positions: of the frames of each.
-        places: ``camera_from_rig`` by the camera's name.
-        rig: ``rig_from_lidar`` under which it looks.
-        common_error: see `solve_rig`.
-        read: gives the frame of a camera at a position.
-        last: takes in the frames of the last look.
-    """
-    found = list[CameraConsensus]()
-    failure: CalibnetError | None = None
-    for camera, chosen in zip(cameras, positions, strict=True):
-        place = places[camera.name]
-        taken_in, skipped = (None, None) if last is None else (last.of(camera, place), last.skipped)
+    def at(self, camera: RigCamera) -> Consensus:
+        """Look at all frames of a camera."""
+        place, count = self.places[camera.name], len(camera.frames)
+        due = Due(evenly_spaced(count, self.aligned) if self.aligned else [])
+        looks = DriveLooks(self.stage, camera.frames, range(count), place @ self.rig)
+        consensus = Consensus(looks.extrinsic, self.stage.range)
         try:
-            consensus = agree(stage, partial(read, camera), chosen, place @ rig, taken_in, skipped)
-        except (CalibrationError, DatasetError) as error:
-            failure = error
-            continue
-        found.append(CameraConsensus.of(camera, consensus, common_error))
-    if failure is not None and not found:
-        raise failure
-    return found
+            for position, frame, trace in looks:
+                consensus.add(trace.correction, trace.information)
+                look = drive_look(frame, position, trace)
+                self.of_camera[camera.name].append(look)
+                self.looks.append(in_rig(look, place))
+                if due.reached(position):
+                    self.terms.append(InRig(gather(frame, looks.extrinsic), place))
+        finally:
+            self.skipped += looks.skipped
+        return consensus
 
 
 def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Protocol
 
 from calibnet.alignment import Evidence, gather
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame, Frames, index_of
 from calibnet.datasets.plausibility import suspicion
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due
+from calibnet.drive.readings import Observed, Readings
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.prior import PosePrior
@@ -80,53 +80,42 @@ def solve_drive(
     """
     if not len(frames):
         raise ValueError("There are no frames to calibrate.")
-    some, everything = evenly_spaced(len(frames), FRAMES_UNTIL_LAST_LOOK), list(range(len(frames)))
-    total, number = LOOKS * len(stages) * len(some) + len(everything), itertools.count()
-
-    def read(position: int) -> Frame:
-        if observer is not None:
-            observer(next(number), total)
-        return frames[position]
-
+    some = evenly_spaced(len(frames), FRAMES_UNTIL_LAST_LOOK)
+    readings = Readings(observer, LOOKS * len(stages) * len(some) + len(frames))
+    observed = Observed(frames, readings)
     extrinsic = initial
     for stage in stages:
         for _ in range(LOOKS):
-            extrinsic = (
-                agree(stage, read, some, extrinsic, pose_prior=pose_prior, common_error=common_error)
-                .estimate()
-                .camera_from_lidar
-            )
+            looks = DriveLooks(stage, observed, some, extrinsic)
+            extrinsic = agree(looks, pose_prior, common_error).estimate().camera_from_lidar
 
     aligns = is_finest(stages[-1].range)
-    evidence = list[Evidence]()
+    evidence, kept = list[Evidence](), list[DriveLook]()
     to_align, convergence = Due(evenly_spaced(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
+    consensus = Consensus(extrinsic, stages[-1].range, pose_prior, common_error)
 
-    def estimate(consensus: Consensus, *starts: Estimate) -> Estimate:
-        return consensus.aligned(evidence, common_error, starts) if aligns else consensus.estimate()
+    def estimate(*starts: Estimate) -> Estimate:
+        return consensus.aligned(evidence, starts) if aligns else consensus.estimate()
 
-    looks = list[DriveLook]()
-
-    def taken_in(position: int, frame: Frame, look: StageTrace, consensus: Consensus) -> None:
-        looks.append(drive_look(frame, position, look))
+    looks = DriveLooks(stages[-1], observed, range(len(frames)), extrinsic)
+    for position, frame, trace in looks:
+        consensus.add(trace.correction, trace.information)
+        kept.append(drive_look(frame, position, trace))
         if aligns and to_align.reached(position):
-            evidence.append(gather(frame, consensus.before))
-        convergence.note(position, frame.index, lambda: estimate(consensus, *convergence.latest))
-
-    skipped = list[BadFrame]()
-    consensus = agree(stages[-1], read, everything, extrinsic, taken_in, skipped, pose_prior, common_error)
+            evidence.append(gather(frame, extrinsic))
+        convergence.note(position, frame.index, lambda: estimate(*convergence.latest))
     of_networks = consensus.estimate()
-    final = estimate(consensus, of_networks, *convergence.latest)
+    final = estimate(of_networks, *convergence.latest)
     convergence.end(final)
-    if observer is not None:
-        observer(total, total)
+    readings.end()
     return DriveEstimate(
         final.camera_from_lidar,
         final.covariance,
         final.frames,
         tuple(convergence.points),
-        skipped=tuple(skipped),
+        skipped=tuple(looks.skipped),
         networks=of_networks if aligns else None,
-        looks=tuple(looks),
+        looks=tuple(kept),
         looked_from=extrinsic,
     )
 
@@ -136,51 +125,60 @@ def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
     return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px)
 
 
-def agree(
-    stage: DriveStage,
-    read: Callable[[int], Frame],
-    positions: list[int],
-    extrinsic: Extrinsic,
-    taken_in: Callable[[int, Frame, StageTrace, Consensus], None] | None = None,
-    skipped: list[BadFrame] | None = None,
-    pose_prior: PosePrior | None = None,
-    common_error: Matrix6 | None = None,
-) -> Consensus:
-    """The consensus of one look of a stage at each of some frames of a drive.
+class FrameLook(NamedTuple):
+    """What one look says of the frame at a position of a drive."""
 
-    Args:
-        stage: that looks.
-        read: gives the frame at a position.
-        positions: of the frames.
-        extrinsic: under which it looks.
-        taken_in: called after each frame that could be calibrated, with its position, the frame, its look and the
-            consensus so far.
-        skipped: frames that could not be read or calibrated are appended to it.
-        pose_prior: what is known of the extrinsic beforehand.
-        common_error: see `Consensus`.
+    position: int
+    frame: Frame
+    trace: StageTrace
+
+
+class DriveLooks:
+    """One look of a stage at each of some frames of a drive, made while it is iterated: one frame is in memory.
+
+    Attributes:
+        skipped: frames so far that could not be read or calibrated.
+    """
+
+    def __init__(self, stage: DriveStage, frames: Frames, positions: Sequence[int], extrinsic: Extrinsic) -> None:
+        """Look with ``stage`` at the frames at ``positions``, under ``extrinsic``."""
+        self.stage, self.frames, self.positions, self.extrinsic = stage, frames, positions, extrinsic
+        self.skipped = list[BadFrame]()
+
+    def __iter__(self) -> Iterator[FrameLook]:
+        """The frames that can be calibrated.
+
+        Raises:
+            CalibrationError: none could be calibrated.
+            DatasetError: none could be read.
+        """
+        failure: CalibnetError | None = None
+        for position in self.positions:
+            number = index_of(self.frames, position)
+            try:
+                frame = self.frames[position]
+                number = frame.index
+                trace = self.stage.look(frame, self.stage.view(frame), self.extrinsic)
+                trace = believed(trace, self.stage.match_error_limit_px, frame)
+            except (CalibrationError, DatasetError) as error:
+                failure = error
+                self.skipped.append(BadFrame(number, str(error)))
+                continue
+            yield FrameLook(position, frame, trace)
+        if failure is not None and len(self.skipped) == len(self.positions):
+            raise failure
+
+
+def agree(looks: DriveLooks, pose_prior: PosePrior | None = None, common_error: Matrix6 | None = None) -> Consensus:
+    """The consensus of looks; arguments as of `Consensus`.
 
     Raises:
-        CalibrationError: none of the frames could be calibrated.
+        CalibrationError: no frame could be calibrated.
         DatasetError: none could be read.
     """
-    failure: CalibnetError | None = None
-    consensus = Consensus(extrinsic, stage.range.information, pose_prior, common_error)
-    for position in positions:
-        index = position
-        try:
-            frame = read(position)
-            index = frame.index
-            look = believed(stage.look(frame, stage.view(frame), extrinsic), stage.match_error_limit_px, frame)
-        except (CalibrationError, DatasetError) as error:
-            failure = error
-            if skipped is not None:
-                skipped.append(BadFrame(index, str(error)))
-            continue
-        consensus.add(look.correction, look.information)
-        if taken_in is not None:
-            taken_in(position, frame, look, consensus)
-    if failure is not None and not len(consensus):
-        raise failure
+    consensus = Consensus(looks.extrinsic, looks.stage.range, pose_prior, common_error)
+    for look in looks:
+        consensus.add(look.trace.correction, look.trace.information)
     return consensus
 
 

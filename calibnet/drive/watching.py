@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from calibnet.calibrator import DriveCalibrator
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame, Frames, index_of
 from calibnet.drive.changes import SHORTEST, watch
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES
@@ -36,6 +36,10 @@ class Part:
 
     def __len__(self) -> int:
         return self.stop - self.start
+
+    def index_of(self, position: int) -> int:
+        """The number of a frame."""
+        return index_of(self.frames, self.start + position)
 
     def __getitem__(self, position: int, /) -> Frame:
         """Read one frame."""

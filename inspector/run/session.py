@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from calibnet.calibrator import Calibrator, DriveCalibrator, drives_only, with_causes
-from calibnet.datasets.frame import Frame, Sequence
+from calibnet.datasets.frame import Frame, Sequence, index_of
 from calibnet.datasets.selection import PickedFrames
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry.types import Extrinsic
@@ -177,8 +177,10 @@ class Session:
 
     def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
+        number = index_of(self.sequence, position)
         try:
             frame = self.sequence[position]
+            number = frame.index
             self._show()
             initial = self.start.initial(frame)
             trace = method.calibrate(frame, initial, detail=self.contents.inside)
@@ -190,7 +192,7 @@ class Session:
         except (CalibrationError, DatasetError) as error:
             if self.stop_on_bad_frame or len(self.positions) == 1:
                 raise
-            summary.skipped.append(BadFrame(position, str(error)))
+            summary.skipped.append(BadFrame(number, str(error)))
             summary.unread += isinstance(error, DatasetError) and not named_cause(error)
             self.console.print(f"Skipped: {error}", style="yellow", markup=False, soft_wrap=True)
             return None

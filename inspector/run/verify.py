@@ -34,13 +34,17 @@ class Readable:
     def __len__(self) -> int:
         return len(self.frames)
 
+    def index_of(self, position: int) -> int:
+        """The number of a frame."""
+        return self.frames.index_of(position)
+
     def __getitem__(self, position: int) -> Frame:
         """Read a frame, and note where that fails; input that is read and cannot be right counts as read."""
         try:
             return self.frames[position]
         except DatasetError as error:
             if not named_cause(error):
-                self.unread[self.frames.positions[position]] = str(error)
+                self.unread[self.index_of(position)] = str(error)
             raise
 
     def first(self) -> Frame:
@@ -66,7 +70,7 @@ class Readable:
         """
         if not self.unread or not (self.stop or 2 * len(self.unread) >= len(self)):
             return
-        each = " ".join(f"Frame {position}: {why}" for position, why in self.unread.items())
+        each = " ".join(f"Frame {frame}: {why}" for frame, why in self.unread.items())
         share = "" if self.stop else ", which is half or more"
         raise DatasetError(f"{len(self.unread)} of {len(self)} frames cannot be read{share}. {each}")
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.datasets.frame import Frame, Frames
+from calibnet.datasets.frame import Frame, Frames, index_of
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.exhibit import Curve
 from calibnet.geometry import MiscalibrationRange, PinholeCamera
@@ -196,7 +196,7 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
         try:
             read.append(frames[position])
         except DatasetError as error:
-            skipped.append(BadFrame(position, str(error)))
+            skipped.append(BadFrame(index_of(frames, position), str(error)))
     if observer is not None:
         observer(total, total)
     alike = [frame for frame in read if same_camera(frame.camera, read[0].camera)]

@@ -29,7 +29,7 @@ SIGMA = np.array([0.1, 0.1, 0.2, 0.004, 0.004, 0.004])
 def drive(frames: int, lost: int = 0, seed: int = 0, stated: float = 1.0) -> Consensus:
     """Frames scattered around the truth; ``lost`` of them far off, and as sure of themselves as the rest."""
     generator = np.random.default_rng(seed)
-    consensus = Consensus(REFERENCE, PRIOR)
+    consensus = Consensus(REFERENCE, RANGES[2])
     for number in range(frames):
         error = generator.normal(size=6) * SIGMA * (40 if number < lost else 1)
         correction = np.eye(4)
@@ -81,7 +81,7 @@ def test_covariance_is_that_of_the_scatter_even_if_the_frames_are_too_sure() -> 
 
 
 def test_uncertain_directions_are_left_to_frames_that_know_them() -> None:
-    consensus = Consensus(REFERENCE, PRIOR)
+    consensus = Consensus(REFERENCE, RANGES[2])
     off = TRUTH.copy()
     off[2, 3] += 2.0
     vague = PRIOR + np.diag([1e4, 1e4, 1e-2, 1e5, 1e5, 1e5])
@@ -91,7 +91,7 @@ def test_uncertain_directions_are_left_to_frames_that_know_them() -> None:
 
 
 def test_heads_without_uncertainty_are_averaged_robustly() -> None:
-    consensus = Consensus(REFERENCE, PRIOR)
+    consensus = Consensus(REFERENCE, RANGES[2])
     generator = np.random.default_rng(1)
     for number in range(9):
         shift = np.array([3.0, 0, 0]) if number == 0 else generator.normal(0, 0.01, 3)
@@ -103,7 +103,7 @@ def test_heads_without_uncertainty_are_averaged_robustly() -> None:
 
 def test_no_frames_are_an_error() -> None:
     with pytest.raises(ValueError, match="no frame"):
-        Consensus(REFERENCE, PRIOR).estimate()
+        Consensus(REFERENCE, RANGES[2]).estimate()
 
 
 COMMON = np.diag(np.square([0.08] * 3 + [np.radians(0.12)] * 3))
@@ -123,11 +123,12 @@ class Pull:
 
 def test_evidence_moves_what_frames_agree_on() -> None:
     consensus = drive(30)
+    consensus.common_error = COMMON
     agreed, towards = consensus.estimate(), pose_vector(TRUTH) + np.array([0.05, 0, 0, 0, 0.001, 0])
-    still = consensus.aligned([], COMMON)
+    still = consensus.aligned([])
     np.testing.assert_allclose(still.camera_from_lidar, agreed.camera_from_lidar, atol=1e-9)
     np.testing.assert_allclose(still.covariance, agreed.covariance + COMMON, rtol=1e-6)
-    firm = consensus.aligned([Evidence((Pull(towards, 10.0),))], COMMON, [agreed, still])
+    firm = consensus.aligned([Evidence((Pull(towards, 10.0),))], [agreed, still])
     target = pose_from_vector(towards) @ REFERENCE
     assert pose_error(firm.camera_from_lidar, target).translation_cm < 0.5
     assert pose_error(agreed.camera_from_lidar, target).translation_cm > 3
@@ -135,11 +136,11 @@ def test_evidence_moves_what_frames_agree_on() -> None:
 
 
 def test_frames_that_scatter_too_far_are_not_aligned() -> None:
-    consensus = Consensus(REFERENCE, PRIOR)
+    consensus = Consensus(REFERENCE, RANGES[2])
     for shift in (-3.0, -1.0, 1.0, 3.0):
         correction = TRUTH.copy()
         correction[0, 3] += shift
         consensus.add(correction, None)
     assert consensus.estimate().translation_cm > 30
-    pulled = consensus.aligned([Evidence((Pull(np.ones(6), 10.0),))], COMMON)
+    pulled = consensus.aligned([Evidence((Pull(np.ones(6), 10.0),))])
     np.testing.assert_allclose(pulled.camera_from_lidar, consensus.estimate().camera_from_lidar, atol=1e-6)

@@ -21,7 +21,8 @@ from tests.support.tiny import tiny_network
 
 SIDE = transform(rotation_from_vector([0.1, 1.5, -0.2]), [0.4, -0.3, 0.9])
 """A camera that looks to the side, from the rig."""
-PRIOR = RANGES[3].information
+RANGE = RANGES[3]
+PRIOR = RANGE.information
 POINTS = np.random.default_rng(2).uniform(-5, 5, (20, 3))
 COMMON = np.diag([0.03**2] * 3 + [0.001**2] * 3)
 
@@ -37,7 +38,7 @@ def saying(
 ) -> Consensus:
     """A camera whose only frame says where the truth is, as firmly as ``sigma [6]``, but for some metres ahead."""
     before = camera_from_rig @ rig
-    consensus = Consensus(before, PRIOR)
+    consensus = Consensus(before, RANGE)
     wrong = transform(np.eye(3), [0.0, 0.0, ahead])
     consensus.add(wrong @ camera_from_rig @ truth @ invert(before), np.diag(sigma**-2.0) + PRIOR)
     return consensus

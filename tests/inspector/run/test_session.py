@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -128,6 +129,26 @@ def test_bad_frames_are_skipped_named_and_counted(
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 3, 4]
     told = read(file, "skipped", "TextLog:text")
     assert [frame for frame, _ in told] == [0, 2] and "cut short" in told[1][1].as_py()[0]
+
+
+class NumberedFrom1(BrokenSequence):
+    """Frames whose files are numbered from 1 on."""
+
+    def index_of(self, position: int) -> int:
+        return position + 1
+
+    def __getitem__(self, position: int) -> Any:
+        return replace(super().__getitem__(position), index=position + 1)
+
+
+def test_a_frame_that_cannot_be_read_has_the_number_that_its_file_has(
+    record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
+) -> None:
+    file = tmp_path / "run.rrd"
+    summary = record(file, length=5, sequence=NumberedFrom1(fakes.FakeSequence(5), bad=2))
+    assert [bad.frame for bad in summary.skipped] == [3]
+    assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 2, 4, 5]
+    assert [frame for frame, _ in read(file, "skipped", "TextLog:text")] == [3]
 
 
 def test_half_of_the_frames_are_too_many_to_skip(record: Callable[..., Any], tmp_path: Path, fakes: ModuleType) -> None:
