@@ -90,7 +90,7 @@ def rotation_vector(rotation: NDArray[np.floating]) -> Vector3:
     # near half a turn the sine has few digits left, but the even part is (1 - cos) times axis by axis
     even = 0.5 * (rotation + rotation.T) - np.cos(angle) * np.eye(3)
     axis = even[:, int(even.diagonal().argmax())]
-    return np.copysign(angle, axis @ sine_axis) * axis / np.linalg.norm(axis)
+    return np.asarray(np.copysign(angle, axis @ sine_axis) * axis / np.linalg.norm(axis), np.float64)
 
 
 def pose_vector(correction: Transform) -> Vector6:
