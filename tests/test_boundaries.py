@@ -127,33 +127,33 @@ def test_the_foundation_imports_nothing_above_it() -> None:
     assert set(imported_modules((ROOT / "calibnet" / "errors.py").read_text(encoding="utf-8"))) & set(above) == set()
 
 
-def loaded_by(statement: str) -> set[str]:
-    """The heavy modules in ``sys.modules`` of a fresh interpreter after ``statement``."""
-    code = f"import sys\n{statement}\nprint('LOADED', *[name for name in {HEAVY!r} if name in sys.modules])"
+QUICK = (
+    "import calibnet",
+    "import calibnet; calibnet.pose_error; calibnet.open_sequence",
+    "import calibnet.datasets, calibnet.geometry, calibnet.trace, calibnet.evaluation.runner",
+    "import calibnet.datasets.synthetic",
+    "import inspector",
+    "from inspector.cli.errors import run; from inspector.cli.main import cli",
+    *(f"run(cli, {arguments})" for arguments in (["--help"], ["--version"])),
+    *(f"run(cli, {[command, '--help']})" for command in ("evaluate", "info", "compare", "check", "export")),
+)
+"""Statements that load nothing heavy, so that one interpreter can run them after one another."""
+
+
+def loaded_by(*statements: str) -> dict[str, set[str]]:
+    """The heavy modules in ``sys.modules`` of a fresh interpreter after each of the statements."""
+    told = f"\nprint('LOADED', *[name for name in {HEAVY!r} if name in sys.modules])\n"
+    code = "import sys\n" + told.join(statements) + told
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
     )
-    return set(done.stdout.rpartition("LOADED")[2].split())
+    lines = [line.split()[1:] for line in done.stdout.splitlines() if line.startswith("LOADED")]
+    return {statement: set(line) for statement, line in zip(statements, lines, strict=True)}
 
 
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "import calibnet",
-        "import calibnet.datasets, calibnet.geometry, calibnet.trace, calibnet.evaluation.runner",
-        "import inspector",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['--help'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['--version'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['evaluate', '--help'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['info', '--help'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['compare', '--help'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['check', '--help'])",
-        "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\nrun(cli, ['export', '--help'])",
-    ],
-)
-def test_what_must_stay_quick_imports_nothing_heavy(statement: str) -> None:
-    assert loaded_by(statement) == set()
+def test_what_must_stay_quick_imports_nothing_heavy() -> None:
+    assert loaded_by(*QUICK) == {statement: set() for statement in QUICK}
 
 
 def test_the_check_of_heavy_imports_can_fail() -> None:
-    assert loaded_by("import rich") == {"rich"}
+    assert loaded_by("import json", "import rich") == {"import json": set(), "import rich": {"rich"}}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -26,9 +24,3 @@ def test_type_checkers_see_the_same_names() -> None:
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="Cascadee"):
         _ = calibnet.Cascadee  # type: ignore[attr-defined]
-
-
-def test_geometry_needs_no_torch() -> None:
-    code = "import sys, calibnet; calibnet.pose_error; calibnet.open_sequence; print('torch' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

@@ -20,11 +20,11 @@ from tests.support.toy_package import install_toys
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def start(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command line as a user does who has installed what is in the folder."""
+def start(folder: Path, *arguments: str, code: str = "") -> subprocess.CompletedProcess[str]:
+    """Run the command line, or ``code``, as a user does who has installed what is in the folder."""
     environment = {**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "COLUMNS": "200"}
     return subprocess.run(
-        [sys.executable, "-m", "inspector", *arguments],
+        [sys.executable, *(["-c", code] if code else ["-m", "inspector", *arguments])],
         env=environment,
         cwd=folder,
         capture_output=True,
@@ -34,22 +34,24 @@ def start(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize(
-    ("command", "names"),
-    [
-        ("evaluate", ("folder|broken|toy", "edge-alignment|", "|broken|nothing")),
-        ("folder", ("folder|broken|toy", "cascade|edge-alignment|", "|broken|nothing")),
-        ("export", ("kitti|ros|opencv|json|yaml|urdf|autoware|koide3|broken|csv",)),
-        ("train", ("geometric|regression|broken|still",)),
-    ],
-)
-def test_help_lists_them_whatever_is_broken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, names: tuple[str, ...]
-) -> None:
+HELPS = {
+    "evaluate": ("folder|broken|toy", "edge-alignment|", "|broken|nothing"),
+    "folder": ("folder|broken|toy", "cascade|edge-alignment|", "|broken|nothing"),
+    "export": ("kitti|ros|opencv|json|yaml|urdf|autoware|koide3|broken|csv",),
+    "train": ("geometric|regression|broken|still",),
+}
+
+
+def test_help_lists_them_whatever_is_broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install_toys(tmp_path, monkeypatch)
-    done = start(tmp_path, command, "--help")
+    code = "from inspector.cli.errors import run\nfrom inspector.cli.main import cli\n"
+    code += f"for command in {list(HELPS)}:\n    print('CODE', run(cli, [command, '--help']))\n"
+    done = start(tmp_path, code=code)
     assert done.returncode == 0, done.stderr
-    assert all(name in "".join(done.stdout.split()) for name in names)
+    texts = done.stdout.split("CODE 0\n")
+    assert len(texts) == len(HELPS) + 1
+    for text, names in zip(texts, HELPS.values(), strict=False):
+        assert all(name in "".join(text.split()) for name in names)
 
 
 def test_a_broken_one_is_one_sentence_when_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
