@@ -14,7 +14,7 @@ from inspector.record.observation import Grid, Layout, StageLayout
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.views import COLORED_BY
 
-GRIDS = (Grid(8, 20, 64), Grid(16, 10, 32))
+GRIDS = (Grid(8, 20, 64, 9), Grid(16, 10, 32, 9))
 
 
 def layout(has_reference: bool = True, contents: Contents | None = None) -> Layout:

@@ -96,7 +96,7 @@ def full_layout() -> Layout:
     from inspector.record.observation import Grid, StageLayout
 
     return Layout(
-        (StageLayout(3, "5/0.5", (Grid(8, 20, 64),), ("Masks",), ("Score",)),),
+        (StageLayout(3, "5/0.5", (Grid(8, 20, 64, 9),), ("Masks",), ("Score",)),),
         True,
         Contents.of(Detail.FULL),
         with_drive=True,
