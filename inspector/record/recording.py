@@ -145,7 +145,9 @@ class Recording:
             log_watch(self._rec, watched.watch, list(sentences(watched)), to_frame)
 
     def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
-        """Log what the drive's extrinsic makes of one of its frames."""
+        """Log what the drive's extrinsic makes of a frame; nothing of one that is not recorded."""
+        if frame.index not in self._seconds:
+            return
         observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
         log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
         self._flush_frame()

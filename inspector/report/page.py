@@ -7,6 +7,7 @@ from html import escape
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
+from calibnet.verdict import REJECTED
 from inspector.read.run import RecordedRun
 from inspector.record.contents import Coloring
 from inspector.report.charts import charts
@@ -26,6 +27,8 @@ SETTING_NAMES = {
     "preset": "network",
     "drive": "solved as one drive",
     "detail": "recorded detail",
+    "parts": "recorded parts",
+    "color": "points coloured by",
     "calib_inspect": "calib-inspect",
 }
 """What settings are called on the page, in its order; others follow under their own names."""
@@ -41,8 +44,8 @@ AGAINST_MEDIAN = (
 )
 
 
-ALONE, AS_ONE = "this frame alone", "whole drive as one"
-"""Names of a frame's own result, where another leads, and of that."""
+ALONE, AS_ONE, LEFT = "this frame alone", "whole drive as one", f"{REJECTED} and left as it was"
+"""Names of a frame's own result, where another leads, of that, and of a result that is not believed."""
 
 
 class Example(NamedTuple):
@@ -134,7 +137,10 @@ def _example(figures: Figures, example: Example) -> str:
         result = f"{_pair(before)} → {_pair(after)}"
         as_one = figures.run.drive_error
         if as_one is not None and AS_ONE in example.pictures:
-            result = f"{_pair(before)} → {_pair(as_one)} {AS_ONE}, {_pair(after)} alone"
+            alone = LEFT if frame.rejected else f"{_pair(after)} alone"
+            result = f"{_pair(before)} → {_pair(as_one)} {AS_ONE}; {alone}"
+        elif frame.rejected:
+            result = f"{_pair(before)}, {LEFT}"
     else:
         change = figures.changes[example.position]
         result = f"changed by {_pair(change)}"
@@ -169,10 +175,14 @@ def _settings(figures: Figures) -> str:
     ordered = {name: known[name] for name in [*SETTING_NAMES, *known] if name in known}
     ordered |= {f"weights of stage {number}": _record(record) for number, record in run.weights.items()}
     return "\n".join(
-        f"<tr><th>{escape(SETTING_NAMES.get(name, name))}</th><td>{escape(str(value))}</td></tr>"
+        f"<tr><th>{escape(SETTING_NAMES.get(name, name))}</th><td>{escape(_told(value))}</td></tr>"
         for name, value in ordered.items()
         if str(value)
     )
+
+
+def _told(value: object) -> str:
+    return {True: "yes", False: "no"}[value] if isinstance(value, bool) else str(value).replace(",", ", ")
 
 
 def _record(record: Mapping[str, Any]) -> str:

@@ -70,7 +70,7 @@ def headline(figures: Figures) -> str:
     """The result in one sentence."""
     run = figures.run
     name = run.settings.get("sequence", run.title)
-    if run.drive is not None and len(run.frames) > 1:
+    if run.drive is not None and run.believes_drive and len(run.frames) > 1:
         return _drive_headline(figures, run.drive)
     if figures.has_reference:
         return (
@@ -86,7 +86,9 @@ def headline(figures: Figures) -> str:
 def _drive_headline(figures: Figures, drive: Extrinsic) -> str:
     """The drive's one extrinsic first, beside it the frames one by one."""
     run, error = figures.run, figures.run.drive_error
-    frames, name = count(len(run.frames)), run.settings.get("sequence", run.title)
+    used = len(run.frames) - len({bad.frame for bad in run.verdict.skipped} & {frame.index for frame in run.frames})
+    frames = count(used) if used == len(run.frames) else f"{used:,} of {count(len(run.frames))}"
+    name = run.settings.get("sequence", run.title)
     if error is None:
         change = pose_error(drive, run.frames[0].initial)
         return f"Solved from {frames} as one, the calibration of {name} changed by {briefly(change)}."
@@ -134,39 +136,48 @@ def _median(figures: Figures) -> str:
     return " (median)" if len(figures.run.frames) > 1 else ""
 
 
+def _leading(figures: Figures) -> PoseError | None:
+    """Error of the drive's one extrinsic, where that is what the page leads with."""
+    run = figures.run
+    return run.drive_error if run.believes_drive and len(run.frames) > 1 else None
+
+
 def _statistics(quantity: Quantity, state: State) -> Distribution:
     return state.metrics.rotation_deg if quantity is ROTATION else state.metrics.translation_cm
 
 
 def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
-    before, after = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
-    name, say = quantity.name, quantity.say
-    worse = _worse(quantity, figures)
-    if after.median >= before.median:
-        return Finding(
-            "bad", f"{name} is not corrected: {say(before.median)} before, {say(after.median)} after.{worse}"
-        )
-    spread = f" (95 % of the frames below {say(after.p95)})" if len(figures.run.frames) > 1 else ""
-    result = f"{say(before.median)} before, {say(after.median)} after{spread}"
-    if after.p95 < quantity.good:
+    """Of the drive's one extrinsic where there is one, else of the frames."""
+    before, alone = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
+    name, say, drive = quantity.name, quantity.say, _leading(figures)
+    worse, spread, after, most = _worse(quantity, figures), "", alone.median, alone.p95
+    if drive is not None:
+        worse, after = "", drive.rotation_deg if quantity is ROTATION else drive.translation_cm
+        most = after
+    elif len(figures.run.frames) > 1:
+        spread = f" (95 % of the frames below {say(most)})"
+    if after >= before.median:
+        return Finding("bad", f"{name} is not corrected: {say(before.median)} before, {say(after)} after.{worse}")
+    result = f"{say(before.median)} before, {say(after)} after{spread}"
+    if most < quantity.good:
         return Finding("good", f"{name} is good: {result}.{worse}")
-    if after.median < quantity.good:
+    if after < quantity.good:
         return Finding("fair", f"{name} is good in most frames, not in all: {result}.{worse}")
-    if after.median < quantity.fair:
+    if after < quantity.fair:
         wanted = f"below {quantity.bound(quantity.good)} would be good"
         return Finding("fair", f"{name} is roughly right: {result}; {wanted}.{worse}")
     wanted = f"it should be below {quantity.bound(quantity.fair)}"
     return Finding("bad", f"{name} is not good enough: {result}; {wanted}.{worse}")
 
 
-def _worse(quantity: Quantity, figures: Figures) -> str:
+def _worse(quantity: Quantity, figures: Figures, what: str = "it") -> str:
     """How many frames it made worse; nothing if none, or if there is only one."""
     before, after = (
         state.rotation_deg if quantity is ROTATION else state.translation_cm
         for state in (figures.initial, figures.corrected)
     )
     worse, total = int(np.sum(after > before)), len(before)
-    return f" In {worse} of {count(total)} it is worse than before." if worse and total > 1 else ""
+    return f" In {worse} of {count(total)} {what} is worse than before." if worse and total > 1 else ""
 
 
 def _rejected(figures: Figures) -> list[Finding]:
@@ -178,10 +189,14 @@ def _rejected(figures: Figures) -> list[Finding]:
 
 
 def _together(figures: Figures) -> list[Finding]:
-    """How good the frames are when they are taken together."""
-    error = figures.median_error
+    """How good the frames are when they are taken together; how good one by one, where that leads the page."""
+    error, metrics = figures.median_error, figures.corrected.metrics
     if error is None or len(figures.run.frames) == 1:
         return []
+    if _leading(figures) is not None:
+        most = f"{ROTATION.say(metrics.rotation_deg.p95)} / {TRANSLATION.say(metrics.translation_cm.p95)}"
+        worse = "".join(_worse(quantity, figures, quantity.name.lower()) for quantity in (ROTATION, TRANSLATION))
+        return [Finding("note", f"One by one, 95 % of the frames end below {most}.{worse}")]
     off = f"{ROTATION.say(error.rotation_deg)} / {TRANSLATION.say(error.translation_cm)}"
     return [Finding("note", f"Taken together, the median of all frames' results is off by {off}.")]
 

@@ -16,10 +16,10 @@ from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.read.pictures import OverlayPoints
-from inspector.read.run import RecordedRun
+from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.read.understood import RecordingError
 from inspector.report.metrics import Figures
-from inspector.report.page import ALONE, AS_ONE, Example, make_page
+from inspector.report.page import ALONE, AS_ONE, LEFT, Example, make_page
 from inspector.report.pictures import draw_overlay
 
 PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
@@ -125,23 +125,24 @@ def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) ->
     camera, image = run.frames[position].camera, run.image(index)
     size = (camera.width, camera.height)
     files = {}
-    for shown, points in _overlays(run, index).items():
+    for shown, points in _overlays(run, run.frames[position]).items():
         files[shown] = f"{PICTURES}/{name}_{shown.replace(' ', '-')}.jpg"
         write_whole(folder / files[shown], draw_overlay(image, *points, size), Kind.JPEG)
     return Example(name, position, files)
 
 
-def _overlays(run: RecordedRun, index: int) -> Mapping[str, OverlayPoints]:
+def _overlays(run: RecordedRun, frame: RecordedFrame) -> Mapping[str, OverlayPoints]:
     """What is shown of a frame, the result last: that of the whole drive, where it is believed and there are points."""
+    index = frame.index
     start = "miscalibrated" if run.has_reference else "start"
     shown = {start: run.overlay(entities.OVERLAY_MISCALIBRATED, index)}
     if run.has_reference:
         shown["reference"] = run.overlay(entities.OVERLAY_REFERENCE, index)
     own = run.overlay(entities.OVERLAY_CORRECTED, index)
     if run.believes_drive:
-        with contextlib.suppress(RecordingError):  # the drive was solved without this frame
+        with contextlib.suppress(RecordingError):  # of the drive nothing was drawn on this frame
             return shown | {ALONE: own, AS_ONE: run.overlay(entities.OVERLAY_DRIVE, index)}
-    return shown | {"corrected": own}
+    return shown | {LEFT if frame.rejected else "corrected": own}
 
 
 def cannot_write(error: OSError, folder: Path) -> ConfigError:

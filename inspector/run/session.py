@@ -240,15 +240,13 @@ class Session:
         recording.log_no_drive([summary.drive, *summary.of_frames()])
 
     def _record_drive_overlays(self, recording: Recording, estimate: DriveEstimate, stop: StopRequest) -> None:
-        """Show the drive's extrinsic on every frame that has a result of its own."""
-        unusable = {bad.frame for bad in estimate.skipped}
+        """Show the drive's extrinsic on every recorded frame, also on those that it was solved without."""
         for position in self.positions:
             if stop.requested:
                 raise KeyboardInterrupt
             with contextlib.suppress(DatasetError):
                 frame = self.sequence[position]
-                if frame.index not in unusable:
-                    recording.log_drive_overlay(frame, estimate, self.start.reference(frame))
+                recording.log_drive_overlay(frame, estimate, self.start.reference(frame))
 
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from calibnet.errors import CalibnetError
+from calibnet.verdict import CANNOT_TELL, REJECTED, BadFrame, Verdict
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 from inspector.read.run import RecordedRun, read_run
@@ -74,6 +75,24 @@ def test_rejected_frames_are_told(record: Callable[..., Any], tmp_path: Path) ->
         page = page_of(figures.run, tmp_path / str(len(doubted)))
         word = "Accepted" if len(doubted) == 1 else "Rejected"
         assert f'<p class="word {reason.grade}">{word}</p>' in page
+
+
+def test_the_drive_leads_where_it_is_believed(known: RecordedRun) -> None:
+    reference = known.frames[0].reference
+    assert reference is not None
+    drive = reference.copy()
+    drive[0, 3] += 0.04
+    skipped = (BadFrame(known.frames[2].index, "no points"), BadFrame(99, "it is not recorded"))
+    believed = Verdict(CANNOT_TELL, "too few frames", drive, skipped=skipped)
+    run = replace(known, drive=drive, drive_verdict=believed)
+    figures = Figures.of(run)
+    assert "to 0.00° / 4.0 cm, 4 of 5 frames as one;" in headline(figures).replace("\u00a0", " ")
+    rotation, translation, alone = (finding.sentence.replace("\u00a0", " ") for finding in findings(figures))
+    assert rotation.startswith("Rotation is good") and "0.00° after." in rotation
+    assert translation.startswith("Translation is roughly right") and "4.0 cm after;" in translation
+    assert alone.startswith("One by one, 95 % of the frames end below")
+    rejected = Figures.of(replace(run, drive_verdict=replace(believed, word=REJECTED)))
+    assert findings(rejected) == findings(Figures.of(known)) and headline(rejected) == headline(Figures.of(known))
 
 
 def test_page_states_the_figures_of_the_run(known: RecordedRun, tmp_path: Path, fakes: ModuleType) -> None:
