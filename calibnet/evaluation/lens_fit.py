@@ -1,4 +1,4 @@
-"""From frames with a known fault of the lens to the odds by which such a fault is named."""
+"""Fits the regression that names faults of the lens to frames with known faults."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from calibnet.judging.lens_predictors import lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
 
 CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
-"""What a fault of the battery is to be called; any other run has none."""
+"""The name for each fault of the battery; runs with other faults count as without a fault of the lens."""
 TOO_WEAK = (
     ("focal-length", "+2 %"),
     ("focal-length", "-2 %"),
@@ -28,25 +28,25 @@ TOO_WEAK = (
     ("distorted", "k1 -0.1"),
     ("distorted", "k1 0.1"),
 )
-"""Not fitted to: what a frame can hardly show, and a principal point moved down, which looks like a pitch."""
+"""Faults that are not fitted to: those a frame hardly shows, and a principal point moved down, which looks like pitch."""
 RIDGE = 1.0
 """Penalty of `calibnet.evaluation.logistic.regression`."""
 WRONG_NAMES = 0.05
-"""Share of the runs that may be given a wrong name, left out by sequence; those without a fault any name."""
+"""Largest share of runs that may get a wrong name, or a name without a fault, on sequences left out."""
 FEWEST = 10
-"""Runs of each fault, and without one, below which nothing can be fitted."""
+"""Fewest runs with each fault, and without one, that are fitted."""
 
 
 class LensStream(RunStream):
-    """Runs of which half have a fault of the lens, by number, as `RunStream` has them with any fault."""
+    """A `RunStream` whose faults are all of the lens."""
 
     def told(self, trace: CascadeTrace) -> dict[str, float] | None:
-        """What two looks say of the lens, whatever the verdict."""
+        """The predictors from two looks, whatever the verdict."""
         looks = lens_fits(trace)
         return None if looks is None else asdict(lens_predictors(looks))
 
     def has(self, fault: Corruption) -> bool:
-        """Whether a fault is one of the lens, and strong enough to be told."""
+        """Whether a fault is one of the lens and strong enough to be recognised."""
         return fault.name in CLASSES and (fault.name, fault.strength) not in TOO_WEAK
 
 
@@ -55,11 +55,12 @@ class LensFigures:
     """How well faults of the lens are named on sequences that were left out of the fit in turn.
 
     Attributes:
-        runs, sequences: how many.
-        faulty: runs with a fault.
-        right: share of these that are named rightly.
-        wrong: share of these that are named wrongly.
-        named_without: share of the runs without a fault that are given one.
+        runs: number of runs.
+        sequences: number of sequences.
+        faulty: number of runs with a fault.
+        right: share of the faulty runs whose fault is named correctly.
+        wrong: share of the faulty runs that get another name.
+        named_without: share of the runs without a fault that get a name.
     """
 
     runs: int
@@ -71,10 +72,10 @@ class LensFigures:
 
 
 def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
-    """Fit the odds to runs of `LensStream`.
+    """Fit the regression to runs of `LensStream`.
 
     Raises:
-        CalibrationError: too few of them have a fault, or none.
+        CalibrationError: too few runs with one of the faults, or without any.
     """
     asked = [run for run in runs if run.predictors is not None and np.isfinite(list(run.predictors.values())).all()]
     kinds = np.array([1 + FAULTS.index(CLASSES[run.fault]) if run.fault in CLASSES else 0 for run in asked], np.intp)

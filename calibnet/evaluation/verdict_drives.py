@@ -1,4 +1,4 @@
-"""Drives to fit the verdict on drives to: plain ones, ones with one fault in all frames, and ones on two mounts."""
+"""Runs on drives to fit their verdict to: without a fault, with one fault in all frames, and with two mounts."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from calibnet.judging.drive_predictors import drive_predictors
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
 MOST = 16
-"""Frames of a drive; a sequence that has fewer gives all of them."""
+"""Most frames of a drive."""
 ENOUGH = 8
-"""Frames from which on a sequence is drawn as often as any: half as many, half as often."""
+"""Sequences of fewer frames are drawn in proportion to their length; all others equally often."""
 VIRTUAL_SHARE = 0.5
-"""Share of drives that `calibnet.evaluation.virtual` shows through another lens, turned, half of them thinned."""
+"""Share of drives that are seen through a virtual rig, see `calibnet.evaluation.virtual`."""
 
 
 class DriveStream:
@@ -67,7 +67,7 @@ class DriveStream:
 
 
 def drawn_fault(sequence: FrameSequence, generator: np.random.Generator) -> Corruption:
-    """Any fault that a drive can have, each name as often as the others; the far start belongs to frames."""
+    """A random fault that can be applied to a drive, except a far start; all names are equally probable."""
     named: dict[str, list[Corruption]] = {}
     for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
         if fault.farther == 1:
@@ -77,9 +77,9 @@ def drawn_fault(sequence: FrameSequence, generator: np.random.Generator) -> Corr
 
 
 def part(length: int, generator: np.random.Generator) -> list[int]:
-    """Positions of a drive's frames: so many, spread over a part of the sequence, both drawn.
+    """Positions of a drive's frames: a random number of frames, evenly spaced over a random part of the sequence.
 
-    The same frames from another guess end at nearly the same place: what tells drives apart is which frames they have.
+    The same frames from another guess end at nearly the same result; drives differ only if their frames do.
     """
     count = min(length, round(float(np.exp(generator.uniform(np.log(FEWEST_JUDGED), np.log(MOST))))))
     stretch = int(generator.integers(count, length + 1))
@@ -90,7 +90,7 @@ def part(length: int, generator: np.random.Generator) -> list[int]:
 def measured(
     cascade: Cascade, drive: Faulty, guess: np.ndarray, number: int, sequence: str, fault: Corruption
 ) -> VerdictRun | None:
-    """Solve a drive, and note what predictors say of it; its error is that against its farthest frame.
+    """Solve a drive, and compute its predictors and its error, the largest one over its frames.
 
     Raises:
         CalibrationError: no frame could be calibrated.

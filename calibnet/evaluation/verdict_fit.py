@@ -1,4 +1,4 @@
-"""From runs of a known truth to the coefficients of the verdict, and how well they do on sequences left out."""
+"""Fits the coefficients of the verdict to runs with a known error, and measures them on sequences left out."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from calibnet.judging.covariance import CovarianceModel
 from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
-"""The ranges of the last stage and of the first one."""
+"""The ranges of the last stage and of the first one, which is searched around the guess."""
 RIDGE = 6.0
 """Penalty of `calibnet.evaluation.logistic.regression`: 3 times the squared coefficients of the odds of being wrong."""
 FALSE_ACCEPTS = 0.01
-"""Share of all runs that may be accepted and wrong, left out by sequence. Half of these runs have no fault; where every
-fault is tried on a frame, as in the battery, most are rejected and the share is smaller."""
+"""Largest share of all runs that may be accepted and wrong, on sequences left out. Half of these runs have no fault; in
+the battery, which tries every fault on every frame, most runs are rejected and the share is smaller."""
 GOOD_REJECTED = 0.02
-"""Share of the good results that may be rejected; nobody can tell of the others that are not accepted."""
+"""Share of the good results that may be rejected; the others that are not accepted are *cannot tell*."""
 LEAST_DEG = 1e-3
-"""Common deviation of the rotation that is as good as none."""
+"""Lower limit of the common standard deviation of the rotation, in degrees."""
 FEWEST, FEWEST_DRIVES = 10, 6
-"""Good and bad results, each, of frames and of drives, below which nothing can be fitted."""
+"""Fewest good and fewest wrong results of frames, and of drives, that are fitted."""
 NEAR = 1.25
-"""Times a limit, or by which it is divided: errors in between are near the limit. No predictor tells 24 from 26 cm."""
+"""Errors between a limit divided by this and the limit times this are near it; no predictor tells 24 from 26 cm."""
 CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
-"""Shares of accepted and wrong runs at which the operating curve is told."""
+"""Shares of false accepts at which the operating curve is given."""
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,17 @@ class FitFigures:
     """How well the verdict does on sequences that were left out of the fit in turn.
 
     Attributes:
-        runs, plain: how many in all, and without a fault.
-        sequences: how many.
-        good: plain runs that end within the limits.
+        runs: number of runs.
+        plain: number of runs without a fault.
+        sequences: number of sequences.
+        good: number of plain runs that end within the limits.
         false_accept_rate: share of all runs that are accepted and wrong.
         acceptance_of_good: share of the good plain runs that are accepted.
         wrong_rejected: share of the wrong runs that are rejected.
-        nees: mean squared error by the covariance, a degree of freedom, of plain runs that are not rejected;
-            of drives, of accepted ones.
-        curve: acceptance of good plain runs at given shares of false accepts; beside it, the same where runs that end
-            near a limit (`NEAR`) are set aside.
+        nees: normalised estimation error squared per degree of freedom, 1 if the covariance is right; of the plain
+            runs that are not rejected or, for drives, of the accepted ones.
+        curve: acceptance of good plain runs at given shares of false accepts, of all runs and without those that end
+            near a limit (`NEAR`).
     """
 
     runs: int
@@ -70,11 +71,11 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, 
     """Fit the classifier and the covariance model to runs on single frames.
 
     Args:
-        runs: of a known truth.
-        ranges: of the stage that ended them, and the one searched around the guess.
+        runs: runs with a known error.
+        ranges: of the last stage, and searched around the guess.
 
     Raises:
-        CalibrationError: too few of them end right, or wrong.
+        CalibrationError: too few runs end right, or wrong.
     """
     classifier, figures, kept = fit_classifier(runs, FRAME_LIMITS)
     model = fit_covariance(kept, ranges)
@@ -85,7 +86,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     """Fit the classifier to runs on drives, and the factor that makes their stated covariance as large as their errors.
 
     Raises:
-        CalibrationError: too few of them end right, or wrong.
+        CalibrationError: too few runs end right, or wrong.
     """
     classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES)
     # only accepted runs count: a few gross errors would inflate the covariance of all
@@ -97,7 +98,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
 
 
 def error_probability(run: VerdictRun, classifier: Classifier) -> float:
-    """How likely a run is wrong, by its predictors."""
+    """Probability that the result of a run is wrong."""
     assert run.predictors is not None
     return classifier(SimpleNamespace(**run.predictors))
 
@@ -105,18 +106,18 @@ def error_probability(run: VerdictRun, classifier: Classifier) -> float:
 def fit_classifier(
     runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST
 ) -> tuple[Classifier, FitFigures, list[VerdictRun]]:
-    """Fit a classifier to runs, and say how it does on sequences that are left out.
+    """Fit a classifier to runs, and measure it on sequences left out.
 
     Args:
-        runs: of a known truth.
-        limits: degrees and centimetres that they are held to.
-        fewest: that have to end right, and wrong.
+        runs: runs with a known error.
+        limits: largest error, in degrees and centimetres, of a good result.
+        fewest: number of good, and of wrong, results that is required.
 
     Returns:
         The classifier, its figures, and the plain runs that it does not reject.
 
     Raises:
-        CalibrationError: too few of them end right, or wrong.
+        CalibrationError: too few runs end right, or wrong.
     """
     asked = [run for run in runs if run.predictors is not None and np.isfinite(list(run.predictors.values())).all()]
     good = np.array([run.good for run in asked], bool)
@@ -160,7 +161,7 @@ def fit_classifier(
 def _curve(
     asked: Sequence[VerdictRun], runs: Sequence[VerdictRun], odds: Floats, limits: tuple[float, float]
 ) -> list[dict[str, float]]:
-    """The operating curve of all runs, and without those near a limit."""
+    """The operating curve of all runs, and of those that do not end near a limit."""
 
     def accepted(share: float, kept: Sequence[bool], of: Sequence[VerdictRun]) -> float:
         chosen, good = odds[kept], np.array([run.good for run in asked], bool)[kept]
@@ -186,43 +187,43 @@ def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:
 
 
 def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:
-    """Share of the good plain runs, of all that were made, that are accepted."""
+    """Share of all good plain runs that are accepted."""
     return float(accepted.sum() / max(sum(run.plain and run.good for run in runs), 1))
 
 
 def threshold(odds: Floats, wrong: NDArray[np.bool_], most: float) -> float:
-    """The odds below which at most so many wrong results lie."""
+    """The log odds below which at most ``most`` wrong results lie."""
     ranked = np.sort(odds[wrong])
     allowed = int(most)
     return float(ranked[allowed]) if allowed < len(ranked) else float("inf")
 
 
 def rounded(value: float) -> float:
-    """To six digits, which is more than is known."""
+    """Round to six digits, more than are significant."""
     return float(f"{value:.6g}")
 
 
 def probability(odds: float) -> float:
-    """Probability of the logarithm of the odds."""
+    """The probability that belongs to log odds."""
     return float(1 / (1 + np.exp(-np.clip(odds, -50, 50))))
 
 
 def fit_covariance(runs: Sequence[VerdictRun], ranges: Ranges) -> CovarianceModel:
-    """The model under which errors are likeliest, widened until their mean square is 1 a degree of freedom.
+    """Fit the covariance model by maximum likelihood, then inflate it to a NEES of 1 per degree of freedom.
 
-    Where no stage states an information, or too few runs remain, the default.
+    The default model if no stage states an information, or there are too few runs.
     """
     known = [run for run in runs if run.information is not None]
     if len(known) < FEWEST:
         return CovarianceModel()
 
-    def model(logarithms: Floats, widened: float = 1.0) -> CovarianceModel:
-        share, translation, rotation = np.exp(logarithms) * np.array([1 / widened, widened**0.5, widened**0.5])
+    def model(logarithms: Floats, inflation: float = 1.0) -> CovarianceModel:
+        share, translation, rotation = np.exp(logarithms) * np.array([1 / inflation, inflation**0.5, inflation**0.5])
         return CovarianceModel(rounded(share), rounded(translation), rounded(max(rotation, LEAST_DEG)))
 
     def cost(logarithms: Floats) -> float:
         squares, covariances = squared_errors(known, ranges, model(logarithms))
-        # of Student's t with four degrees of freedom: a few gross errors must not widen all others
+        # Student's t with four degrees of freedom: a few gross errors must not inflate the covariance of all
         return float((0.5 * np.linalg.slogdet(covariances)[1] + 5.0 * np.log1p(squares / 4.0)).sum())
 
     start = np.log(list(asdict(CovarianceModel()).values()))
@@ -231,13 +232,13 @@ def fit_covariance(runs: Sequence[VerdictRun], ranges: Ranges) -> CovarianceMode
 
 
 def nees_of(runs: Sequence[VerdictRun], ranges: Ranges, model: CovarianceModel) -> float:
-    """Mean squared error by the covariance, a degree of freedom; 1 where it is right. Not a number without runs."""
+    """Normalised estimation error squared per degree of freedom, 1 if the model is right; NaN without runs."""
     known = [run for run in runs if run.information is not None]
     return float(squared_errors(known, ranges, model)[0].mean() / 6) if known else float("nan")
 
 
 def squared_errors(runs: Sequence[VerdictRun], ranges: Ranges, model: CovarianceModel) -> tuple[Floats, Floats]:
-    """Squared errors ``[N]`` by the covariance, and the covariances ``[N, 6, 6]``."""
+    """Normalised squared errors ``[N]``, and the covariances ``[N, 6, 6]``."""
     informations, offsets = np.array([run.information for run in runs]), np.array([run.offset for run in runs])
     covariances = model.covariance(informations, *ranges, np.array([run.match_error_px for run in runs]))
     return np.einsum("ni,nij,nj->n", offsets, np.linalg.inv(covariances), offsets), covariances

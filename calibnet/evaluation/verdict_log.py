@@ -1,4 +1,4 @@
-"""Making the runs that a verdict is fitted to, in several processes; each is kept in a file as soon as it is made."""
+"""Makes the runs that the verdict is fitted to, in several processes, and appends each to a file when it is made."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from calibnet.runtime.reading import MEGABYTE, read_text
 from calibnet.runtime.writing import check_output
 
 BATCH = 8
-"""Runs a process that are asked for at once: time is looked at between batches."""
+"""Runs per process in a batch; the time limit is checked between batches."""
 LARGEST = 256 * MEGABYTE
-"""Bytes of a log of runs, of 2 kB each."""
+"""Largest size of a log in bytes; a run takes 2 kB."""
 Kind = Literal["frames", "lenses", "drives"]
 STREAMS: dict[Kind, type[RunStream | DriveStream]] = {"frames": RunStream, "lenses": LensStream, "drives": DriveStream}
 SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
-"""Seed of the first synthetic drive, and frames of each; training draws its scenes from other seeds."""
+"""Seed of the first synthetic drive, and frames of each. Training uses other seeds."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """What a stream of runs is made of, in words that another process understands.
+    """What a stream of runs is made of, in a form that can be passed to another process.
 
     Attributes:
         preset, weights, stages: of the cascade.
         data: as `calibnet.training.data.open_data` takes them.
-        synthetic: drives of the synthetic world besides.
+        synthetic: number of synthetic drives to add.
         seed: of everything random.
-        kind: of the runs: on single frames with any fault, on those with one of the lens, or on whole drives.
+        kind: runs on single frames with any fault, on frames with faults of the lens, or on drives.
     """
 
     preset: str
@@ -82,7 +82,7 @@ class Source:
 
 
 class RunLog:
-    """Runs in a file, one a line, under a key that says what they depend on; lines of other keys are left alone."""
+    """A file of runs, one per line, with a key that says what they depend on; lines with other keys are ignored."""
 
     def __init__(self, path: Path, key: dict[str, Any]) -> None:
         """Read what there is.
@@ -105,7 +105,7 @@ class RunLog:
                 continue  # cut short when it was written, or of another version: it is run again
 
     def add(self, number: int, run: VerdictRun | None) -> None:
-        """Take in a run, and write it down at once."""
+        """Add a run, and append it to the file at once."""
         self.known[number] = run
         entry = {"key": self.key, "number": number, "run": None if run is None else asdict(run)}
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -114,7 +114,7 @@ class RunLog:
 
 
 def whole(run: VerdictRun) -> VerdictRun:
-    """The run, if it has all predictors that are asked today.
+    """The run, if its predictors are the current ones.
 
     Raises:
         KeyError: it has others.
@@ -126,12 +126,12 @@ def whole(run: VerdictRun) -> VerdictRun:
 
 
 Runner = Callable[[Iterable[int]], Iterator[VerdictRun | None]]
-"""Makes the runs of some numbers, in their order."""
+"""Makes the runs with some numbers, in order."""
 
 
 @contextmanager
 def runner(source: Source, workers: int) -> Iterator[Runner]:
-    """What makes runs: so many processes, or with 0 this one."""
+    """Make runs in this many processes, or in this one if 0."""
     if not workers:
         stream = source.open()
         yield lambda numbers: map(stream.run, numbers)
@@ -151,15 +151,15 @@ def collect(
     go_on: Callable[[], bool] = lambda: True,
     observer: Callable[[int], None] = lambda done: None,
 ) -> list[VerdictRun]:
-    """The first runs of a stream; those that the log knows are not run again.
+    """The first runs of a stream; those in the log are not repeated.
 
     Args:
-        log: that keeps them.
-        runs: how many.
+        log: file that keeps the runs.
+        runs: number of runs.
         run: makes them.
-        workers: processes that it has.
+        workers: number of its processes.
         go_on: whether there is time for more.
-        observer: called after each with how many there are.
+        observer: called with the number of finished runs after each.
     """
     missing = [number for number in range(runs) if number not in log.known]
     done = runs - len(missing)
@@ -179,10 +179,10 @@ _stream: RunStream | DriveStream | None = None
 
 
 def _open(source: Source) -> None:
-    """Open the stream of this process, which ends with the one that started it, however that ends."""
+    """Open the stream in a worker, which ends when its parent process ends for any reason."""
     global _stream
     Thread(target=_end_with_parent, daemon=True).start()
-    signal(SIGINT, SIG_IGN)  # of Ctrl-C the parent alone speaks
+    signal(SIGINT, SIG_IGN)  # only the parent reports Ctrl-C
     _stream = source.open()
 
 

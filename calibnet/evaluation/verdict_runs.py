@@ -1,7 +1,7 @@
-"""Runs to fit the verdict to: plain frames and frames with the battery's faults, and what predictors say of each.
+"""Runs to fit the verdict to: frames with and without one of the battery's faults, and the predictors of each run.
 
-The stream of runs has no end, and each depends on the seed and its number alone: a longer one begins with
-a shorter one.
+The stream of runs is endless. A run depends only on the seed and its number, so a longer stream begins with a shorter
+one.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, FRAME_LIMITS
 
 FRAMES = 8
-"""Frames of a sequence, spread over it: neighbours of a drive say the same."""
+"""Frames used of a sequence, evenly spaced, since neighbouring frames are much the same."""
 KEPT = 16
-"""Frames in memory, of some 10 MB each."""
+"""Frames kept in memory, some 10 MB each."""
 PLAIN_SHARE = 0.5
-"""Share of runs without a fault, which tell how many good results are accepted."""
+"""Share of runs without a fault, which show how many good results are accepted."""
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,16 @@ class VerdictRun:
     """One calibration of a frame or of a drive from a random guess.
 
     Attributes:
-        number: in the stream.
-        sequence: what was calibrated.
-        frame: index of the frame, or number of the drive's frames.
-        fault, strength: what was put into it, see `calibnet.evaluation.corruptions`.
-        rotation_deg, translation_cm: how far off it ended.
-        good: whether that is within the limits.
-        predictors: by name; None where the verdict needs none, for instance because picture and scan do not fit.
-        offset: the result against the truth, ``(translation m, rotation rad)`` in the camera frame.
+        number: number of the run in the stream.
+        sequence: name of the sequence.
+        frame: index of the frame, or the number of frames of a drive.
+        fault, strength: the fault that was applied, see `calibnet.evaluation.corruptions`.
+        rotation_deg, translation_cm: error of the result.
+        good: whether the error is within the limits.
+        predictors: by name; None if the verdict needs none, for instance because picture and scan do not fit.
+        offset: error of the result as ``(translation m, rotation rad)`` in the camera frame.
         information: ``[6, 6]`` that the last stage, or the drive, states; None without one.
-        match_error_px: that the last stage expects; not a number for a drive.
+        match_error_px: match error that the last stage expects; NaN for a drive.
     """
 
     number: int
@@ -70,18 +70,18 @@ class VerdictRun:
 
     @property
     def plain(self) -> bool:
-        """Whether nothing was put into the frame."""
+        """Whether the run has no fault."""
         return self.fault == PLAIN.name
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What a run starts with.
+    """The input of a run.
 
     Attributes:
-        sequence: that the frame is from.
-        fault: that was put into it.
-        frame: with it; its extrinsic is the truth.
+        sequence: name of the frame's sequence.
+        fault: fault that was applied to the frame.
+        frame: the frame with the fault; its extrinsic is the truth.
         guess: ``camera_from_lidar`` to start from.
     """
 
@@ -113,16 +113,16 @@ class RunStream:
             return None
 
     def told(self, trace: CascadeTrace) -> dict[str, float] | None:
-        """What predictors say of a run; None where the verdict does not ask them."""
+        """The predictors of a run; None if the verdict needs none."""
         asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
         return asdict(predictors(trace)) if asked else None
 
     def has(self, fault: Corruption) -> bool:
-        """Whether a fault is one of those of this stream."""
+        """Whether this stream draws a fault."""
         return True
 
     def drawn(self, number: int) -> Drawn:
-        """What is run under this number.
+        """Draw the input of the run with a number.
 
         Raises:
             DatasetError: its frame cannot be read.
@@ -138,7 +138,7 @@ class RunStream:
         return Drawn(sequence.name, fault, fault.put(frame), guess)
 
     def _fault(self, which: int, position: int, generator: np.random.Generator) -> Corruption:
-        """Any fault that this frame can have, each name as often as the others."""
+        """A random fault that can be applied to this frame; all names are equally probable."""
         others = [other for other in range(len(self.sequences)) if other != which]
         donors = [self.read(int(generator.choice(others)), 0)] if others else []
         named: dict[str, list[Corruption]] = {}
@@ -151,7 +151,7 @@ class RunStream:
 def measured(
     cascade: Cascade, drawn: Drawn, number: int, told: Callable[[CascadeTrace], dict[str, float] | None]
 ) -> VerdictRun:
-    """Calibrate a frame, and note what predictors say of it.
+    """Calibrate a frame, and compute the error and the predictors of the result.
 
     Args:
         cascade: what calibrates.
