@@ -28,7 +28,7 @@ TOO_WEAK = (
     ("distorted", "k1 -0.1"),
     ("distorted", "k1 0.1"),
 )
-"""Faults that are not fitted to: those a frame hardly shows, and a principal point moved down, which looks like pitch."""
+"""Not fitted to: faults that a frame hardly shows, and a principal point moved down, which looks like pitch."""
 RIDGE = 1.0
 """Penalty of `calibnet.evaluation.logistic.regression`."""
 WRONG_NAMES = 0.05
