@@ -6,6 +6,7 @@ apart, how many it could not use, and how well picture and scan fit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
@@ -82,6 +83,12 @@ class Outcome:
     def passed(self) -> bool:
         """Whether the limit is kept; a value that is no number keeps none."""
         return self.value <= self.limit.largest
+
+    def as_dict(self) -> dict[str, object]:
+        """The form that JSON files hold; values are in the unit of the name."""
+        limit = self.limit
+        value = self.value if math.isfinite(self.value) else None
+        return {"name": limit.name, "value": value, "largest": limit.largest, "passed": self.passed}
 
     @property
     def sentence(self) -> str:

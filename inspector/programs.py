@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import secrets
+import shlex
 import shutil
 import signal
 import socket
@@ -43,7 +44,7 @@ def open_command(file: Path) -> str:
     if shutil.which(program) is None:
         beside = Path(sys.executable).with_name(program)
         program = os.path.relpath(beside) if Path.cwd() in beside.parents else str(beside)
-    return f"{program} {file}"
+    return shlex.join([program, str(file)])
 
 
 def own_address() -> str:

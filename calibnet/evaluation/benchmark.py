@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import re
 import time
@@ -22,6 +21,7 @@ from calibnet.evaluation import reference
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.network.batch import lidar_input, make_batch
 from calibnet.runtime.precision import autocast, has_fast_bf16
+from calibnet.runtime.threads import cores
 
 BATCHES = (1, 4)
 """Frames at once of the networks' throughput."""
@@ -173,7 +173,7 @@ def describe_machine(device: torch.device) -> dict[str, Any]:
         "device": torch.cuda.get_device_name(device) if device.type == "cuda" else processor(),
         "instructions": torch.backends.cpu.get_cpu_capability(),
         "threads": torch.get_num_threads(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": cores(),
         "precision": "bf16" if has_fast_bf16(device) else "float32",
         "torch": torch.__version__,
     }

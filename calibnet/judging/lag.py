@@ -7,8 +7,6 @@ scans gives, the result lies near the guess again.
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +15,7 @@ from calibnet.errors import DatasetError
 from calibnet.geometry.se3 import invert, pose_from_vector, pose_vector
 from calibnet.geometry.types import Transform
 from calibnet.judging.causes import Attempt, Search, scan_moved
+from calibnet.runtime.threads import cores
 
 Points = NDArray[np.float32] | NDArray[np.float64]
 
@@ -103,7 +102,7 @@ def registered(points: Points, onto: Points) -> Transform | None:
         registration_type="GICP",
         downsampling_resolution=VOXEL_M,
         max_correspondence_distance=FARTHEST_M,
-        num_threads=os.cpu_count() or 1,
+        num_threads=cores(),
     )
     if not result.converged or result.num_inliers < FEWEST_POINTS:
         return None

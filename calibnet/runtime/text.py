@@ -35,6 +35,11 @@ def lines(text: object) -> str:
     return "\n".join(one_line(line, 10 * LONGEST) for line in str(text).split("\n"))
 
 
+def number_of(count: int, noun: str) -> str:
+    """``"1 drive"``, ``"2 drives"``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def file_name(text: str) -> str:
     """Foreign text as the name of one file or folder: no separator, nothing hidden, no parent, at most 100 characters.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, THREADS, USUAL_THREADS
+from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, THREADS, USUAL_THREADS, NumberRange
 from inspector.cli.output import (
     JSON_FILE,
     console_beside,
@@ -63,7 +63,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option(
-    "--limit", type=click.FloatRange(1), default=300.0, show_default=True, help="Time limit for a row, in seconds."
+    "--limit", type=NumberRange(1), default=300.0, show_default=True, help="Time limit for a row, in seconds."
 )
 @click.option(
     "--audit/--no-audit",

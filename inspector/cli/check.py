@@ -66,7 +66,7 @@ def check(
     verdict = run.verdict
     if junit_file is not None:
         write(junit_file, junit(run, outcomes), Kind.JUNIT)
-    write_json(json_file, verdict.as_dict())
+    write_json(json_file, verdict.as_dict() | {"limits": [outcome.as_dict() for outcome in outcomes]})
     if outcomes:
         say(summary(run, outcomes), err=json_file == "-")
     say(line(verdict), err=json_file == "-")

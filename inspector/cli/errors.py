@@ -152,7 +152,7 @@ def environment_sentence(error: OSError | ImportError) -> str | None:
         errno.EPERM: "check the permissions or use another path",
         errno.EROFS: "choose a path that can be written",
         errno.ENOENT: "check the path",
-        errno.EADDRINUSE: "stop the other program or use another port",
+        errno.EADDRINUSE: "stop the other program",
     }.get(error.errno)
     return f"{where}{what}{f'; {remedy}' if remedy else ''}."
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, replace
@@ -11,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from inspector.cli.options import FOLDER, STAGES
+from calibnet.runtime.threads import cores
+from inspector.cli.options import FOLDER, SEED, STAGES, NumberRange
 from inspector.cli.output import make_console, say
 
 if TYPE_CHECKING:
@@ -53,11 +53,11 @@ MOST_WORKERS = 8
 @click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Number of runs on drives.")
 @click.option(
     "--minutes",
-    type=click.FloatRange(0, min_open=True),
+    type=NumberRange(0, min_open=True),
     help="Stop after this time even if --runs and --drives are not finished; the runs made so far are kept for the "
     "next call.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of everything random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
 @click.option(
     "--stages",
     type=STAGES,
@@ -109,14 +109,19 @@ def fit_verdict(
     marks = fingerprints(preset, weights, ranges)
     path = coefficients_path(preset, weights)
     until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
-    processes = min(os.cpu_count() or 1, MOST_WORKERS) if workers is None else workers
+    processes = min(cores(), MOST_WORKERS) if workers is None else workers
     console = make_console()
 
     def made(source: Source, count: int, title: str) -> list[VerdictRun]:
         key = {"weights": {str(range_): mark for range_, mark in marks.items()}}
         key |= {name: value for name, value in asdict(source).items() if name not in ("preset", "weights", "stages")}
         log = RunLog(path.with_suffix(".jsonl"), key)
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        columns = (
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
         with Progress(*columns, console=console, transient=True) as progress, runner(source, processes) as run:
             task = progress.add_task(title, total=count)
             return collect(
@@ -143,7 +148,7 @@ def fit_verdict(
     try:
         lens, lens_figures = fit_lens(of_lenses)
     except CalibrationError as error:
-        console.print(f"Faults of the lens will not be named. {error}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"Faults of the lens will not be named. {error}", style="yellow", soft_wrap=True)
     else:
         fitted = {**fitted, "lenses": asdict(lens_figures)}
         coefficients = replace(coefficients, lens=lens, fitted=fitted)
@@ -153,7 +158,7 @@ def fit_verdict(
     try:
         drive, inflation, figures = fit_drives(of_drives)
     except CalibrationError as error:
-        console.print(f"Drives will not be accepted. {error}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"Drives will not be accepted. {error}", style="yellow", soft_wrap=True)
     else:
         fitted = {**fitted, "drives": asdict(figures)}
         coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)

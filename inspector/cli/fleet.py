@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.runtime.text import number_of
+from calibnet.runtime.threads import cores
 from calibnet.runtime.writing import OutputError
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import DETAIL, FRAMES, SIZE
@@ -29,7 +31,7 @@ LOOKING = 8
 EVERY_S = 30.0
 """Seconds between two writings of the table while drives are done; a tenth of the time at most goes there."""
 MOST_NEWS = 10
-"""Cars that are named in the end; the page has all."""
+"""Mounts that are named in the end; the page has all."""
 STOPPING = "Stopping when the drives under way are done; once more gives them up."
 
 
@@ -101,20 +103,13 @@ def fleet(
     run = secrets.token_hex(8)
     tasks = [Task(drive, store, str(detail), force, run) for drive in drives]
     store.check()
-    engine = Engine(default_workers() if workers is None else workers, scheduler, memory or "auto", prepare_worker)
+    engine = Engine(max(1, cores() // 2) if workers is None else workers, scheduler, memory or "auto", prepare_worker)
     claim = None if store.local is None else Claim(store.local / TABLE, Kind.PARQUET)
     try:
         return run_fleet(tasks, engine)
     finally:
         if claim is not None:
             claim.release()
-
-
-def default_workers() -> int:
-    """A process for every two cores: a drive's network uses two well, and more do not help much."""
-    import os
-
-    return max(1, len(os.sched_getaffinity(0)) // 2) if hasattr(os, "sched_getaffinity") else 1
 
 
 def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
@@ -158,10 +153,13 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
         say(sentence)
     say(f"Table: {store.root}/{TABLE}")
     if interrupted or gone:
-        again = shlex.join(["calib-inspect", *sys.argv[1:]]) if "--force" not in sys.argv else "it without --force"
-        say(f"{gone or 'Interrupted.'} The others are left; to go on, call the same again: {again}", err=True)
+        again = shlex.join(["calib-inspect", *(word for word in sys.argv[1:] if word != "--force")])
+        say(f"{gone or 'Interrupted.'} The others are left; to go on: {again}", err=True)
         return ExitCode.INTERRUPTED if interrupted else ExitCode.BAD_INPUT
-    say(f"A page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
+    if store.local is not None:
+        say(f"A page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
+    else:
+        say(f"A page of it: copy {store.root} to this machine, then: calib-inspect fleet-report FOLDER")
     return ExitCode.OK
 
 
@@ -175,7 +173,7 @@ def news(rows: Sequence[Row]) -> Iterator[str]:
     moved = [car for car in histories(rows) if car.moves]
     yield from (f"{car.name}: {car.sentence}" for car in moved[:MOST_NEWS])
     if len(moved) > MOST_NEWS:
-        yield f"{len(moved) - MOST_NEWS} more cars have a mount that moved."
+        yield f"{number_of(len(moved) - MOST_NEWS, 'more mount')} moved."
 
 
 def needs_work_or_checked(task: Task) -> Row | None:

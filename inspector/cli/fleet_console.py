@@ -29,7 +29,7 @@ class FleetProgress:
         self._progress.update(self._task, advance=1, said=said)
         if row.verdict == "failed":
             text = f"Failed: {row.name}: {row.reason}"
-            self._progress.console.print(text, style="yellow", markup=False, soft_wrap=True)
+            self._progress.console.print(text, style="yellow", soft_wrap=True)
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def fleet_progress(total: int) -> Iterator[FleetProgress]:
     """Show the bar while drives are done; nothing for none."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("drives"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"))
+    columns = (TextColumn("drives"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}", markup=False))
     progress = Progress(*columns, TimeRemainingColumn(), TextColumn("left"), console=make_console(), disable=not total)
     with progress:
         yield FleetProgress(progress, progress.add_task("drives", total=total, said=""))

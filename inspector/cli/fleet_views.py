@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
 
@@ -32,7 +33,7 @@ def simulate(count: int, out: Path, frames: int, seed: int) -> None:
             out, count, seed, frames, lambda done, total: progress.update(task, completed=done, total=total)
         )
     say(f"{count} drives: {drives}")
-    say(f"Calibrate them: calib-inspect fleet {drives} --out {out / 'results'}")
+    say(f"Calibrate them: {shlex.join(['calib-inspect', 'fleet', str(drives), '--out', str(out / 'results')])}")
 
 
 @click.command("fleet-report")

@@ -19,7 +19,7 @@ from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import length_option
 from inspector.cli.options import FOLDER, FRAMES, KNOWN_OPTIONS, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
-from inspector.cli.output import overwrite_option, say
+from inspector.cli.output import make_console, overwrite_option, say
 from inspector.cli.preparing import UNJUDGED, announce, open_other
 from inspector.cli.recordings import OUTPUT_FILE
 from inspector.cli.run import checked
@@ -136,8 +136,6 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
         keeping: where an accepted calibration goes, and where the session is shown.
         **asked: fields of `RunOptions`.
     """
-    from rich.console import Console
-
     from calibnet.cascade.cascade import Cascade
     from inspector.live.accept import Target
     from inspector.live.session import LiveSession
@@ -155,7 +153,7 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     if options.method == CASCADE:
         numbers = options.stages or options.start.stages
         method = cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.prior)
-        announce(Console(stderr=True, highlight=False), options, cascade)
+        announce(make_console(), options, cascade)
     else:
         method = open_other(options)
         say(UNJUDGED, err=True)

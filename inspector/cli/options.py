@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +12,7 @@ import click
 
 from calibnet.geometry.types import Transform
 from calibnet.methods.registry import CASCADE, METHODS
+from calibnet.runtime.threads import cores
 from inspector.record.contents import Coloring, Detail, Part
 
 if TYPE_CHECKING:
@@ -154,6 +154,19 @@ class NumberRange(click.FloatRange):
         return number
 
 
+class SeedType(click.ParamType[int]):
+    """Seed of everything random; recordings keep it as a signed 64-bit number."""
+
+    name = "N"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Parse the text; a value that is a number already is held against the limits alike."""
+        text = str(value)
+        if re.fullmatch(r"\d{1,19}", text, re.ASCII) is None or int(text) >= 2**63:
+            self.fail(f"{text!r} is not a whole number from 0 to {2**63 - 1}.", param, ctx)
+        return int(text)
+
+
 UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
@@ -173,9 +186,8 @@ class Size(click.ParamType[int]):
 
 
 SIZE = Size()
-SEED = click.IntRange(0, 2**63 - 1)
-"""Seed of everything random; recordings keep it as a 64-bit number."""
-CORES = os.cpu_count() or 1
+SEED = SeedType()
+CORES = cores()
 THREADS = click.IntRange(1, CORES)
 """Threads of the CPU: torch ends the process at many more than there can be."""
 USUAL_THREADS = min(2, CORES)

@@ -49,7 +49,7 @@ def make_console(stderr: bool = True) -> Console:
         def print(self, *objects: Any, **options: Any) -> None:
             super().print(*(lines(one) if isinstance(one, str) else one for one in objects), **options)
 
-    console = Quoting(stderr=stderr, highlight=False)
+    console = Quoting(stderr=stderr, highlight=False, markup=False, emoji=False)  # a name is no markup
     if console.width < NARROWEST:
         console.width = NARROWEST
     return console

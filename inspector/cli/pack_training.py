@@ -8,18 +8,25 @@ from pathlib import Path
 import click
 
 from calibnet.training.options import TrainingOptions
-from inspector.cli.options import FOLDER, SIZE
+from inspector.cli.options import FOLDER, SEED, SIZE, NumberRange
+from inspector.cli.output import make_console
 
 
 @click.command("pack-training")
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Real frames, as in train. Repeatable.")
 @click.option("--validate", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames to leave out.")
-@click.option("--synthetic", type=click.FloatRange(0, 1), default=TrainingOptions.synthetic, show_default=True)
+@click.option(
+    "--synthetic",
+    type=NumberRange(0, 1),
+    default=TrainingOptions.synthetic,
+    show_default=True,
+    help="Share of synthetic frames, as in train.",
+)
 @click.option("--scenes", type=click.IntRange(1), default=500, show_default=True, help="Synthetic scenes to pack.")
 @click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
 @click.option("--after", type=FOLDER, help="Weights whose residuals are measured, which takes minutes, and packed too.")
 @click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
 @click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
 @click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Largest size of a part.")
 def pack_training(
@@ -43,7 +50,6 @@ def pack_training(
     calib-inspect pack-training --data kitti-raw:KITTI/raw --data folder:RIGS --out packed
     calib-inspect train --packed packed --range 5/0.5 --minutes 8 --batch 64 --workers 15
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
-    from rich.console import Console
     from rich.progress import track
 
     from calibnet.training.packing import pack_training as pack
@@ -60,7 +66,7 @@ def pack_training(
         after=str(after) if after else None,
         seed=seed,
     )
-    console = Console(stderr=True, highlight=False)
+    console = make_console()
 
     def tracked(places: Iterable[tuple[int, int]]) -> Iterable[tuple[int, int]]:
         return track(list(places), "Packing", console=console)

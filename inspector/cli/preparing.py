@@ -69,8 +69,8 @@ def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
             f"{options.method} needs a drive: several frames on one mount, and neither --no-drive nor --per-frame."
         )
     console = make_console()
-    console.print(f"{options.sequence.name} ({options.sequence.rig}), {options.start}, {options.method}", markup=False)
-    console.print(UNJUDGED, markup=False, soft_wrap=True)
+    console.print(f"{options.sequence.name} ({options.sequence.rig}), {options.start}, {options.method}")
+    console.print(UNJUDGED, soft_wrap=True)
     description = RunDescription(options.title, options.identity([]), describe_provenance("", [], None))
     return make_session(options, outputs, method, drive, description, console)
 
@@ -128,15 +128,15 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
     known = f", {options.prior.words}" if options.prior else ""
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
-    console.print(what, markup=False, soft_wrap=True)
+    console.print(what, soft_wrap=True)
     if options.expectation:
-        console.print(options.expectation, markup=False, soft_wrap=True)
+        console.print(options.expectation, soft_wrap=True)
     for note in getattr(options.sequence, "notes", ()):
-        console.print(note, markup=False, soft_wrap=True)
+        console.print(note, soft_wrap=True)
     for stage in cascade.skipped:
-        console.print(f"Skipped: {stage.reason}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"Skipped: {stage.reason}", style="yellow", soft_wrap=True)
     if cascade.unjudged:
-        console.print(f"No result will be accepted: {cascade.unjudged}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"No result will be accepted: {cascade.unjudged}", style="yellow", soft_wrap=True)
 
 
 def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:

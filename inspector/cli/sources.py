@@ -14,7 +14,7 @@ import click
 from calibnet.datasets import dataset_names
 from calibnet.datasets.published import PUBLISHED, options_of
 from calibnet.errors import ConfigError
-from inspector.cli.options import FOLDER
+from inspector.cli.options import FOLDER, NumberRange
 from inspector.cli.source import Source, open_bag, open_folder, published
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ SOURCES = (
             LIDAR_FRAME,
             click.Option(
                 ["--max-time-difference"],
-                type=click.FloatRange(min=0),
+                type=NumberRange(min=0),
                 metavar="MS",
                 help="Pair each image with the nearest scan within so many milliseconds, by timestamps.txt in both "
                 "folders or by names that are times.  [default: by name; by time within 50 where names differ]",
@@ -164,7 +164,7 @@ SOURCES = (
             LIDAR_FRAME,
             click.Option(
                 ["--every"],
-                type=click.FloatRange(min=0, min_open=True),
+                type=NumberRange(min=0, min_open=True),
                 metavar="S",
                 help="Take one frame per this many seconds, at a standstill if there is one.  [default: about 40 "
                 "frames]",
@@ -178,7 +178,7 @@ SOURCES = (
             ),
             click.Option(
                 ["--max-time-difference"],
-                type=click.FloatRange(min=0, min_open=True),
+                type=NumberRange(min=0, min_open=True),
                 metavar="MS",
                 help="Largest time difference between an image and its scan, in milliseconds.  [default: 50]",
             ),

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.interruption import StopRequest
+from calibnet.runtime.threads import cores
 from inspector.fleet.extra import require_extra
 from inspector.programs import LOCALHOST
 
@@ -69,7 +70,7 @@ class Engine:
     @property
     def threads(self) -> int:
         """Threads of each worker on this machine."""
-        return max(1, (os.cpu_count() or 1) // max(1, self.workers))
+        return max(1, cores() // max(1, self.workers))
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _here(
                 outcome = Outcome(piece, act(piece))
             except Exception as error:
                 outcome = Outcome(piece, error=error)
-                if rest:
+                if rest and not is_lasting(error):
                     continue
             yield outcome
             break
@@ -149,7 +150,7 @@ def _on(
                 continue
             piece = works.pop(future)
             try:
-                outcome = Outcome(piece, future.result())
+                outcome = future.result()
             except (CancelledError, asyncio.CancelledError):
                 if not stop.requested:
                     raise _lost(client) from None
@@ -168,8 +169,15 @@ def _on(
         time.sleep(POLL_S)
 
 
-def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Done:
+def is_lasting(error: Exception) -> bool:
+    """Whether another try would fail alike, as the error says by an attribute ``lasting``."""
+    return bool(getattr(error, "lasting", False))
+
+
+def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Outcome[Work, Done]:
     """Do a piece on a worker that has room; one whose memory is taken retires first, and its nanny starts another.
+
+    An error that is not lasting is raised, so that Dask tries again.
 
     Libraries may keep some memory of whatever they did. Nothing is under way at this moment, so nothing is lost; beyond
     0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle. A worker that simply ended
@@ -183,7 +191,12 @@ def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Done:
         time.sleep(FETCH_S)  # for the result of the piece before, which lies here
         worker.loop.add_callback(_retire, worker)
         raise Reschedule
-    return act(piece)
+    try:
+        return Outcome(piece, act(piece))
+    except Exception as error:
+        if is_lasting(error):
+            return Outcome(piece, error=error)
+        raise
 
 
 async def _retire(worker: Any) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
-from calibnet.runtime.text import one_line
+from calibnet.runtime.text import number_of, one_line
 from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted, told_together
@@ -18,7 +18,7 @@ from inspector.report.template import html_page, stylesheet
 
 PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300
-"""Drives and cars on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
+"""Drives and mounts on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
 LONGEST_REASON = 300
@@ -49,11 +49,12 @@ def write_page(rows: Sequence[Row], folder: Path) -> Path:
 def make_page(rows: Sequence[Row], folder: Path) -> str:
     """The page; links lead below its folder."""
     cars, worst = histories(rows), worst_first(rows)
-    headline = f"{len(rows)} drives of {len(cars)} cars: {counted(rows)}"
-    about = f"{told_together(rows)} {_moved(sum(bool(car.moves) for car in cars))}".strip()
+    names = {car.car for car in cars}
+    headline = f"{number_of(len(rows), 'drive')} of {number_of(len(names), 'car')}: {counted(rows)}"
+    about = f"{told_together(rows)} {_moved(len({car.car for car in cars if car.moves}))}".strip()
     sections = Template(_resource("page.html")).substitute(
         cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
-        more_cars=_more(len(cars), MOST_CARS, "cars"),
+        more_cars=_more(len(cars), MOST_CARS, "mounts"),
         heads="".join(_head(name) for name in HEADS),
         rows="\n".join(_row(row, folder) for row in worst[:MOST_ROWS]),
         more_rows=_more(len(worst), MOST_ROWS, "drives"),

@@ -167,19 +167,36 @@ class Store:
 
     @contextmanager
     def workplace(self, name: str) -> Iterator[Path]:
-        """A folder to write results into: itself, or one on this machine whose files are copied there in the end."""
+        """A folder to write results into: itself, or one on this machine whose files replace those there in the end.
+
+        They do so after an error as well, so that a drive which fails shows no earlier result.
+        """
         if self.local is not None:
             folder = self.local / name
             folder.mkdir(parents=True, exist_ok=True)
             yield folder
             return
         with tempfile.TemporaryDirectory(prefix="calib-inspect-result-") as temporary:
-            yield Path(temporary)
-            system, root = _system(self.root)
-            for path in sorted(path for path in Path(temporary).rglob("*") if path.is_file()):
-                target = f"{root}/{name}/{path.relative_to(temporary).as_posix()}"
-                system.makedirs(target.rpartition("/")[0], exist_ok=True)
-                system.put_file(str(path), target)
+            try:
+                yield Path(temporary)
+            except Exception:
+                with suppress(Exception):  # the error itself is what has to be known
+                    self._replace(name, Path(temporary))
+                raise
+            self._replace(name, Path(temporary))
+
+    def _replace(self, name: str, folder: Path) -> None:
+        """Put the files of a folder on this machine in place of those in a folder of the store elsewhere."""
+        system, root = _system(self.root)
+        there = f"{root}/{name}"
+        earlier = set(system.find(there)) if system.exists(there) else set()
+        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            target = f"{there}/{path.relative_to(folder).as_posix()}"
+            system.makedirs(target.rpartition("/")[0], exist_ok=True)
+            system.put_file(str(path), target)
+            earlier.discard(target)
+        for old in sorted(earlier):
+            system.rm_file(old)
 
 
 def _system(url: str) -> tuple[Any, str]:

@@ -18,7 +18,6 @@ import rerun as rr
 from calibnet.datasets.frame import Frame
 from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.memory import hand_back
-from calibnet.runtime.text import one_line
 from calibnet.trace import CascadeTrace, DriveEstimate
 from calibnet.verdict import BadFrame, Verdict
 from calibnet.watch import Watched
@@ -27,7 +26,7 @@ from inspector.mount_changes import sentences
 from inspector.record.frame import log_frame, verdict_values
 from inspector.record.observation import Layout, Observation
 from inspector.record.outcome import outcome_values
-from inspector.record.stream import Stream
+from inspector.record.stream import Stream, plain
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
@@ -77,12 +76,8 @@ class Recording:
         self._flushed = 0
         self._worst = -math.inf
         blueprint = make_blueprint(layout, self._tabs)
-        options, title = (
-            {name: _plain(value) for name, value in description.options.items()},
-            one_line(description.title),
-        )
-        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, title, sinks, blueprint)
-        self._stream.rec.send_property(entities.RUN, rr.AnyValues(**options))
+        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, blueprint)
+        self._stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         provenance = rr.AnyValues(**description.provenance, **_described(layout))
         self._stream.rec.send_property(entities.PROVENANCE, provenance)
         self._rec = Subtree(self._stream.rec)
@@ -176,11 +171,6 @@ class Recording:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _plain(value: Any) -> Any:
-    """Text that is in UTF-8 and one line, whatever a folder is called."""
-    return one_line(value) if isinstance(value, str) else value
 
 
 def _described(layout: Layout) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from inspector.record.pictures.cloud import OUTSIDE, RANGE_M, seen_colors
 from inspector.record.pictures.frame_overlays import FrameOverlays
 from inspector.record.pictures.legends import log_point_legend
 from inspector.record.recording import RunDescription
-from inspector.record.stream import Stream
+from inspector.record.stream import Stream, plain
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import move_below
 from inspector.record.tabs.scene import BACKGROUND, POINT_SIZE, frustum
@@ -80,7 +80,7 @@ def record_rig(
     stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, rig_blueprint(cameras))
     try:
         rec = Subtree(stream.rec)
-        stream.rec.send_property(entities.RUN, rr.AnyValues(**description.options))
+        stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         stream.rec.send_property(entities.PROVENANCE, rr.AnyValues(**description.provenance))
         rec.log_once(entities.RIG, rr.AnyValues(rig_json=json.dumps(solved.recorded())))
         rec.log_once(TEXT, rr.TextDocument("\n".join(solved.markdown()), media_type=rr.MediaType.MARKDOWN))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -14,7 +12,7 @@ from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind
 from inspector import entities
 from inspector.record.recording import RunDescription
-from inspector.record.stream import Stream
+from inspector.record.stream import Stream, plain
 
 SENTENCE = "sentence"
 """Text: why there is no more."""
@@ -31,15 +29,11 @@ def record_sentence(file: Path, description: RunDescription, word: str, cause: s
         view = rrb.TextDocumentView(origin=SENTENCE, name="Why there is no more")
         layout = rrb.Blueprint(view, rrb.TimePanel(state="hidden"), auto_views=False, auto_layout=False)
         sinks = [rr.FileSink(claim.begin())]
-        stream = Stream(entities.APPLICATION_ID, description.recording_id, one_line(description.title), sinks, layout)
-        stream.rec.send_property(entities.RUN, rr.AnyValues(**_plain(description.options)))
+        stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, layout)
+        stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         stream.rec.send_property(entities.OUTCOME, rr.AnyValues(word=word, cause=cause, reason=one_line(sentence)))
         stream.rec.log(SENTENCE, rr.TextDocument(f"# {word.capitalize()}\n\n{one_line(sentence)}"), static=True)
         stream.close()
         claim.complete()
     finally:
         claim.release()
-
-
-def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: one_line(value) if isinstance(value, str) else value for name, value in options.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -15,6 +15,7 @@ import rerun_bindings
 
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.memory import hand_back
+from calibnet.runtime.text import one_line
 from inspector.record.flushing import RecordingLostError, flush
 from inspector.record.indexing import NotIndexedError, index
 
@@ -58,7 +59,7 @@ class Stream:
         self._identity, self._blueprint = (application_id, recording_id), blueprint
         self.rec = self._opened([_growing(sink) if isinstance(sink, Path) else sink for sink in sinks], True)
         self.rec.set_log_time_enabled(False)
-        self.rec.send_recording_name(title)
+        self.rec.send_recording_name(one_line(title))
 
     def _opened(self, sinks: Sequence[Any], is_new: bool) -> rr.RecordingStream:
         """Rerun's stream, which of a new recording says when it was begun."""
@@ -108,6 +109,11 @@ class Stream:
                 raise ViewerClosedError(
                     "The viewer has closed the connection, and there is no --save to go on with."
                 ) from None
+
+
+def plain(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options with text that is in UTF-8 and one line, whatever a folder is called."""
+    return {name: one_line(value) if isinstance(value, str) else value for name, value in options.items()}
 
 
 def _growing(path: Path) -> rr.FileSink:

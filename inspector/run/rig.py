@@ -18,6 +18,7 @@ from calibnet.geometry import CameraModel, invert, pose_error
 from calibnet.geometry.prior import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
+from calibnet.runtime.text import one_line
 from calibnet.verdict import REJECTED, Verdict, moved
 from inspector.rig_result import CameraResult, Residual, RigResult
 
@@ -58,7 +59,7 @@ def open_rig(folders: Sequence[Path]) -> dict[str, Folder]:
                 f"{root / CAMERAS}, and the scans into {root / 'clouds'}; or give a plain folder for each camera."
             )
         folders, clouds = inside, root / "clouds"
-    names = [folder.resolve().name for folder in folders]
+    names = [one_line(folder.resolve().name) for folder in folders]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DatasetError(f"Two cameras are called {twice}; give their folders different names.")

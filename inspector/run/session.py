@@ -151,7 +151,7 @@ class Session:
     def _show(self) -> None:
         """Open the viewer or the page, and say where it is, once."""
         if self.outputs.show() and self.outputs.page is not None:
-            self.console.print(f"Watch it at {self.outputs.page}", markup=False, soft_wrap=True)
+            self.console.print(f"Watch it at {self.outputs.page}", soft_wrap=True)
 
     def _range(self, first: Frame) -> tuple[int, int]:
         """Numbers of the first and the last frame; of datasets that leave numbers out only the last frame knows it."""
@@ -173,7 +173,7 @@ class Session:
             remark = recording.close(advance)
             progress.update(task, total=progress.tasks[0].completed)  # fewer than there were: chunks are fewer
         if remark:
-            self.console.print(remark, style="yellow", markup=False, soft_wrap=True)
+            self.console.print(remark, style="yellow", soft_wrap=True)
 
     def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
         """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
@@ -194,7 +194,7 @@ class Session:
                 raise
             summary.skipped.append(BadFrame(number, str(error)))
             summary.unread += isinstance(error, DatasetError) and not named_cause(error)
-            self.console.print(f"Skipped: {error}", style="yellow", markup=False, soft_wrap=True)
+            self.console.print(f"Skipped: {error}", style="yellow", soft_wrap=True)
             return None
         given = None
         if self.verify and not self.drive and trace.verdict is not None:

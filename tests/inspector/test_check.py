@@ -131,7 +131,7 @@ def test_json_is_the_verdict_alone_on_stdout(
     record(file, length=1, detail="overview", strides=(32,), doubted=(0,), causes=causes)
     code, out, err = call(capsys, file, "--json", "-")
     (frame,) = read_run(file).frames
-    assert code == 1 and json.loads(out) == frame.verdict.as_dict()
+    assert code == 1 and json.loads(out) == frame.verdict.as_dict() | {"limits": []}
     assert json.loads(out)["causes"] == [causes[0].as_dict()]
     assert err == f"Verdict: rejected. {REASON} The picture looks mirrored.\n"
 
@@ -194,3 +194,12 @@ def test_without_reference_it_is_one_sentence(
     assert (code, out) == (3, "")
     assert "has no reference extrinsic" in err
     assert err.count("\n") == 1
+
+
+def test_json_says_of_every_limit_whether_it_is_kept(full_recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call(capsys, full_recording, "--max-rotation", 0.01, "--max-translation", 50, "--json", "-")
+    content = json.loads(out)
+    assert code == 1 and content["verdict"] == "accepted"
+    rotation, translation = content["limits"]
+    assert rotation["name"] == "median rotation error" and rotation["largest"] == 0.01 < rotation["value"]
+    assert (rotation["passed"], translation["passed"]) == (False, True)

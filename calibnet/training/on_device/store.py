@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import ConfigError
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.threads import cores
 from calibnet.training.data import Source
 
 LARGEST_BYTES = 16 << 30
@@ -57,7 +57,7 @@ class FrameStore:
         places = [(source.sequence, position) for source in sources for position in range(len(source.sequence))]
         lengths = [len(source.sequence) for source in sources]
         frames, height, width, most = list[Frame](), 0, 0, 0
-        threads = ThreadPoolExecutor(os.cpu_count())
+        threads = ThreadPoolExecutor(cores())
         try:
             for frame in threads.map(lambda place: place[0][place[1]], places):
                 frames.append(frame)

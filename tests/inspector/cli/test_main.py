@@ -17,9 +17,14 @@ from rich.table import Table
 
 from calibnet import __version__
 from calibnet.errors import CalibnetError, DatasetError
+from calibnet.evaluation.measure import Step
 from inspector.cli import errors
+from inspector.cli.evaluate import Bars
+from inspector.cli.fleet_console import fleet_progress
 from inspector.cli.main import COMMANDS, cli, settle_environment
 from inspector.cli.output import make_console
+from inspector.fleet.drives import Drive
+from inspector.fleet.table import row_of
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -228,6 +233,23 @@ def test_a_table_has_its_numbers_on_any_terminal(
     table.add_row("total", "2.651 M")
     console.print(table)
     assert "2.651 M" in capsys.readouterr().out
+
+
+def test_a_name_with_brackets_or_colons_is_printed_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    console = make_console(stderr=False)
+    console.print("3 parts in a[/b] and :smile:")
+    table = Table("name")
+    table.add_row("[red]x[/] a[/b]")
+    console.print(table)
+    shown = capsys.readouterr().out
+    assert "3 parts in a[/b] and :smile:" in shown and "[red]x[/] a[/b]" in shown
+
+
+def test_bars_are_named_by_foreign_text() -> None:
+    with Bars() as bars:
+        bars.show(Step("row", 1, 2, "a[/b]"))
+    with fleet_progress(1) as progress:
+        progress.advance(row_of(Drive("a[/b]", "c[/d]", "folder", "/x"), verdict="failed", reason="e[/f]"))
 
 
 def test_variables_of_libraries_that_change_what_they_do_are_taken_out() -> None:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from calibnet.geometry import RANGES, MiscalibrationRange, euler_xyz, range_of, sample_miscalibration, stages_within
-from inspector.cli.options import FRAMES, MISCALIBRATION, RANGE, STAGES
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from inspector.cli.options import FRAMES, MISCALIBRATION, RANGE, SEED, STAGES
 
 
 def convert(option_type: click.ParamType[Any], text: str) -> Any:
@@ -22,6 +24,32 @@ def test_range() -> None:
 def test_bad_ranges_are_usage_errors(text: str) -> None:
     with pytest.raises(click.BadParameter, match="Range"):
         convert(RANGE, text)
+
+
+@pytest.mark.parametrize("number", ["nan", "inf"])
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        (("bench",), "--limit"),
+        (("fit-verdict",), "--minutes"),
+        (("pack-training",), "--synthetic"),
+        (("folder",), "--max-time-difference"),
+        (("bag",), "--max-time-difference"),
+        (("bag",), "--every"),
+    ],
+)
+def test_numbers_are_finite(
+    command: tuple[str, ...], option: str, number: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(cli, [*command, option, number]) == 2
+    assert f"Invalid value for '{option}'" in capsys.readouterr().err
+
+
+def test_seeds_are_whole_numbers_of_64_bits() -> None:
+    assert convert(SEED, "0") == 0 and convert(SEED, str(2**63 - 1)) == 2**63 - 1
+    for text in ("-1", "1.5", str(2**63), "x", ""):
+        with pytest.raises(click.BadParameter):
+            convert(SEED, text)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -216,6 +218,28 @@ def test_a_rig_is_exported_a_file_a_camera(rig: Path, invoke: Invoke) -> None:
         in invoke("export", "rig.rrd", "--format", "ros", "--camera", "up")[2]
     )
     assert invoke("export", "rig.rrd", "--format", "ros", "--frame", "1", "--camera", "left")[0] == 2
+
+
+def test_every_camera_has_a_file_of_its_own_whatever_it_is_called(rig: Path, invoke: Invoke) -> None:
+    names = ["front left", "front_left", os.fsdecode(b"caf\xe9")]
+    (rig / "cameras" / "left").rename(rig / "cameras" / names[0])
+    (rig / "cameras" / "right").rename(rig / "cameras" / names[1])
+    shutil.copytree(rig / "cameras" / names[1], rig / "cameras" / names[2])
+    code, _, err = invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless", "--output", "own")
+    assert code == 0, err
+    assert len(list(Path("own").iterdir())) == 3
+    assert invoke("export", "rig.rrd", "--format", "ros", "--output", "found")[0] == 0
+    written = [file.read_text() for file in Path("found").iterdir()]
+    assert len(written) == 3
+    frames = {re.findall(r"\w+_camera_optical_frame", text)[0] for text in written}
+    assert len(frames) == 3
+
+
+def test_a_rig_may_lie_in_a_folder_whose_name_is_not_utf_8(rig: Path, invoke: Invoke) -> None:
+    foreign = rig.rename(rig.with_name(os.fsdecode(b"caf\xe9")))
+    code, _, err = invoke(str(foreign), "--rigid", "--save", "rig.rrd", "--headless")
+    assert code == 0, err
+    assert len(read_rig(Path("rig.rrd")).solved.cameras) == 2
 
 
 def test_what_is_rejected_of_a_rig_is_not_exported(rig: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,6 +53,18 @@ def always_die(piece: tuple[Path, int]) -> int:
     return number
 
 
+class LastingError(Exception):
+    """The input is to blame."""
+
+    lasting = True
+
+
+def fail_for_good(piece: tuple[Path, int]) -> int:
+    folder, number = piece
+    note(folder, f"{number}")
+    raise LastingError("never")
+
+
 def fail(piece: tuple[Path, int]) -> int:
     folder, number = piece
     note(folder, f"{number}")
@@ -128,6 +140,12 @@ def test_what_fails_is_tried_twice(tmp_path: Path, any_engine: Engine) -> None:
     (outcome,) = run_all(any_engine, fail, [(tmp_path, 7)], StopRequest())
     assert str(outcome.error) == "no 7"
     assert lines(tmp_path) == ["7", "7"]
+
+
+def test_what_would_fail_alike_is_tried_once(tmp_path: Path, any_engine: Engine) -> None:
+    (outcome,) = run_all(any_engine, fail_for_good, [(tmp_path, 7)], StopRequest())
+    assert str(outcome.error) == "never"
+    assert lines(tmp_path) == ["7"]
 
 
 def test_a_worker_that_is_killed_loses_only_what_it_was_doing(tmp_path: Path, two: Engine) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 from pathlib import Path
 
@@ -174,10 +175,11 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
 
     monkeypatch.setattr(JudgedCascade, "calibrate_drive", interrupted)
     call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
-    code, out, err = invoke(*call)
+    monkeypatch.setattr("sys.argv", ["calib-inspect", *call, "--force"])
+    code, out, err = invoke(*call, "--force")
     assert code == 130
     assert "1 of 2 drives: 1 accepted" in out
-    assert "call the same again" in err
+    assert f"to go on: calib-inspect {shlex.join(call)}" in err
     assert list(rows_of(Path("all"))) == ["monday"]
     monkeypatch.setattr(JudgedCascade, "calibrate_drive", solve)
     assert invoke(*call)[0] == 0

@@ -142,6 +142,27 @@ def test_a_bucket_is_read_and_written_as_a_folder_is(invoke: Invoke, bucket: str
     assert cascade.solved == 1
 
 
+def test_a_drive_that_fails_shows_nothing_of_an_earlier_run_in_a_bucket(
+    invoke: Invoke, bucket: str, cascade: JudgedCascade, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = fsspec.filesystem("memory")
+    call = ("fleet", "DRIVES.csv", "--out", "memory://results/all", "--workers", "0")
+    Path("DRIVES.csv").write_text(f"path\n{bucket}\n")
+    out = invoke(*call)[1]
+    assert "copy memory://results/all to this machine, then: calib-inspect fleet-report" in out
+    there = "/results/all/drives/blue/monday"
+    before = {name.removeprefix(f"{there}/") for name in memory.find(there)}
+    assert {"index.html", "verdict.json", "drive.json", "metrics.json"} <= before
+
+    def fault(self: JudgedCascade, *_: object) -> None:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(JudgedCascade, "calibrate_drive", fault)
+    invoke(*call, "--force")
+    assert {name.removeprefix(f"{there}/") for name in memory.find(there)} == {"log.txt", "recording.rrd"}
+    assert b"ZeroDivisionError" in memory.cat_file(f"{there}/log.txt")
+
+
 def test_an_address_that_nothing_reads_is_a_sentence(invoke: Invoke) -> None:
     Path("DRIVES.csv").write_text("path\nnosuch://bucket/drive\n")
     code, _, err = invoke("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")

@@ -112,7 +112,7 @@ def test_the_command_ends_with_what_moved() -> None:
     assert together == "72 of them by what all drives of the car say together."
     assert first.startswith("c0: The mount moved between d3 and d4, by 2.00°")
     assert len(others) == 9
-    assert rest == "2 more cars have a mount that moved."
+    assert rest == "2 more mounts moved."
     assert list(news(judged_by_cars(still))) == []
 
 
@@ -197,6 +197,12 @@ def test_a_table_of_something_else_is_a_sentence(tmp_path: Path) -> None:
     pq.write_table(pa.table({"a": [1]}), tmp_path / TABLE)
     with pytest.raises(DatasetError, match="car is missing"):
         read_table(tmp_path / TABLE)
+
+
+def test_a_car_of_two_cameras_is_one_car(tmp_path: Path) -> None:
+    two = [replace(row("d1"), camera="2"), replace(row("d1"), camera="3")]
+    assert "<h1>2 drives of 1 car: 2 accepted</h1>" in make_page(two, tmp_path)
+    assert "<h1>1 drive of 1 car: 1 accepted</h1>" in make_page(two[:1], tmp_path)
 
 
 def test_foreign_names_are_text_on_the_page(tmp_path: Path) -> None:
