@@ -84,8 +84,8 @@ class Bag:
         first_image = self._bag.message(self.image).content
         first_scan = self._bag.message(self.points).content
         frames = FrameChoice(
-            options.frames.camera or str(first_image.header.frame_id).lstrip("/"),
-            options.frames.lidar or str(first_scan.header.frame_id).lstrip("/"),
+            options.frames.camera or str(first_image.header.frame_id).lstrip("/") or None,
+            options.frames.lidar or str(first_scan.header.frame_id).lstrip("/") or None,
         )
         looked_at = list[NDArray[np.uint8]]()
         self._development = Development()

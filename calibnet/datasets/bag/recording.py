@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces.typing import Typesdict
 
+KINDS = (".bag", ".db3", ".mcap")
+"""What a bag's file is called: ROS 1, and the two storages of ROS 2."""
 METADATA_BYTES = 16 * MEGABYTE
 """Largest metadata.yaml of a ROS 2 bag."""
 DEFINED = {
@@ -73,12 +75,8 @@ class BagRecording:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
-        self.paths = list(paths)
+        self.paths = [file for path in paths for file in _parts(path)]
         for path in self.paths:
-            if not path.exists():
-                raise DatasetError(
-                    f"Bag {path} does not exist; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder."
-                )
             for file in _files(path):  # which also makes them inputs, so that no output replaces them
                 largest = METADATA_BYTES if file.suffix == ".yaml" else None
                 require_file(file, "Bag", largest, DatasetError, "copy it again")
@@ -86,7 +84,12 @@ class BagRecording:
         old = any(path.suffix == ".bag" for path in self.paths)
         self._reader: AnyReader | McapFile
         with self.failures():
-            if len(self.paths) == 1 and is_foreign(self.paths[0]):
+            if any(is_foreign(path) for path in self.paths):
+                if len(self.paths) > 1:
+                    raise DatasetError(
+                        f"Bag {self} was not recorded by ROS 2, and such MCAP files are read one at a time; join them: "
+                        "mcap merge A.mcap B.mcap -o AB.mcap."
+                    )
                 self._reader = McapFile(self.paths[0])
             else:
                 ros2 = get_typestore(Stores.ROS2_HUMBLE)
@@ -187,6 +190,29 @@ class BagRecording:
         if isinstance(self._reader, McapFile):
             return connection.decode(data)
         return self._reader.deserialize(data, connection.msgtype)
+
+
+def _parts(path: Path) -> list[Path]:
+    """What libraries open: a file, a folder with its ``metadata.yaml``, or the bags in a folder that has none.
+
+    Raises:
+        DatasetError: there is none.
+    """
+    if not path.exists():
+        raise DatasetError(f"Bag {path} does not exist; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder.")
+    if not path.is_dir():
+        if path.suffix not in KINDS and path.is_file():
+            raise DatasetError(
+                f"Bag {path} ends with none of {', '.join(KINDS)}; call it by its kind, and reindex first what a "
+                "recorder left as .active (`rosbag reindex`)."
+            )
+        return [path]
+    if (path / "metadata.yaml").exists():
+        return [path]
+    found = sorted(file for file in path.iterdir() if file.suffix in KINDS)
+    if not found:
+        raise DatasetError(f"Folder {path} holds no bag; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder.")
+    return found
 
 
 def _files(path: Path) -> list[Path]:

@@ -110,7 +110,11 @@ def _chosen(
     """The frame of that name, or the only one that is called as such frames are."""
     if name is not None:
         if name not in tree:
-            raise DatasetError(f"{path} has no frame {name!r}; frames there: {', '.join(sorted(tree)) or 'none'}.")
+            there = ", ".join(sorted(tree)) or "none"
+            raise DatasetError(
+                f"{path} has no frame {name!r}; frames there: {there}. Name one of them with --{what}-frame, or give a "
+                "first guess with --guess FILE."
+            )
         return name
     called = [frame for frame in tree if pattern.search(frame) and frame != but]
     for better in (OPTICAL.search, lambda frame: not re.search(r"base|mount|plate|imu", frame)):

@@ -48,6 +48,35 @@ def test_a_single_file_of_a_ros_2_bag_is_a_bag(tmp_path: Path) -> None:
     assert len(Bag([file])) == 3
 
 
+def test_a_folder_without_metadata_is_the_bags_in_it(path: Path, tmp_path: Path) -> None:
+    for file in [path] if path.is_file() else path.iterdir():
+        if file.suffix != ".yaml":
+            (tmp_path / file.name).write_bytes(file.read_bytes())
+    assert len(Bag([tmp_path])) == 3
+
+
+def test_a_folder_without_bags_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"holds no bag; give a \.bag, \.db3 or \.mcap file"):
+        Bag([tmp_path])
+
+
+@pytest.mark.parametrize("name", ["drive.bag.active", "drive.BAG", "drive"])
+def test_a_file_of_another_name_is_one_sentence(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(DatasetError, match=r"ends with none of \.bag, \.db3, \.mcap; call it by its kind"):
+        Bag([tmp_path / name])
+
+
+def test_frames_without_a_name_are_found_by_what_they_are_called(tmp_path: Path) -> None:
+    bag, nameless = BagWriter(tmp_path / "drive", "mcap"), FRAMES[0]
+    image = bag.raw(nameless.image, "rgb8", 10.0)
+    bag.write("/cam/image_raw", replace(image, header=bag.header(10.0, "")), 10.0)
+    bag.write("/cam/camera_info", bag.info(nameless, "plumb_bob", [0.0] * 5), 10.0)
+    bag.write("/points", bag.cloud(nameless.points, 10.0), 10.0)
+    bag.write("/tf_static", bag.transforms(nameless.camera_from_lidar), 10.0)
+    assert_allclose(Bag([bag.close()])[0].camera_from_lidar, nameless.camera_from_lidar, atol=1e-9)
+
+
 def test_scans_are_put_together_at_a_standstill(path: Path) -> None:
     frames = list(Bag([path], BagOptions(accumulate=2)))
     assert [len(frame.points) for frame in frames] == [2 * len(frame.points) for frame in FRAMES]

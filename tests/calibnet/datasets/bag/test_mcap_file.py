@@ -45,6 +45,12 @@ def test_points_that_lie_elsewhere_in_their_frame_are_refused(tmp_path: Path) ->
         Bag([path])
 
 
+def test_several_are_to_be_joined(tmp_path: Path) -> None:
+    path = written(tmp_path / "drive.mcap", "json")
+    with pytest.raises(DatasetError, match="read one at a time; join them: mcap merge"):
+        Bag([path, path])
+
+
 def test_what_is_missing_is_listed(tmp_path: Path) -> None:
     bag = ForeignMcap(tmp_path / "drive.mcap", "json")
     bag.write("/cam/image", "CompressedImage", image_of(FRAMES[0], 1.0), 1.0)
