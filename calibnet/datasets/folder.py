@@ -25,7 +25,7 @@ from calibnet.geometry.prior import Prior, parse_angle, parse_axes, parse_length
 from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
 DEPTHS_LOOKED_AT = 6
 """Pictures of a drive that tell how many bits a camera gives."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -19,7 +20,7 @@ from calibnet.datasets.clouds.scans import ending, full_scale_of, read_raw, read
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import read_image
 from calibnet.datasets.images.lens import Picture
-from calibnet.datasets.plausibility import bit_depth, of_camera, of_extrinsic, of_scan, refuse
+from calibnet.datasets.plausibility import bit_depth, mosaic, of_camera, of_extrinsic, of_scan, refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
@@ -110,7 +111,8 @@ class PairedSequence(ABC):
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
         remarks = refuse([*of_camera(camera), *of_extrinsic(extrinsic)], f"Calibration of {image_path}")
-        remarks += refuse([bit_depth(image)], f"Image {image_path}") + refuse(of_scan(points), f"Scan {scan_path}")
+        remarks += refuse([bit_depth(image), mosaic(image)], f"Image {image_path}")
+        remarks += refuse(of_scan(points), f"Scan {scan_path}")
         return Frame(
             index=files.index,
             timestamp=files.timestamp,
@@ -169,7 +171,7 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
         suffix = ending(path, suffixes)
         if not suffix or path.name.startswith("."):
             continue
-        stem = path.name[: -len(suffix)]
+        stem = unicodedata.normalize("NFC", path.name[: -len(suffix)])  # macOS takes letters and accents apart
         if stem in files:
             raise DatasetError(f"{folder} holds both {files[stem].name} and {path.name}; keep one of them.")
         files[stem] = path

@@ -22,6 +22,8 @@ WORTH_A_WARNING_MS = 20.0
 """Time between them above which the user is warned: 28 cm of way at 50 km/h."""
 CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
 """By the number of digits of a time since 1970, its unit in seconds."""
+TIME_IN_NAME = re.compile(r"(?:.*[^\d.])?(\d{13}|\d{16}|\d{19}|\d{10}[._]\d{3,9})|(\d{10,19}|\d{9,10}[._]\d+)")
+"""A time since 1970 as a file's name, or, of milliseconds and finer ones, at its end, as nuScenes names its files."""
 NEWEST = 4e9
 """Seconds since 1970 beyond which a number is no time."""
 
@@ -156,9 +158,8 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
         if len(seconds) != len(files):
             raise DatasetError(f"{path} has {len(seconds)} times for {len(files)} files; write one a line.")
         return np.array(seconds, dtype=np.float64)
-    if not all(re.fullmatch(r"\d{10,19}|\d{9,10}[._]\d+", stem) for stem in files):
-        return None
-    seconds = [_seconds(stem.replace("_", ".")) for stem in files]
+    named = [TIME_IN_NAME.fullmatch(stem) for stem in files]
+    seconds = [None if match is None else _seconds((match[1] or match[2]).replace("_", ".")) for match in named]
     return None if None in seconds else np.array(seconds, dtype=np.float64)
 
 

@@ -23,7 +23,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.development import Development, ImageError, Levels
 from calibnet.datasets.images.lens import Lens
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
-from calibnet.datasets.plausibility import bit_depth, of_scan, refuse
+from calibnet.datasets.plausibility import bit_depth, mosaic, of_scan, refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 
@@ -136,7 +136,8 @@ class Bag:
             )
         points = np.concatenate([self._scan(scan) for scan in moment.scans])
         image, original, faces = self._lens(taken)
-        remarks = refuse([bit_depth(taken)], f"Image of {where}") + refuse(of_scan(points), f"Scan of {where}")
+        remarks = refuse([bit_depth(taken), mosaic(taken)], f"Image of {where}")
+        remarks += refuse(of_scan(points), f"Scan of {where}")
         return Frame(
             index=position,
             timestamp=moment.image.seconds - self.moments[0].image.seconds,

@@ -91,13 +91,8 @@ def _parts(given: Mapping[Any, Any]) -> Iterator[tuple[str, Any]]:
     """Translation and rotation under the names that `calibnet.datasets.calibration_files.values.pose` reads."""
     if set("xyz") <= set(given):
         yield "translation", [given[axis] for axis in "xyz"]
-    for key in ("translation", *values.ROTATIONS):
-        value = given.get(key)
-        if isinstance(value, Mapping) and set("xyz") <= set(value):
-            named = [value[axis] for axis in "xyzw" if axis in value]
-            yield "quaternion_xyzw" if len(named) == 4 else key, named
-        elif value is not None:
-            yield key, value
+    spelled = values.spelled_out(given)
+    yield from ((key, spelled[key]) for key in ("translation", *values.ROTATIONS) if spelled.get(key) is not None)
     for names, key in ((("qx", "qy", "qz", "qw"), "quaternion_xyzw"), (("roll", "pitch", "yaw"), "rpy_rad")):
         if set(names) <= set(given):
             yield key, [given[name] for name in names]

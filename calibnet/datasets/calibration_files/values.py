@@ -53,7 +53,9 @@ def numbers(value: Any, key: str, path: Path, *shapes: tuple[int, ...]) -> Float
 
 def pixels(value: Any, key: str, path: Path) -> int:
     """A width or height."""
-    if isinstance(value, float) and value.is_integer():
+    if (isinstance(value, float) and value.is_integer()) or (
+        isinstance(value, str) and re.fullmatch(r"\d{1,6}", value)
+    ):
         value = int(value)
     if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= 100_000:
         raise DatasetError(f"Calibration {path}: {key} is {value!r}; give a whole number of pixels.")
@@ -169,7 +171,19 @@ def pose(value: Any, path: Path, key: str) -> Transform:
     return checked_rigid(matrix, path, key)
 
 
+def spelled_out(value: Mapping[Any, Any]) -> dict[Any, Any]:
+    """The parts of a pose, with numbers that are named x, y, z (w), as ROS does, in lists."""
+    parts: dict[Any, Any] = {}
+    for key, part in value.items():
+        named = [axis for axis in "xyzw" if isinstance(part, Mapping) and axis in part]
+        numbered = [part[axis] for axis in named] if named and len(named) == len(part) else part
+        is_quaternion = key in ("rotation", "quaternion", "orientation") and len(named) == 4
+        parts["quaternion_xyzw" if is_quaternion else key] = numbered
+    return parts
+
+
 def _of_parts(value: Mapping[Any, Any], path: Path, key: str) -> Transform:
+    value = spelled_out(value)
     if "translation" not in value:
         raise DatasetError(f"Calibration {path}: {key} has no 'translation'; give x, y, z in metres.")
     if unknown := set(map(str, value)) - {"translation", *ROTATIONS}:

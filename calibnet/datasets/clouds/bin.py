@@ -28,6 +28,8 @@ NEARLY = 0.97
 """Share of the best layout's telling from which on a simpler one, or KITTI's, is as good."""
 CLEARLY = 0.8
 """Share of it above which another layout is a rival."""
+SMALLEST, LARGEST, USUAL = 1e-9, 1e9, 0.4
+"""Sizes of the numbers of a scan but 0, and the share of such ones below which they are no whole numbers."""
 FARTHEST_M = 200_000.0
 """Coordinates of a scan are smaller, in millimetres too; half a number read as one is mostly larger by far, or 0."""
 
@@ -72,6 +74,8 @@ def recognised(data: bytes) -> tuple[str, ...]:
             f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns ({DECLARE})"
         )
     values = np.frombuffer(data, "<f4")
+    if _halves_are_odd(values):
+        _check_width(data)
     if len(values) < FEWEST_VALUES:
         return KITTI if KITTI in fitting else _ask()
     levels = _levels(values[:ENOUGH_VALUES])
@@ -114,6 +118,15 @@ def _check_width(data: bytes) -> None:
         values = np.abs(np.frombuffer(data[: len(data) // 8 * 8], "<f8"))
         if len(values) >= FEWEST_VALUES and (values < FARTHEST_M).mean() > 0.99 and (values > 0.1).mean() > 0.3:
             raise CloudError("its numbers seem to be float64; write them as float32 (points.astype('float32').tofile)")
+
+
+def _halves_are_odd(values: NDArray[np.float32]) -> bool:
+    """Whether every other number is 0 or none that a scan has, as the lower halves of larger numbers are."""
+    pairs = values[: len(values) // 2 * 2].reshape(-1, 2)
+    with np.errstate(invalid="ignore"):
+        lower = np.abs(pairs[pairs.any(axis=1), 0])
+        usual = (lower > SMALLEST) & (lower < LARGEST)
+    return len(lower) > 0 and float(usual.mean()) < USUAL
 
 
 def _levels(values: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -98,7 +98,9 @@ def read_array(data: bytes) -> NDArray[np.generic]:
     length, promised = len(data) - file.tell(), math.prod(shape) * dtype.itemsize
     if dtype.hasobject:
         raise CloudError("it holds Python objects, which are not opened; save an array [N, 4] of numbers")
-    if (dtype.kind not in "fiu" and not dtype.names) or any(side < 0 for side in shape) or length != promised:
+    if dtype.kind not in "fiu" and not dtype.names:
+        raise CloudError(f"it is an array of {str(dtype)[:40]}; save an array [N, 4] of numbers")
+    if any(side < 0 for side in shape) or length != promised:
         what = f"an array {str(shape)[:60]} of {str(dtype)[:40]}"
         raise CloudError(f"its header promises {what}, of {promised} bytes, and it holds {length}")
     return np.frombuffer(data, dtype, offset=file.tell()).reshape(shape, order="F" if by_column else "C")

@@ -70,18 +70,25 @@ def full_scale_of(intensities: NDArray[np.floating]) -> float:
 
 
 def clean_points(points: NDArray[np.floating], path: Path, full_scale: float | None = None) -> NDArray[np.float32]:
-    """Drop rows of ``[N, 4]`` whose position is not finite and bring intensity to 0..1, 0 where it is not finite.
+    """Drop rows of ``[N, 4]`` that are no return, at no finite place or at 0, 0, 0, and bring intensity to 0..1.
+
+    An intensity that is not finite becomes 0.
 
     Raises:
         DatasetError: nothing is left; the message names ``path``.
     """
     if len(points) == 0:
         raise DatasetError(f"Scan {path} is empty; remove the frame or record it again.")
-    finite = np.abs(points[:, :3]) < FARTHEST_M  # false for NaN
-    if not finite.all():
-        points = points[finite.all(axis=1)]
-        if len(points) == 0:
-            raise DatasetError(f"Scan {path} has no finite point (all NaN or infinite); remove the frame.")
+    places = points[:, :3]
+    real = (np.abs(places) < FARTHEST_M).all(axis=1) & places.any(axis=1)  # false for NaN
+    if not real.any() and (np.isfinite(places).all(axis=1) & places.any(axis=1)).any():
+        raise DatasetError(
+            f"Scan {path}: its points are more than {FARTHEST_M / 1e3:.0f} km away, as those of a map are; give metres "
+            "from the LiDAR, as it stood when the picture was taken."
+        )
+    if not real.any():
+        raise DatasetError(f"Scan {path} has no finite point (all NaN, infinite or 0, 0, 0); remove the frame.")
+    points = points[real]
     clean = np.array(points, dtype=np.float32)
     intensity = clean[:, 3]
     intensity[~np.isfinite(intensity)] = 0.0

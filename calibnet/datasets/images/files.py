@@ -24,7 +24,7 @@ LARGEST_BYTES = 256 * MEGABYTE
 """Largest file of a picture."""
 MOST_PIXELS = 100_000_000
 """Most pixels of a picture: 300 MB once it is decoded."""
-FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
+FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM")
 DEPTHS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "I;16", "I;16B", "I;16L"}
 """Kinds of pixels, as Pillow calls them, that are a camera's; others have 32 bits."""
 IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, SAMPLE_FORMAT = 256, 257, 258, 339
@@ -86,7 +86,7 @@ def decode_levels(data: bytes, size: tuple[int, int] | None = None) -> Levels:
     before any pixel is decoded.
 
     Args:
-        data: of a PNG, JPEG, BMP, TIFF or WebP file.
+        data: of a PNG, JPEG, BMP, TIFF, WebP or PGM/PPM file.
         size: width and height that it must have.
 
     Raises:
@@ -108,7 +108,7 @@ def decode_levels(data: bytes, size: tuple[int, int] | None = None) -> Levels:
         except Exception:  # a header is parsed by many hands, which fail in as many ways
             raise ImageError(damaged) from None
         _check_size(image.width, image.height, size)
-        if image.mode not in DEPTHS:
+        if image.mode not in DEPTHS and not _is_deep(image, data):
             raise ImageError(f"has pixels of an unusual kind ({image.mode}); store 8 or 16 bits a channel")
         try:
             if image.format == "PNG" and _ends_flat(image) and not _is_whole(data):
@@ -190,6 +190,8 @@ def _is_deep(image: Image.Image, data: bytes) -> bool:
     """Whether a channel has 16 bits, of which Pillow keeps eight."""
     if image.format == "TIFF":
         return bool(max(getattr(image, "tag_v2", {}).get(BITS_PER_SAMPLE, (8,))) > 8)
+    if image.format == "PPM":
+        return image.mode == "I"
     return bool(image.format == "PNG" and data[24] > 8)
 
 

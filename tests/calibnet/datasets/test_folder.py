@@ -286,3 +286,14 @@ def test_two_files_of_one_stem(write_layout):
     layout.scans[0].with_suffix(".npy").write_bytes(npy(XYZ))
     with pytest.raises(DatasetError, match=r"0000\.bin and 0000\.npy"):
         layout.open()
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_pictures_in_pgm(bits, write_layout):
+    layout = write_layout("folder")
+    grey = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in layout.images]
+    for path, picture in zip(layout.images, grey, strict=True):
+        path.unlink()
+        cv2.imwrite(str(path.with_suffix(".pgm")), picture if bits == 8 else picture.astype(np.uint16) * 257)
+    for frame, picture in zip(layout.open(), grey, strict=True):
+        assert_array_equal(frame.image, np.repeat(picture[..., None], 3, axis=2))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import unicodedata
+
 import pytest
 from numpy.testing import assert_allclose
 
@@ -82,6 +84,10 @@ def test_a_large_difference_is_said_in_centimetres(write_layout):
             ["1532402927.612", "1532402927.712", "1532402927.812"],
         ),
         (["1532402927612", "1532402927712", "1532402927812"], ["1532402927_61", "1532402927_71", "1532402927_81"]),
+        (
+            [f"n015-2018-11-21-19-38-26+0800__CAM_FRONT__1532402927{tenth}12460" for tenth in (0, 1, 2)],
+            [f"top 1532402927{tenth}10460000" for tenth in (0, 1, 2)],
+        ),
     ],
 )
 def test_names_that_are_times_are_times(images, scans, write_layout):
@@ -91,6 +97,15 @@ def test_names_that_are_times_are_times(images, scans, write_layout):
     frames = list(layout.open(max_time_difference=5))
     assert [frame.index for frame in frames] == [0, 1, 2]
     assert_allclose([frame.timestamp for frame in frames], [0.0, 0.1, 0.2], atol=1e-5)
+
+
+def test_letters_with_accents_are_the_same_however_they_are_stored(write_layout):
+    """macOS stores them as two characters."""
+    layout, names = write_layout("folder"), ["ä0", "ä1", "ä2"]
+    rename(layout.images, names)
+    decomposed = [unicodedata.normalize("NFD", name) for name in names]
+    layout.scans[:] = [path.rename(path.with_stem(stem)) for path, stem in zip(layout.scans, decomposed, strict=True)]
+    assert len(list(layout.open())) == 3
 
 
 def test_dates_of_kitti_are_times(write_layout):

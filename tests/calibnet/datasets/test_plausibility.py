@@ -12,6 +12,7 @@ from calibnet.datasets.plausibility import (
     bit_depth,
     distortion,
     focal_length,
+    mosaic,
     of_camera,
     of_extrinsic,
     of_scan,
@@ -116,6 +117,15 @@ def texture(seed: int = 0) -> np.ndarray:
 )
 def test_the_picture_against_its_bits(change, found):
     assert names([bit_depth(change(texture()).astype(np.uint8))]) == found
+
+
+def test_a_picture_of_a_bayer_sensor_is_known_by_its_neighbours():
+    colours = (texture() / 16).astype(np.uint8)
+    grey = np.repeat(colours[..., 1:2], 3, axis=2)
+    raw = colours[..., 1].copy()
+    raw[0::2, 0::2], raw[1::2, 1::2] = colours[0::2, 0::2, 0], colours[1::2, 1::2, 2]
+    assert names([mosaic(np.repeat(raw[..., None], 3, axis=2))]) == [("bayer", False)]
+    assert names([mosaic(grey), mosaic(colours), mosaic(np.zeros_like(grey))]) == []
 
 
 @pytest.mark.parametrize("bits", [8, 10, 12, 14, 16])

@@ -274,6 +274,8 @@ OURS = f"width: 1280\nheight: 720\ncamera_matrix: {MATRIX.tolist()}\ndistortion:
         f"camera_from_lidar: {{translation: [0, -0.1, -0.2], rotation: {AXES.tolist()}}}",
         "camera_from_lidar: {translation: [0, -0.1, -0.2], quaternion_xyzw: [0.5, -0.5, 0.5, 0.5]}",
         "camera_from_lidar: {translation: [0, -0.1, -0.2], quaternion_wxyz: [0.5, 0.5, -0.5, 0.5]}",
+        "camera_from_lidar: {translation: {x: 0, y: -0.1, z: -0.2}, rotation: {w: 0.5, x: 0.5, y: -0.5, z: 0.5}}",
+        "camera_from_lidar: {quaternion: {x: 0.5, y: -0.5, z: 0.5, w: 0.5}, translation: {z: -0.2, y: -0.1, x: 0}}",
         "lidar_from_camera: {translation: [0.2, 0, -0.1], rpy_deg: [-90, 0, -90]}",
         "lidar_from_camera: {translation: [0.2, 0, -0.1], rpy_rad: [-1.5707963267948966, 0, -1.5707963267948966]}",
     ],

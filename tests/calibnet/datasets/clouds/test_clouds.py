@@ -16,6 +16,7 @@ from pyarrow import feather, parquet
 
 from calibnet.datasets.clouds.bin import KITTI, LAYOUTS, read_bin, recognised
 from calibnet.datasets.clouds.columns import CloudError
+from calibnet.datasets.clouds.scans import clean_points
 from calibnet.errors import DatasetError
 from tests.support.clouds import with_fields
 
@@ -67,6 +68,9 @@ def test_what_is_no_float32_is_asked_about():
 def test_float64_is_called_so(columns):
     with pytest.raises(CloudError, match="seem to be float64; write them as float32"):
         recognised(scan()[:, :columns].astype(np.float64).tobytes())
+    steps = np.round(512 * scan()[:, :columns].astype(np.float64)) / 512  # whose lower halves are mostly zeros
+    with pytest.raises(CloudError, match="seem to be float64; write them as float32"):
+        recognised(steps.tobytes())
 
 
 @pytest.mark.parametrize(("held", "named"), [(6, 4), (6, 3), (4, 5), (5, 4), (4, 3)])
@@ -252,3 +256,16 @@ def test_intensity_wider_than_eight_bits_is_scaled_by_what_is_bright(write_layou
     intensity = layout.open()[1].points[:, 3]
     assert np.median(intensity) == pytest.approx(0.5 / 0.99, rel=1e-2)
     assert intensity.max() == 1.0
+
+
+def test_points_without_a_return_are_dropped():
+    rows = scan(300)[:, :4]
+    nowhere = np.array([[0, 0, 0, 0.5], [np.nan, 1, 1, 0], [1, np.inf, 1, 0], [-3e38, 0, 0, 0]])
+    assert_array_equal(clean_points(np.vstack([nowhere, rows]), Path("a.bin")), rows)
+    with pytest.raises(DatasetError, match=r"has no finite point \(all NaN, infinite or 0, 0, 0\)"):
+        clean_points(nowhere[:3], Path("a.bin"))
+
+
+def test_points_of_a_map_are_no_scan():
+    with pytest.raises(DatasetError, match="its points are more than 100 km away, as those of a map are"):
+        clean_points(scan(300)[:, :4] + [5e5, 5e6, 100.0, 0.0], Path("a.bin"))
