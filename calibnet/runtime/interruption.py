@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 from typing import Any
 
@@ -29,6 +30,11 @@ class StopRequest:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
+
+    def wait(self) -> None:
+        """Return once a stop is requested."""
+        while not self.requested:
+            time.sleep(0.1)
 
     def _handle(self, number: int, _: FrameType | None) -> None:
         if self.requested:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import time
 from pathlib import Path
 
 import click
@@ -69,5 +68,4 @@ def view(folder: Path, in_browser: bool, headless: bool) -> None:
         say(f"{catalogue.count} drives at {catalogue.address} until Ctrl-C.")
         with open_viewer(catalogue.address, in_browser, headless) as where:
             say(where)
-            while not stop.requested:
-                time.sleep(0.1)
+            stop.wait()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import tempfile
-import time
-import webbrowser
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, fields
 from functools import partial, wraps
 from pathlib import Path
@@ -171,6 +170,7 @@ def on_a_page(session: LiveSession, open_page: bool) -> None:
     from calibnet.runtime.interruption import StopRequest
     from inspector.live.app import LiveApp
     from inspector.record.outputs import has_display
+    from inspector.serving.browser import opened_page
     from inspector.serving.server import PageServer
     from inspector.serving.viewer_files import fetch_viewer
 
@@ -179,10 +179,8 @@ def on_a_page(session: LiveSession, open_page: bool) -> None:
         try:
             with StopRequest() as stop, PageServer(LiveApp(session, Path(viewer)).asgi) as server:
                 say(f"Live at {server.address} until Ctrl-C.")
-                if open_page and has_display():
-                    webbrowser.open(server.address)
-                while not stop.requested:
-                    time.sleep(0.1)
+                with opened_page(server.address) if open_page and has_display() else nullcontext():
+                    stop.wait()
         finally:
             session.close()
 

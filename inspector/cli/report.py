@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-import time
-import webbrowser
+from contextlib import nullcontext
 from pathlib import Path
 
 import click
@@ -63,6 +62,7 @@ def serve_report(folder: Path) -> None:
     from calibnet.runtime.interruption import StopRequest
     from inspector.record.outputs import has_display
     from inspector.report.serve import report_app
+    from inspector.serving.browser import opened_page
     from inspector.serving.server import PageServer
     from inspector.serving.viewer_files import fetch_viewer
 
@@ -70,7 +70,5 @@ def serve_report(folder: Path) -> None:
         fetch_viewer(Path(viewer))
         with StopRequest() as stop, PageServer(report_app(folder, Path(viewer))) as server:
             say(f"Serving at {server.address} until Ctrl-C.")
-            if has_display():
-                webbrowser.open(server.address)
-            while not stop.requested:
-                time.sleep(0.1)
+            with opened_page(server.address) if has_display() else nullcontext():
+                stop.wait()

@@ -25,7 +25,7 @@ _OPTIONS: Mapping[str, Callable[..., Any]] = {
     ),
     "headless": click.option("--headless", is_flag=True, help="Open no window."),
     "serve": click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
-    "bind": click.option("--bind", default="127.0.0.1", show_default=True, help="Address that --serve listens on."),
+    "bind": click.option("--bind", metavar="ADDRESS", help="Address that --serve listens on.  [default: 127.0.0.1]"),
     "connect": click.option(
         "--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."
     ),
@@ -48,7 +48,7 @@ class Viewing:
     save: Path | None
     headless: bool
     serve: bool
-    bind: str
+    bind: str | None
     connect: str | None
     keep: str = ""
 
@@ -58,12 +58,15 @@ class Viewing:
         Args:
             name: of what is recorded, for that file's name.
         """
+        from inspector.programs import LOCALHOST
         from inspector.record.outputs import Outputs, has_display
 
+        if self.bind is not None and not self.serve:
+            raise click.UsageError("--bind belongs to --serve; add --serve or leave --bind out.")
         save, viewer = self.save, has_display() and not (self.headless or self.serve or self.connect)
         if save is None and (self.keep or not (viewer or self.serve or self.connect)):
             save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', self.keep or name).strip('-.')[:100] or 'run'}.rrd"
-        return Outputs(save, viewer, self.serve, self.connect, self.bind, numbered=self.save is None)
+        return Outputs(save, viewer, self.serve, self.connect, self.bind or LOCALHOST, numbered=self.save is None)
 
 
 def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -8,7 +8,6 @@ import re
 import shutil
 import tempfile
 import threading
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -61,12 +60,17 @@ class Outputs:
         """Find out before the work whether the outputs can be opened, and claim the file until `close`.
 
         Raises:
-            ConfigError: the file may not or cannot be written, or nothing listens at ``connect``.
+            ConfigError: the file may not or cannot be written, nothing listens at ``connect``, or this machine has no
+                address ``bind``.
         """
         if os.environ.get("RERUN", "").lower() in SWITCHED_OFF:
             raise ConfigError("RERUN in the environment switches Rerun off, so nothing would be recorded; unset it.")
         if self.connect is not None:
             check_viewer(self.connect)
+        if self.serve:
+            from inspector.serving.server import bound_socket  # only who serves waits for a server's import
+
+            bound_socket(self.bind).close()
         if self.file is not None:
             claim = self._claimed(self.file)
             try:
@@ -109,9 +113,9 @@ class Outputs:
     def wait_while_serving(self) -> None:
         """Return at Ctrl-C or SIGTERM; at once where nothing is served. The recording grows no more."""
         self._ended.set()
-        with StopRequest() as stop:
-            while self.page is not None and not stop.requested:
-                time.sleep(0.1)
+        if self.page is not None:
+            with StopRequest() as stop:
+                stop.wait()
 
     def complete(self) -> None:
         """The recording is closed and whole: an earlier one of its name is removed."""

@@ -27,22 +27,23 @@ def new_token() -> str:
 class Guard:
     """ASGI middleware that checks Host, Origin and token, and takes the token off the path."""
 
-    def __init__(self, app: ASGIApp, port: int, token: str, only_here: bool = True, data: str = "") -> None:
+    def __init__(self, app: ASGIApp, port: int, token: str, only_here: str | None = LOCALHOST, data: str = "") -> None:
         """Stand before an app.
 
         Args:
             app: knows nothing of the token.
             port: that the server listens on.
             token: of `new_token`.
-            only_here: the server listens on 127.0.0.1; else it may have any name, and the token alone is asked for.
+            only_here: host of the server's address, which only this machine reaches; None where others do as well: it
+                may have any name then, and the token alone is asked for.
             data: address of a server of ours, without a path, that pages may load from as well.
         """
         self._app, self._only_here = app, only_here
-        self._hosts = {f"{LOCALHOST}:{port}", f"localhost:{port}"}
+        self._hosts = {f"{host}:{port}" for host in (only_here or LOCALHOST, LOCALHOST, "localhost")}
         self._token = token
         live, pages = (" ".join(f"{scheme}://{host}" for host in sorted(self._hosts)) for scheme in ("ws", "http"))
         self._headers = {
-            "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; "
+            "content-security-policy": "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:; "
             f"connect-src 'self' data: blob: {live} {data}; frame-src {pages}; frame-ancestors {pages}; "
             "form-action 'self'; base-uri 'none'",
             "cross-origin-resource-policy": "same-origin",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import socket
 import threading
 import time
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from types import TracebackType
 
 import uvicorn
@@ -19,10 +20,41 @@ from calibnet.runtime.text import one_line
 from inspector.serving.guard import LOCALHOST, Guard, new_token
 
 PATIENCE_S = 10.0
-ANY = "0.0.0.0"
 KEEP_ALIVE_S = 15
 MOST_CONNECTIONS = 64
 """Open at the same time; others are told to come again."""
+
+
+def bound_socket(bind: str) -> socket.socket:
+    """A socket on a free port of an address of this machine.
+
+    Raises:
+        ConfigError: this machine has no such address.
+    """
+    opened = socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET)
+    try:
+        if not bind.strip():  # to the system that is every address
+            raise ValueError
+        opened.bind((bind, 0))
+    except (OSError, UnicodeError, ValueError):
+        opened.close()
+        raise ConfigError(
+            f"--bind {one_line(bind)[:100]!r} is not an address of this machine; 127.0.0.1 is for this machine alone, "
+            "0.0.0.0 for all that reach it."
+        ) from None
+    return opened
+
+
+def host_of(address: IPv4Address | IPv6Address) -> str:
+    """The host of a URL that reaches a server at an address; this machine's name, where it listens at all of them."""
+    if not address.is_unspecified:
+        return str(address) if address.version == 4 else f"[{address}]"
+    name = socket.gethostname()
+    try:
+        socket.getaddrinfo(name, None)
+    except OSError:
+        return LOCALHOST
+    return name
 
 
 class PageServer:
@@ -37,28 +69,19 @@ class PageServer:
 
         Args:
             app: to serve.
-            bind: address of this machine to listen on; of another than 127.0.0.1 whoever has the token may come.
+            bind: address of this machine to listen on; of one that others reach, whoever has the token may come.
             data: see `Guard`.
 
         Raises:
             ConfigError: this machine has no such address.
         """
-        self._socket = socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET)
-        try:
-            if not bind.strip():  # to the system that is every address
-                raise ValueError
-            self._socket.bind((bind, 0))
-        except (OSError, UnicodeError, ValueError):
-            self._socket.close()
-            raise ConfigError(
-                f"--bind {one_line(bind)[:100]!r} is no address of this machine; 127.0.0.1 is for this machine alone, "
-                "0.0.0.0 for all that reach it."
-            ) from None
-        port, token = int(self._socket.getsockname()[1]), new_token()
-        shown = LOCALHOST if bind == ANY else f"[{bind}]" if ":" in bind else bind
-        self.address = f"http://{shown}:{port}/{token}/"
+        self._socket = bound_socket(bind)
+        address, port, *_ = self._socket.getsockname()
+        token, here = new_token(), ip_address(address)
+        host = host_of(here)
+        self.address = f"http://{host}:{port}/{token}/"
         config = uvicorn.Config(
-            Guard(app, port, token, only_here=bind == LOCALHOST, data=data),
+            Guard(app, port, token, only_here=host if here.is_loopback else None, data=data),
             lifespan="off",
             log_config=None,
             access_log=False,

@@ -219,6 +219,26 @@ def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke
     assert "hourglass" not in out
 
 
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (("--bind", "0.0.0.0"), 2, "--bind belongs to --serve"),
+        (("--serve", "--bind", "999.1.1.1"), 3, "is not an address of this machine"),
+    ],
+)
+def test_an_address_to_serve_at_is_checked_before_weights_are_loaded(
+    invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], code: int, message: str
+) -> None:
+    from calibnet.cascade.cascade import Cascade
+
+    def load(*_: Any) -> None:
+        raise AssertionError("too early")
+
+    monkeypatch.setattr(Cascade, "load", staticmethod(load))
+    found, _, err = invoke("folder", str(own_folder), *options)
+    assert (found, message in err) == (code, True), err
+
+
 def test_a_run_without_room_for_an_index_ends_with_its_result_and_report(
     invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

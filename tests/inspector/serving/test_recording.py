@@ -116,7 +116,7 @@ def test_one_port_behind_the_guard_and_no_process(tmp_path: Path, monkeypatch: p
 
 @pytest.mark.parametrize("bind", ["999.1.1.1", "nonsense", "", " ", "198.51.100.7", "a\nb", "x" * 300, "1:2:3"])
 def test_an_address_that_is_none_is_one_sentence(bind: str) -> None:
-    with pytest.raises(ConfigError, match=r"^--bind [^\n]+ is no address of this machine; [^\n]+\.$"):
+    with pytest.raises(ConfigError, match=r"^--bind [^\n]+ is not an address of this machine; [^\n]+\.$"):
         PageServer(Starlette(), bind)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import socket
+import stat
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
@@ -16,6 +17,7 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from inspector.serving.browser import opened_page
 from inspector.serving.server import PageServer
 
 
@@ -110,3 +112,37 @@ def test_it_ends_with_its_context() -> None:
     waiting.close()  # a client that says nothing does not hold it
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection((str(address.hostname), int(address.port or 0)), timeout=5)
+
+
+@pytest.mark.parametrize("bind", ["localhost", "127.0.0.2", "::1"])
+def test_other_addresses_of_this_machine_alone_are_guarded_alike(bind: str) -> None:
+    with PageServer(Starlette(routes=[Route("/", page)]), bind) as running:
+        assert status(running) == 200
+        assert status(running, Host=f"evil.example:{urlsplit(running.address).port}") == 403
+
+
+@pytest.mark.parametrize(("bind", "shown"), [("0.0.0.0", ""), ("::", ""), ("::1", "::1"), ("localhost", "127.0.0.1")])
+def test_the_printed_address_is_one_to_come_to(bind: str, shown: str) -> None:
+    with PageServer(Starlette(routes=[Route("/", page)]), bind) as running:
+        assert urlsplit(running.address).hostname == (shown or socket.gethostname().lower())
+        assert status(running) == 200
+
+
+def test_pages_may_compile_the_viewer_and_evaluate_nothing_else(server: PageServer) -> None:
+    address = urlsplit(server.address)
+    connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=10)
+    connection.request("GET", address.path)
+    policy = str(connection.getresponse().headers["content-security-policy"])
+    connection.close()
+    assert "'wasm-unsafe-eval'" in policy and "'unsafe-eval'" not in policy
+
+
+def test_the_token_is_on_no_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    with opened_page("http://127.0.0.1:1/secret/") as file:
+        (given,) = opened
+        assert "secret" not in given and given == file.as_uri()
+        assert "http://127.0.0.1:1/secret/" in file.read_text()
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600 and stat.S_IMODE(file.parent.stat().st_mode) == 0o700
+    assert not file.exists()
