@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from calibnet.geometry import CameraModel, pose_error
+from calibnet.geometry import CameraModel, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.markdown import markdown_table
@@ -55,6 +55,11 @@ class CameraResult:
     residual: Residual = field(default_factory=Residual)
     reference: Extrinsic | None = field(default=None, repr=False)
 
+    @property
+    def error(self) -> PoseError | None:
+        """Of what was found; None where no reference is known."""
+        return None if self.reference is None else pose_error(self.verdict.camera_from_lidar, self.reference)
+
     def line(self) -> str:
         """A sentence for the terminal."""
         turned, shifted = self.verdict.moved
@@ -64,9 +69,8 @@ class CameraResult:
         if self.residual.rotation_deg is not None:
             alone = f"{self.residual.rotation_deg:.2f}° / {self.residual.translation_cm:.1f} cm"
             said += f", {alone} from what its own frames say"
-        if self.reference is not None:
-            error = pose_error(self.verdict.camera_from_lidar, self.reference)
-            said += f", off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        if self.error is not None:
+            said += f", off the reference by {self.error.rotation_deg:.2f}° / {self.error.translation_cm:.1f} cm"
         return f"{said}." if self.verdict.word == ACCEPTED else f"{said}. {explained(self.verdict)}"
 
     def row(self) -> list[str]:
@@ -75,9 +79,8 @@ class CameraResult:
         residual, sure, off = self.residual, "", ""
         if self.verdict.covariance is not None:
             sure = f"{self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm"
-        if self.reference is not None:
-            error = pose_error(self.verdict.camera_from_lidar, self.reference)
-            off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        if self.error is not None:
+            off = f"{self.error.rotation_deg:.2f}° / {self.error.translation_cm:.1f} cm"
         alone = (
             "" if residual.rotation_deg is None else f"{residual.rotation_deg:.2f}° / {residual.translation_cm:.1f} cm"
         )
@@ -139,19 +142,36 @@ class RigResult:
         yield from (camera.line() for camera in self.cameras)
         yield f"Verdict: {self.word}, of {len(self.cameras)} cameras {self.how}."
 
-    def markdown(self) -> Iterator[str]:
-        """The verdict and a table, for the viewer."""
+    @property
+    def headline(self) -> str:
+        """How the cameras were solved, and how far from the truth they are at most or, unknown, from the start."""
+        said = f"{len(self.cameras)} cameras, solved {self.how}"
+        errors = [camera.error for camera in self.cameras if camera.error is not None]
+        if len(errors) == len(self.cameras):
+            far = max(error.rotation_deg for error in errors), max(error.translation_cm for error in errors)
+            return f"{said}: {far[0]:.2f}° / {far[1]:.1f} cm off the reference{self._at_most}."
+        turned, shifted = (max(camera.verdict.moved[i] for camera in self.cameras) for i in (0, 1))
+        return f"{said}: corrected by {turned:.2f}° / {shifted:.1f} cm{self._at_most}."
+
+    @property
+    def _at_most(self) -> str:
+        return "" if self.rigid and not self.tolerance else " at most"
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Columns that say something, and a row per camera, whose name is without the words that all begin with."""
         rows = [camera.row() for camera in self.cameras]
         kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
-        yield from (f"# {self.word.capitalize()}", "", f"{len(rows)} cameras, solved {self.how}.", "")
         names = [camera.name for camera in self.cameras]
         alike = next((place for place, letters in enumerate(zip(*names, strict=False)) if len(set(letters)) > 1), 0)
-        words = max(names[0].rfind(mark, 0, alike) for mark in "-_. ") + 1  # that all names begin with
+        words = max(names[0].rfind(mark, 0, alike) for mark in "-_. ") + 1
         for row in rows:
             row[0] = row[0][words:]
-        yield from markdown_table(
-            [COLUMNS[column] for column in kept], [[row[column] for column in kept] for row in rows]
-        )
+        return [COLUMNS[column] for column in kept], [[row[column] for column in kept] for row in rows]
+
+    def markdown(self) -> Iterator[str]:
+        """The verdict and a table, for the viewer."""
+        yield from (f"# {self.word.capitalize()}", "", self.headline, "")
+        yield from markdown_table(*self.table())
         yield ""
         for reason in dict.fromkeys(explained(camera.verdict) for camera in self.cameras):
             yield from (reason, "")

@@ -14,7 +14,7 @@ from inspector.report.pictures import draw_overlay
 from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
 from inspector.report.verdict import GRADES
 from inspector.report.write import PICTURES, RECORDING, write_files
-from inspector.rig_result import COLUMNS, CameraResult
+from inspector.rig_result import CameraResult
 from inspector.verdicts import explained
 
 
@@ -47,7 +47,8 @@ def _draw(rig: RecordedRig, number: int, camera: CameraResult, folder: Path) -> 
     moments = rig.moments[camera.name]
     index = moments[len(moments) // 2]
     image, sides = pictures.image(index), list[Side]()
-    shown = {"as given": entities.OVERLAY_MISCALIBRATED, camera.verdict.word: entities.OVERLAY_CORRECTED}
+    result = f"corrected, {camera.verdict.word}"
+    shown = {"as given": entities.OVERLAY_MISCALIBRATED, result: entities.OVERLAY_CORRECTED}
     for side, (name, entity) in zip(("left", "right"), shown.items(), strict=True):
         file = f"{PICTURES}/camera_{number}_{side}.jpg"
         write_whole(folder / file, draw_overlay(image, *pictures.overlay(entity, index), size), Kind.JPEG)
@@ -58,14 +59,14 @@ def _draw(rig: RecordedRig, number: int, camera: CameraResult, folder: Path) -> 
 def _page(rig: RecordedRig, figures: list[str], recording_bytes: int) -> str:
     solved = rig.solved
     sections = template("rig.html").substitute(
-        table=_table(solved.cameras), figures="\n".join(figures), scale=scale_of_depth()
+        table=_table(*solved.table()), figures="\n".join(figures), scale=scale_of_depth()
     )
     head = Head(
         title=f"{rig.title}: calibration report",
         kind="Camera–LiDAR calibration report of a rig",
         word=solved.word,
         reasons="\n".join(_reasons(solved.cameras)),
-        headline=f"{len(solved.cameras)} cameras, solved {solved.how}.",
+        headline=solved.headline,
         findings="",
         about=rig.title,
         metrics="verdict, extrinsic and covariance of every camera.",
@@ -83,9 +84,12 @@ def _reasons(cameras: tuple[CameraResult, ...]) -> Iterator[str]:
         yield f'<li class="{GRADES[of[0].verdict.word]}">{escape(names + reason)}</li>'
 
 
-def _table(cameras: tuple[CameraResult, ...]) -> str:
-    rows = [camera.row() for camera in cameras]
-    kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
-    head = "".join(f"<th>{escape(COLUMNS[column])}</th>" for column in kept)
-    body = "\n".join(f"<tr>{''.join(f'<td>{escape(row[column])}</td>' for column in kept)}</tr>" for row in rows)
-    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+def _table(columns: list[str], rows: list[list[str]]) -> str:
+    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
+    body = "\n".join(f"<tr>{''.join(f'<td>{escape(_whole(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    return f'<table class="figures">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>'
+
+
+def _whole(cell: str) -> str:
+    """A cell in which no unit is torn from its number."""
+    return cell.replace(" cm", "\u00a0cm").replace(" px", "\u00a0px")

@@ -64,4 +64,4 @@ def _cell(text: str, more: bool = False) -> str:
 def _table(heads: Iterable[Iterable[str]], rows: Iterable[str]) -> str:
     head = "".join(f"<tr>{''.join(cells)}</tr>" for cells in heads)
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return f'<table class="figures"><thead>{head}</thead><tbody>{body}</tbody></table>'
+    return f'<table class="figures stages"><thead>{head}</thead><tbody>{body}</tbody></table>'

@@ -75,7 +75,7 @@ class Summary:
             error = observation.error(extrinsic)
             if error is not None:
                 errors.append(error)
-        self._milliseconds["shared"].append(sum(trace.milliseconds.values()))
+        self._milliseconds["image and scan"].append(sum(trace.milliseconds.values()))
         for stage in trace.stages:
             self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
 

@@ -78,7 +78,9 @@ def log_once(rec: Subtree, layout: Layout) -> None:
         log_names(rec, LEGEND_SLICES, marks | true)
     if Part.VOLUMES in layout.contents.parts:
         log_map_legends(rec)
-        log_names(rec, LEGEND_WINDOW, {"its cell": CELL_FRAME, "now": colors.INITIAL, "won": colors.FOUND} | true)
+        log_names(
+            rec, LEGEND_WINDOW, {"cell shown": CELL_FRAME, "point now": colors.INITIAL, "found": colors.FOUND} | true
+        )
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
@@ -103,8 +105,7 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
         name = "Which displacement won" if Part.TENSORS in parts else stage.title
         pages.append(_maps_page(stage, layout, name))
     if Part.TENSORS in parts:
-        slices = rrb.Grid(*(_slices_view(stage.number, grid) for grid in stage.grids), grid_columns=2)
-        pages.append(with_legend(slices, legend("Framed tiles", LEGEND_SLICES), "All displacements"))
+        pages.append(with_legend(_slices(stage), legend("Framed tiles", LEGEND_SLICES), "All displacements"))
         rows = (_tensor_row(stage.number, grid) for grid in stage.grids)
         pages.append(rrb.Vertical(*rows, name="One displacement, by sliders"))
         return rrb.Tabs(*pages, name=stage.title)
@@ -134,8 +135,14 @@ def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
     return rrb.Horizontal(*views, column_shares=[3.0] * (len(views) - 1) + [2.6])
 
 
+def _slices(stage: StageLayout) -> View:
+    """The finest scale large, the others beside it."""
+    finest, *others = (_slices_view(stage.number, grid) for grid in stage.grids)
+    return rrb.Horizontal(finest, rrb.Vertical(*others), column_shares=[2.0, 1.0]) if others else finest
+
+
 def _slices_view(number: int, grid: Grid) -> View:
-    every = f"{scale_name(grid)}: a tile a displacement, dx → dy ↓; bright = probable"
+    every = f"{scale_name(grid)}: a tile for each displacement, dx → dy ↓; bright = probable"
     return image_view(every, entities.of_scale(number, grid.stride, SLICES))
 
 
@@ -203,7 +210,7 @@ def _log_window(rec: Subtree, number: int, scale: ScaleTrace, window: SearchWind
 
 def _log_tensors(rec: Subtree, number: int, scale: ScaleTrace) -> None:
     """The volume before and after aggregation as it is."""
-    low, high = colors.robust_limits(scale.volume)
+    low, high = colors.robust_limits(scale.volume)[0], float(scale.volume.max())  # most of the highest are in one slice
     raw = rr.Tensor(scale.volume, dim_names=TENSOR_DIMENSIONS, value_range=(low, max(high, low + 1e-3)))
     rec.log(entities.of_scale(number, scale.stride, COST_VOLUME), raw)
     aggregated = rr.Tensor(scale.probability, dim_names=TENSOR_DIMENSIONS)

@@ -33,7 +33,7 @@ PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm",
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
 LEGEND_CURVES = "legend/drive"
 """The names of the curves in their colours."""
-CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT}
+CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT, "zero": colors.INITIAL}
 """Curves of every parameter, with their colours."""
 
 
@@ -48,7 +48,7 @@ def parameter(name: str) -> str:
 
 
 def curve(name: str, kind: str) -> str:
-    """A parameter's curve: ``estimate``, or the ``upper`` or ``lower`` end of its uncertainty."""
+    """A parameter's curve: ``estimate``, the ``upper`` or ``lower`` end of its uncertainty, or ``zero``."""
     return f"{parameter(name)}/{kind}"
 
 
@@ -60,11 +60,12 @@ def wanted(layout: Layout) -> bool:
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log the names and colours of the curves."""
     names = {"estimate from the frames so far": colors.FOUND, "± one standard deviation": colors.LIMIT}
+    names[_zero(layout)] = colors.INITIAL
     log_names(rec, LEGEND_CURVES, names | frames_named(layout))
     rec.log_once(entities.DRIVE_TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
     for name in PARAMETERS:
         for kind, color in CURVES.items():
-            label = {"upper": "+1σ", "lower": "-1σ"}.get(kind, kind)
+            label = {"upper": "+1σ", "lower": "-1σ", "zero": _zero(layout)}.get(kind, kind)
             width = 2.5 if kind == "estimate" else 1.0
             rec.log_once(curve(name, kind), rr.SeriesLines(names=label, colors=color, widths=width))
 
@@ -101,20 +102,24 @@ def log_drive(
         error = pose_error(current.camera_from_lidar, origin)
         for name in PARAMETERS:
             value, band = offset(error, name), deviation(current, name)
-            for kind, level in (("estimate", value), ("upper", value + band), ("lower", value - band)):
+            for kind, level in zip(CURVES, (value, value + band, value - band, 0.0), strict=True):
                 rec.log(curve(name, kind), rr.Scalars(level))
 
 
 def view(layout: Layout) -> View:
     """The verdict beside six plots: a good calibration runs into zero, inside its band."""
-    zero = "the reference" if layout.has_reference else "the estimate from all frames"
     views = [
-        curve_view(f"{name.capitalize()} off {zero} [{unit}]", f"/{parameter(name)}")
+        curve_view(f"{name.capitalize()} off {_zero(layout)} [{unit}]", f"/{parameter(name)}")
         for name, unit in PARAMETERS.items()
     ]
     text = rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="Verdict")
     curves = with_legend(rrb.Grid(*views, grid_columns=3), legend("Curves", LEGEND_CURVES), "Curves")
     return rrb.Horizontal(text, curves, column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)
+
+
+def _zero(layout: Layout) -> str:
+    """What the curves are relative to."""
+    return "the reference" if layout.has_reference else "the estimate from all frames"
 
 
 def log_drive_overlay(rec: Subtree, observation: Observation, contents: Contents, verdict: Verdict | None) -> None:
@@ -146,7 +151,7 @@ def _lines(
     else:
         lines += [f"{solved.capitalize()}.", ""]
     if remarks:
-        lines += [f"Each frame alone: {' '.join(remarks)}", ""]
+        lines += [f"**One by one.** {' '.join(remarks)}", ""]
     if estimate.skipped:
         lines += ["Skipped:", "", *(f"- frame {bad.frame}: {bad.why}" for bad in estimate.skipped), ""]
     return [*lines, *matrix_lines("The drive's", estimate.camera_from_lidar), ""]

@@ -254,7 +254,7 @@ def test_the_report_of_a_rig_shows_all_its_cameras(rig: Path, invoke: Invoke) ->
     code, _, err = invoke("report", "rig.rrd", "--out", "page")
     assert code == 0, err
     page = Path("page/index.html").read_text()
-    assert "2 cameras, solved as one rigid rig." in page and "Accepted" in page
+    assert "2 cameras, solved as one rigid rig: corrected by " in page and "Accepted" in page
     for number, name in enumerate(("left", "right")):
         assert f"<b>{name}</b>" in page and f"<td>{name}</td>" in page
         for side in ("left", "right"):

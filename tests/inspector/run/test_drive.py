@@ -86,7 +86,7 @@ def test_the_answer_has_the_matrix_and_the_frames_beside_it(file: Path, recorded
 
 def test_a_report_shows_the_drives_result_and_beside_it_each_frames_own(recorded: RecordedRun, tmp_path: Path) -> None:
     page = write_report(recorded, tmp_path / "report").read_text(encoding="utf-8")
-    assert "0.10° / 0.0\u00a0cm whole drive as one, " in page and "Whole drive as one against" in page
+    assert "0.10° / 0.0\u00a0cm whole drive as one; " in page and "Whole drive as one against" in page
     shown = {file.name: file.read_bytes() for file in (tmp_path / "report" / "pictures").iterdir()}
     assert shown["worst_whole-drive-as-one.jpg"] != shown["worst_this-frame-alone.jpg"]
     assert "worst_corrected.jpg" not in shown
