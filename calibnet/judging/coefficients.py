@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from calibnet.errors import WeightsError
+from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.covariance import CovarianceModel
@@ -20,9 +20,13 @@ from calibnet.judging.lens_causes import FAULTS, LensOdds
 from calibnet.judging.lens_predictors import LensPredictors
 from calibnet.judging.predictors import Predictors
 from calibnet.runtime.reading import parse_toml, read_text
+from calibnet.runtime.schema import validated
 from calibnet.runtime.writing import write_whole
 from calibnet.weights.fingerprint import fingerprint
 from calibnet.weights.manifest import PACKAGE, Manifest
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 HEAD = (
     "# How verdicts on the weights beside this file are made; `calib-inspect fit-verdict` writes it.\n"
@@ -121,35 +125,49 @@ def load_coefficients(manifest: Manifest, folder: Path | None = None) -> Coeffic
     return Coefficients(missing=other or f"The verdict has not been fitted to the weights in {where}; {mend}.")
 
 
+@dataclass(frozen=True)
+class _Drive(Classifier):
+    inflation: float = 1.0
+
+
+@dataclass(frozen=True)
+class _File:
+    """What a file of coefficients holds."""
+
+    weights: dict[str, str]
+    frame: Classifier
+    covariance: CovarianceModel
+    lens: LensOdds | None = None
+    drive: _Drive | None = None
+    fitted: dict[str, Any] = field(default_factory=dict)
+
+
 def _read(path: Path) -> Coefficients:
-    remedy = "fit them again with `calib-inspect fit-verdict`"
-    text = read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy)
+    origin, remedy = f"File of a verdict's coefficients {path}", "fit them again with `calib-inspect fit-verdict`"
     try:
-        content = parse_toml(text)
-        frame = _classifier(content["frame"], Predictors)
-        drive = content.get("drive", {})
-        inflation = drive.pop("inflation", 1.0)
-        of_drive = _classifier(drive, DrivePredictors) if drive else None
-        lens = _lens(content["lens"]) if "lens" in content else None
-        weights = {MiscalibrationRange.parse(range_): of for range_, of in content["weights"].items()}
-        covariance, fitted = CovarianceModel(**content["covariance"]), content.get("fitted", {})
-        return Coefficients(frame, covariance, lens, of_drive, inflation, weights, "", fitted)
-    except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise WeightsError(f"{path} holds no coefficients of a verdict ({error}); {remedy}.") from None
+        content = parse_toml(read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy))
+        read = validated(_File, content, origin, WeightsError, remedy)
+        _require_known(read.frame.weights, Predictors)
+        if read.lens is not None:
+            _require_faults(read.lens)
+        drive = None
+        if read.drive is not None:
+            _require_known(read.drive.weights, DrivePredictors)
+            drive = Classifier(**{one.name: getattr(read.drive, one.name) for one in fields(Classifier)})
+        weights = {MiscalibrationRange.parse(range_): mark for range_, mark in read.weights.items()}
+    except (ValueError, ConfigError) as error:
+        raise WeightsError(f"{origin}: {error}; {remedy}.") from None
+    inflation = 1.0 if read.drive is None else read.drive.inflation
+    return Coefficients(read.frame, read.covariance, read.lens, drive, inflation, weights, "", read.fitted)
 
 
-def _lens(content: dict[str, Any]) -> LensOdds:
-    odds = LensOdds(**content)
-    known = {field.name for field in fields(LensPredictors)}
+def _require_faults(odds: LensOdds) -> None:
     if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
-        raise KeyError(f"faults of the lens are {', '.join(FAULTS)}")
-    if unknown := {name for weights in odds.weights.values() for name in weights} - known:
-        raise KeyError(f"there is no predictor {', '.join(sorted(unknown))}")
-    return odds
+        raise ValueError(f"faults of the lens are {', '.join(FAULTS)}")
+    for weights in odds.weights.values():
+        _require_known(weights, LensPredictors)
 
 
-def _classifier(content: dict[str, Any], predictors: type[Predictors | DrivePredictors]) -> Classifier:
-    classifier = Classifier(**content)
-    if unknown := classifier.weights.keys() - {field.name for field in fields(predictors)}:
-        raise KeyError(f"there is no predictor {', '.join(sorted(unknown))}")
-    return classifier
+def _require_known(weights: Mapping[str, float], predictors: type[DataclassInstance]) -> None:
+    if unknown := weights.keys() - {field.name for field in fields(predictors)}:
+        raise ValueError(f"there is no predictor {', '.join(sorted(unknown))}")
