@@ -25,7 +25,7 @@ from calibnet.judging.covariance import CovarianceModel
 from calibnet.network.batch import Cut, lidar_input, make_batch
 from calibnet.network.displacement import DisplacementField, expected_error
 from calibnet.network.network import CalibrationNetwork, NetworkOutput
-from calibnet.runtime.clock import Clock
+from calibnet.runtime.clock import Clock, after_each
 from calibnet.runtime.precision import autocast
 from calibnet.trace import Matches, StageTrace
 from calibnet.weights.manifest import StageSettings
@@ -179,8 +179,8 @@ class Stage:
         clock("projection")
         cut = Cut.of([lidar])
         inputs = make_batch(view.image, [lidar], [camera.matrix], cut)
-        with autocast(self.device):
-            output = self.network(inputs, view.features, keep_activations=detail, clock=clock)
+        with autocast(self.device), after_each(self.network.boxes, clock):
+            output = self.network(inputs, view.features, keep_activations=detail)
         correction = self._correction(output)
         if not np.isfinite(correction).all():
             raise CalibrationError(

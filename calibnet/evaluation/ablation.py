@@ -16,16 +16,16 @@ from calibnet.datasets import Frame
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.datasets.selection import by_rig
 from calibnet.errors import CalibrationError, WeightsError
+from calibnet.evaluation.counting import total
 from calibnet.evaluation.metrics import Metrics
 from calibnet.evaluation.runner import draw_miscalibration
 from calibnet.geometry import RANGES, MiscalibrationRange, pose_error
 from calibnet.methods.card import MethodCard
-from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.network.config import load_preset
 from calibnet.network.convolution import pack
-from calibnet.network.counting import total
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.precision import fastest
+from calibnet.training.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.weights.files import read_record, weights_path
 
 Observer = Callable[[str, int, int], None]

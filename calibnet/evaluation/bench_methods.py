@@ -6,14 +6,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from calibnet.calibrator import Calibrator
 from calibnet.cascade.cascade import Cascade
 from calibnet.evaluation.bench import BenchMethod
-from calibnet.geometry import RANGES, MiscalibrationRange, stages_within
+from calibnet.evaluation.counting import count
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, stages_within
 from calibnet.methods.card import MethodCard
 from calibnet.methods.registry import CASCADE, METHODS, accepts, open_method
-from calibnet.network.config import load_preset
-from calibnet.network.counting import total
 from calibnet.network.network import CalibrationNetwork
 from calibnet.weights import read_record, weights_path
 
@@ -60,7 +61,26 @@ class MeasuredCascade(Cascade):
 
 
 def cascade_card(cascade: Cascade, preset: str, folder: Path | None) -> MethodCard:
-    """What the stages cost together, and what their records say they were trained on."""
-    parameters, multiply_adds = total(CalibrationNetwork(load_preset(preset), RANGES[0]))  # every stage costs the same
+    """What the stages cost together for one frame, and what their records say they were trained on.
+
+    Stages count at the size of their image and with the looks that they take at most. An image branch that stages
+    share counts once: its parameters altogether, its work at each size of image.
+    """
+    parameters = multiply_adds = 0
+    branches, views = set[int](), set[tuple[int, float]]()
+    for stage, branch in zip(cascade.stages, cascade.image_branches, strict=False):
+        config, size = stage.network.config, stage.settings.image_size
+        plain = CalibrationNetwork(config, stage.range).eval()  # what runs is packed, and its products are not seen
+        input_ = PinholeCamera(config.input_width, config.input_height, np.eye(3))
+        input_ = input_.fitted(size * config.input_height, size * config.input_width, config.scales[-1])
+        image, *others = count(plain, input_.height, input_.width)
+        parameters += sum(cost.parameters for cost in others)
+        multiply_adds += stage.settings.looks * sum(cost.multiply_adds for cost in others)
+        if branch not in branches:
+            parameters += image.parameters
+        if (branch, size) not in views:
+            multiply_adds += image.multiply_adds
+        branches.add(branch)
+        views.add((branch, size))
     paths = [weights_path(preset, RANGES[number - 1], folder) for number in cascade.numbers]
-    return MethodCard.trained(len(paths) * parameters, len(paths) * multiply_adds, map(read_record, paths))
+    return MethodCard.trained(parameters, multiply_adds, map(read_record, paths))

@@ -96,4 +96,4 @@ PUBLISHED_ABLATION = {
     "hybrid-loss": PublishedAblation(20.2, 77.4, 22.6, 0.997, 0.074),
     "full": PublishedAblation(20.5, 78.3, 23.3, 0.864, 0.068),
 }
-"""The rows of the paper by the names of `calibnet.network.ablations.ABLATIONS`."""
+"""The rows of the paper by the names of `calibnet.training.ablations.ABLATIONS`."""

@@ -1,7 +1,6 @@
 """Aggregation of the cost volumes by a 3-D hourglass that fuses the scales (paper section 3.3).
 
-A volume is ``[B, Dy, Dx, h, w, C]``: for every displacement of the window and every cell a vector of channels. A
-convolution of PyTorch wants the channels before what it runs over; `convolve` gives it that view.
+A volume is ``[B, Dy, Dx, h, w, C]``: for every displacement of the window and every cell a vector of channels.
 
 A window of radius ``r`` means ``r`` cells at every scale, so the window of a coarse scale is twice as wide in pixels as
 that of the next finer one. On the way down every second displacement of the fine window lands in the centre of the
@@ -11,22 +10,17 @@ coarse one, on the way up that centre is interpolated back: scales are fused whe
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from functools import lru_cache, partial
-from typing import NamedTuple
+from collections.abc import Iterable
+from functools import partial
+from typing import NamedTuple, cast
 
-import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
-from calibnet.network.convolution import Conv3d, Pointwise
-from calibnet.network.cost_volume import TEMPERATURE
-
-
-def convolve(convolution: Callable[[Tensor], Tensor], rows: Tensor) -> Tensor:
-    """Apply to ``[N, ..., C]`` a convolution that takes ``[N, C, ...]``; the channels stay last in memory."""
-    return convolution(rows.movedim(-1, 1)).movedim(1, -1)
+from calibnet.network.convolution import Conv3d, Pointwise, channels_last_in
+from calibnet.network.cost_volume import LOGIT_SCALE, Volume
+from calibnet.network.fusion import Fusion
 
 
 class WindowConv(nn.Module):
@@ -44,7 +38,7 @@ class WindowConv(nn.Module):
     def forward(self, volume: Tensor) -> Tensor:
         """``[B, Dy, Dx, h, w, C] -> [B, Dy, Dx, h, w, C]``."""
         rows = volume.movedim(self.other, 1)
-        return convolve(self.conv, rows.flatten(0, 1)).unflatten(0, rows.shape[:2]).movedim(1, self.other)
+        return channels_last_in(self.conv, rows.flatten(0, 1)).unflatten(0, rows.shape[:2]).movedim(1, self.other)
 
 
 class VolumeBlock(nn.Module):
@@ -62,8 +56,16 @@ class VolumeBlock(nn.Module):
         return F.relu(volume + self.y(self.x(volume)), inplace=True)
 
 
+def volume_blocks(channels: int, number: int) -> nn.Sequential:
+    """So many blocks, one after the other."""
+    return nn.Sequential(*(VolumeBlock(channels) for _ in range(number)))
+
+
 class Down(nn.Conv3d):
-    """A 1x3x3 convolution of stride 2 over the displacements of a fine scale that the coarse one has too."""
+    """A 1x3x3 convolution of stride 2 over the displacements of a fine scale that the coarse one has too.
+
+    It has the weights of a 3-D convolution, and runs as the 2-D one of every displacement that it is.
+    """
 
     def __init__(self, fine: int, coarse: int) -> None:
         super().__init__(fine, coarse, (1, 3, 3), (1, 2, 2), (0, 1, 1))
@@ -72,93 +74,68 @@ class Down(nn.Conv3d):
         """``[B, Dy, Dx, h, w, C] -> [B, Dy, Dx, h/2, w/2, C']``, zeros where the coarse window reaches farther."""
         shared = volume[:, ::2, ::2]
         halve = partial(F.conv2d, weight=self.weight.squeeze(2), bias=self.bias, stride=2, padding=1)
-        halved = convolve(halve, shared.flatten(0, 2)).unflatten(0, shared.shape[:3])
+        halved = channels_last_in(halve, shared.flatten(0, 2)).unflatten(0, shared.shape[:3])
         margin = (volume.shape[1] - shared.shape[1]) // 2
         return F.pad(halved, (0, 0) * 3 + (margin, margin) * 2)
 
 
-@lru_cache(maxsize=8)
-def refinement(window: int, device: torch.device) -> Tensor:
-    """The linear map ``[D, D]``, on a device, that samples a flattened window's centre at half-cell steps."""
-    with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
-        radius = window // 2
-        position = torch.arange(-radius, radius + 1) / 2 + radius
-        along = (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
-        return torch.kron(along, along).to(device)
-
-
-def refine_window(volume: Tensor) -> Tensor:
-    """Interpolate the centre of a coarse window to the fine window; cells stay as they are."""
-    rows = volume.flatten(3).flatten(1, 2)  # [B, D, hwC]
-    return (refinement(volume.shape[1], rows.device).to(rows) @ rows).view_as(volume)
-
-
-def double(volume: Tensor) -> Tensor:
-    """Repeat every cell 2x2 times: ``[B, Dy, Dx, 2h, 2w, C]``."""
-    return volume.repeat_interleave(2, dim=4).repeat_interleave(2, dim=3)
-
-
-class Fusion(NamedTuple):
-    """A volume on the way up as the two parts that make it up.
-
-    Attributes:
-        own: ``[B, Dy, Dx, h, w, C]``, of the scale itself.
-        coarser: ``[B, Dy, Dx, h/2, w/2, C]``, what the next coarser scale adds, if anything; not interpolated yet.
-    """
-
-    own: Tensor
-    coarser: Tensor | None = None
-
-    def volume(self) -> Tensor:
-        """The sum: ``[B, Dy, Dx, h, w, C]``."""
-        return self.own if self.coarser is None else self.own + double(refine_window(self.coarser))
-
-    def read(self, head: nn.Module) -> Tensor:
-        """What a 1x1x1 convolution makes of the sum: ``[B, Dy, Dx, h, w, C']``.
-
-        It is linear and so is the interpolation. So each part is read before it is interpolated, and the sum, which at
-        the finest scale is by far the largest volume, is never made.
-        """
-        assert isinstance(head, Pointwise) and head.bias is not None
-        coarser = None if self.coarser is None else head(self.coarser) - head.bias  # which is to be added once
-        return Fusion(head(self.own), coarser).volume()
-
-
 class Hourglass(nn.Module):
-    """Down through the scales and up again, with a skip at each."""
+    """Down through the scales and up again, with a skip at each; without hierarchical fusion each scale by itself."""
 
     def __init__(self, config: NetworkConfig, blocks: int) -> None:
         super().__init__()
         channels, fuse = config.channels_at_scales, config.hierarchical_fusion
         self.convolve_finest = config.convolve_finest
-
-        def stacks(finest: int, coarser: int) -> nn.ModuleList:
-            counts = [finest] + [coarser] * (len(channels) - 1)
-            widths = zip(channels, counts, strict=True)
-            return nn.ModuleList(nn.Sequential(*(VolumeBlock(width) for _ in range(count))) for width, count in widths)
-
-        # the finest scale holds nearly all the work: it is convolved on the way up at most
-        self.down_blocks = stacks(0, blocks if fuse else 0)
-        self.up_blocks = stacks(blocks if config.convolve_finest else 0, blocks)
         steps = list(itertools.pairwise(channels)) if fuse else []
+        # the finest scale holds nearly all the work: it is convolved on the way up at most
+        self.down_blocks = nn.ModuleList(
+            volume_blocks(width, blocks if fuse and scale else 0) for scale, width in enumerate(channels)
+        )
+        self.up_blocks = nn.ModuleList(
+            volume_blocks(width, blocks if scale or config.convolve_finest else 0)
+            for scale, width in enumerate(channels)
+        )
         self.down = nn.ModuleList(Down(fine, coarse) for fine, coarse in steps)
         self.up = nn.ModuleList(Pointwise(coarse, fine) for fine, coarse in steps)
 
     def forward(self, volumes: list[Tensor]) -> list[Fusion]:
         """Volumes ``[B, Dy, Dx, h_s, w_s, C_s]``, fine to coarse, to fused volumes of the same shapes."""
-        volumes, fused = list(volumes), list[Fusion]()
+        volumes = list(volumes)
         for scale, down in enumerate(self.down, start=1):
             volumes[scale] = self.down_blocks[scale](volumes[scale] + down(volumes[scale - 1]))
-        for scale in reversed(range(len(volumes))):  # the coarsest has none to hear from; without fusion none has
-            fusion = Fusion(volumes[scale], self.up[scale](fused[0].volume()) if scale < len(self.up) else None)
+        fused = [Fusion(volume) for volume in volumes]
+        for scale in reversed(range(len(volumes))):
+            if scale < len(self.up):
+                fused[scale] = Fusion(volumes[scale], self.up[scale](fused[scale + 1].volume()))
             if scale or self.convolve_finest:
-                fusion = Fusion(self.up_blocks[scale](fusion.volume()))
-            fused.insert(0, fusion)
+                fused[scale] = Fusion(self.up_blocks[scale](fused[scale].volume()))
         return fused
 
 
+class Activations(NamedTuple):
+    """The volumes around the hourglasses, ``[B, C, D, h_s, w_s]`` per scale, fine to coarse."""
+
+    before: list[Tensor]
+    after: list[Tensor]
+
+
+class Aggregated(NamedTuple):
+    """What comes out of the hourglasses.
+
+    Attributes:
+        logits: ``[B, D, h_s, w_s]`` over the window, per scale, fine to coarse.
+        activations: only when asked for.
+    """
+
+    logits: list[Tensor]
+    activations: Activations | None
+
+
 class Aggregation(nn.Module):
-    """Volumes of all scales to aggregated volumes and matching scores."""
+    """Volumes of all scales through the hourglasses to logits.
+
+    A logit is the volume's cosine, which is trained to match by itself, and what the hourglasses add to it.
+    """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -168,21 +145,21 @@ class Aggregation(nn.Module):
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(Pointwise(width, 1) for width in channels)
 
-    def forward(
-        self, volumes: list[Tensor], scores: list[Tensor], keep_activations: bool = False
-    ) -> tuple[list[Tensor], list[Tensor], list[Tensor]]:
-        """Aggregate volumes ``[B, Dy, Dx, h_s, w_s, G + 2Cc]`` and raw scores ``[B, D, h_s, w_s]``, fine to coarse.
-
-        Returns:
-            Activations before and after the hourglasses, ``[B, Dy, Dx, h_s, w_s, C_s]``, those after only if they are
-            to be kept, and logits ``[B, D, h_s, w_s]`` over the window: the raw score, which is trained to be one by
-            itself, and what the hourglasses add to it.
-        """
-        before = [enter(volume) for enter, volume in zip(self.enter, volumes, strict=True)]
-        fused = [Fusion(volume) for volume in before]
+    def forward(self, volumes: list[Volume], keep_activations: bool = False) -> Aggregated:
+        """Aggregate volumes of all scales, fine to coarse."""
+        entered = [enter(volume.channels) for enter, volume in zip(self.enter, volumes, strict=True)]
+        fused = [Fusion(volume) for volume in entered]
         for hourglass in self.hourglasses:
             fused = hourglass([fusion.volume() for fusion in fused])
-        added = [fusion.read(head)[..., 0].flatten(1, 2) for fusion, head in zip(fused, self.score, strict=True)]
-        logits = [TEMPERATURE * raw + more for raw, more in zip(scores, added, strict=True)]
-        after = [fusion.volume() for fusion in fused] if keep_activations else []
-        return before, after, logits
+        heads = cast(Iterable[Pointwise], self.score)
+        added = [fusion.read(head)[..., 0].flatten(1, 2) for fusion, head in zip(fused, heads, strict=True)]
+        logits = [LOGIT_SCALE * volume.score + more for volume, more in zip(volumes, added, strict=True)]
+        if not keep_activations:
+            return Aggregated(logits, None)
+        after = [fusion.volume() for fusion in fused]
+        return Aggregated(logits, Activations(channels_first(entered), channels_first(after)))
+
+
+def channels_first(volumes: list[Tensor]) -> list[Tensor]:
+    """Volumes ``[B, Dy, Dx, h, w, C]`` as ``[B, C, D, h, w]``."""
+    return [volume.flatten(1, 2).movedim(-1, 1) for volume in volumes]

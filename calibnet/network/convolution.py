@@ -83,6 +83,11 @@ class Conv3d(_Convolution, nn.Conv3d):
     """3-D convolution, then an activation of `ACTIVATIONS`."""
 
 
+def channels_last_in(convolution: Callable[[Tensor], Tensor], rows: Tensor) -> Tensor:
+    """Apply to ``[N, ..., C]`` a convolution that takes ``[N, C, ...]``; the channels stay last in memory."""
+    return convolution(rows.movedim(-1, 1)).movedim(1, -1)
+
+
 class Pointwise(Conv3d):
     """A 1x1x1 convolution over channels that come last, then an activation: ``[..., C] -> [..., C']``."""
 

@@ -7,21 +7,24 @@ cells around it, and a volume is ``[B, Dy, Dx, h, w, C]``.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.network.config import NetworkConfig
 from calibnet.network.convolution import Conv2d
+from calibnet.network.features import Features
 
-TEMPERATURE = 14.0
+LOGIT_SCALE = 14.0
 """Cosines of unit-norm features become logits times this."""
 
 RUN = 16
 """Cells of a row that are compared at once, all with the image cells around any of them."""
 
 
-def surroundings(image: Tensor, height: int, radius: int) -> Tensor:
+def search_region(image: Tensor, height: int, radius: int) -> Tensor:
     """What the windows of the lowest ``height`` rows see of an image: ``[B, C, height + 2r, w + 2r]``.
 
     Zeros beside it; above, the rows that are there.
@@ -52,7 +55,7 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     def grouped(features: Tensor) -> Tensor:
         return F.pad(features, beyond).unflatten(1, (groups, -1)).movedim(2, -1)  # [B, G, h, w, C/G]: as in memory
 
-    rows = grouped(surroundings(image, height, radius)).unfold(2, window, 1).unfold(3, around, RUN).movedim(4, -1)
+    rows = grouped(search_region(image, height, radius)).unfold(2, window, 1).unfold(3, around, RUN).movedim(4, -1)
     cells = grouped(lidar).unflatten(3, (runs, RUN))
     products = cells @ rows.flatten(4, 5).transpose(-1, -2)  # [B, G, h, runs, R, Dy * (R + 2r)]
     b, g, y, run, x, _ = products.stride()
@@ -61,21 +64,43 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     return band.flatten(5)[..., :width].movedim(1, -1)
 
 
-def pairs(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
+def concatenation_volume(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
     """Every LiDAR cell and the cells of its window, both ``[B, C, Dy, Dx, h, w]``, of features ``[B, C, h, w]``."""
     window = 2 * radius + 1
-    moved = surroundings(image, lidar.shape[2], radius).contiguous().unfold(2, window, 1).unfold(3, window, 1)
+    moved = search_region(image, lidar.shape[2], radius).contiguous().unfold(2, window, 1).unfold(3, window, 1)
     moved = moved.permute(0, 1, 4, 5, 2, 3)
     return lidar.contiguous()[:, :, None, None].expand_as(moved), moved
 
 
-def matching_score(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
+def group_cosines(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
+    """The shares ``[B, Dy, Dx, h, w, groups]`` of the channel groups in the cosine of features ``[B, C, h, w]``."""
+    return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups)
+
+
+def total(shares: Tensor) -> Tensor:
+    """The cosine ``[B, D, h, w]`` from the shares of the groups: the whole vector has unit norm."""
+    return (shares.sum(-1) if shares.shape[-1] > 1 else shares[..., 0]).flatten(1, 2)
+
+
+def cosine(lidar: Tensor, image: Tensor, radius: int) -> Tensor:
     """Cosine ``[B, D, h, w]`` of every LiDAR cell with its window, from features ``[B, C, h, w]``."""
-    return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups=1)[..., 0].flatten(1, 2)
+    return total(group_cosines(lidar, image, radius, groups=1))
+
+
+class Volume(NamedTuple):
+    """The cost volume of one scale.
+
+    Attributes:
+        channels: ``[B, Dy, Dx, h, w, G + 2Cc]``, of every displacement of every LiDAR cell.
+        score: ``[B, D, h, w]``, the cosine of the two features, to which the hourglass adds.
+    """
+
+    channels: Tensor
+    score: Tensor
 
 
 class CostVolume(nn.Module):
-    """The cost volume of one scale."""
+    """Makes the cost volume of one scale."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
@@ -83,18 +108,23 @@ class CostVolume(nn.Module):
         self.reduce_lidar = Conv2d(config.feature_channels, config.concat_channels, 1)
         self.reduce_image = Conv2d(config.feature_channels, config.concat_channels, 1)
 
-    def forward(self, lidar: Tensor, image: Tensor) -> tuple[Tensor, Tensor]:
-        """Compare features ``[B, C, h, w]`` of both branches.
-
-        Returns:
-            The volume ``[B, Dy, Dx, h, w, G + 2Cc]`` and the matching score ``[B, D, h, w]``, the cosine
-            of the two features (the sum over the groups, since the whole vector has unit norm).
-        """
-        groups = correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), self.radius, self.groups)
-        score = (groups.sum(-1) if self.groups > 1 else groups[..., 0]).flatten(1, 2)
-        fixed, moved = pairs(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
+    def forward(self, lidar: Tensor, image: Tensor) -> Volume:
+        """Compare features ``[B, C, h, w]`` of both branches."""
+        shares = group_cosines(lidar, image, self.radius, self.groups)
+        fixed, moved = concatenation_volume(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
         # a group's share of the cosine is about 1/G: scaled so that all channels start alike
-        shares = groups * self.groups if self.groups > 1 else groups
+        scaled = shares * self.groups if self.groups > 1 else shares
         # a channel after the other, then channels last: four times as fast as a few channels at a time
-        parts = [shares.movedim(-1, 1), fixed.to(groups.dtype), moved.to(groups.dtype)]
-        return torch.cat(parts, dim=1).movedim(1, -1).contiguous(), score
+        parts = [scaled.movedim(-1, 1), fixed.to(shares.dtype), moved.to(shares.dtype)]
+        return Volume(torch.cat(parts, dim=1).movedim(1, -1).contiguous(), total(shares))
+
+
+class CostVolumes(nn.ModuleList):
+    """Makes those of all scales."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__(CostVolume(config) for _ in config.volume_scales)
+
+    def forward(self, features: Features) -> list[Volume]:
+        """Compare the features of both branches at every scale, fine to coarse."""
+        return [build(lidar, image) for build, lidar, image in zip(self, *features, strict=True)]

@@ -8,6 +8,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from calibnet.network.channels import PIXEL_SCALE, inverse_depth
 from calibnet.network.config import NetworkConfig
 from calibnet.network.convolution import Conv2d
 from calibnet.network.layers import ConvBlock
@@ -98,14 +99,13 @@ class DisplacementDecoder(nn.Module):
             expected.append(mean)
             peaks.append(peak)
         depth = cells[:, 2:]
-        occupied = (depth > 0).float()
         parts = [
             probabilities[0] * 4.0,
-            torch.cat(expected, dim=1) / 32.0,
+            torch.cat(expected, dim=1) / PIXEL_SCALE,
             *peaks,
             lidar_features,
-            occupied,
-            occupied * 4.0 / depth.clamp(min=1.0),
+            (depth > 0).float(),
+            inverse_depth(depth),
         ]
         inputs = torch.cat([part.to(lidar_features.dtype) for part in parts], dim=1)
         features = self.context(inputs.contiguous(memory_format=torch.channels_last))

@@ -15,6 +15,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.network.channels import PIXEL_SCALE, inverse_depth
 from calibnet.network.config import NetworkConfig
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.layers import ConvBlock
@@ -98,8 +99,8 @@ class RegressionHead(nn.Module):
 
     def forward(self, field: DisplacementField, cells: Tensor, intrinsics: Tensor) -> Pose:
         """Estimate the correction from the field and the cells' points ``[B, 3, h, w]``."""
-        inverse = 4.0 / cells[:, 2:].clamp(min=1.0) * (cells[:, 2:] > 0)
-        inputs = torch.cat([field.features, field.displacement / 32.0, field.log_scale, inverse], dim=1)
+        scaled = [field.displacement / PIXEL_SCALE, field.log_scale, inverse_depth(cells[:, 2:])]
+        inputs = torch.cat([field.features, *scaled], dim=1)
         pooled = F.adaptive_avg_pool2d(self.reduce(inputs.contiguous(memory_format=torch.channels_last)), self.POOLED)
         hidden = self.hidden(pooled.flatten(1))
         translation = self.translation(hidden).float() * self.range.translation_m
@@ -114,9 +115,9 @@ class RegressionHead(nn.Module):
 class GeometricHead(nn.Module):
     """Weighted Gauss-Newton perspective-n-point over the cells of the finest scale.
 
-    The residuals' weights come from the field's own uncertainty, softened for large residuals as a
-    Laplace likelihood wants; the range the stage was trained for enters as a weak prior, which keeps
-    translation bounded where a scene does not constrain it.
+    Residuals count in units of the field's own uncertainty, with the IRLS weights of a Charbonnier loss; the range
+    the stage was trained for enters as a weak prior, which keeps translation bounded where a scene does not constrain
+    it.
     """
 
     ITERATIONS = 5

@@ -29,7 +29,7 @@ class Target(NamedTuple):
     of_features: bool = False
 
 
-def move(correction: Tensor, points: Tensor) -> Tensor:
+def transform_points(correction: Tensor, points: Tensor) -> Tensor:
     """Apply ``[B, 4, 4]`` to ``[B, N, 3]``."""
     return points @ correction[:, :3, :3].transpose(1, 2) + correction[:, None, :3, 3]
 
@@ -37,11 +37,11 @@ def move(correction: Tensor, points: Tensor) -> Tensor:
 def true_displacement(cells: Tensor, correction: Tensor, intrinsics: Tensor) -> Tensor:
     """Pixels ``[B, 2, h, w]`` from where each cell's point is projected to where it belongs."""
     points = cells.flatten(2).transpose(1, 2)
-    offset = project_points(move(correction, points), intrinsics) - project_points(points, intrinsics)
+    offset = project_points(transform_points(correction, points), intrinsics) - project_points(points, intrinsics)
     return offset.transpose(1, 2).unflatten(2, cells.shape[2:])
 
 
-def quaternion_angle(rotation: Tensor) -> Tensor:
+def rotation_angle(rotation: Tensor) -> Tensor:
     """Angle in radians of rotations ``[B, 3, 3]``; has a gradient at zero, unlike the arccos."""
     difference = rotation - rotation.transpose(1, 2)
     sine = torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)

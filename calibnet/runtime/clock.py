@@ -3,8 +3,22 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import torch
+from torch import nn
+
+
+@contextmanager
+def after_each(parts: Mapping[str, nn.Module], done: Callable[[str], None]) -> Iterator[None]:
+    """Call ``done`` with the name of each module after each of its calls, while this lasts."""
+    handles = [module.register_forward_hook(lambda *_, part=part: done(part)) for part, module in parts.items()]
+    try:
+        yield
+    finally:
+        for handle in handles:
+            handle.remove()
 
 
 class Clock:

@@ -18,10 +18,10 @@ from calibnet.methods.learned.network import MethodNetwork
 from calibnet.methods.learned.networks import NETWORKS, method_network
 from calibnet.methods.learned.stage import MethodStage
 from calibnet.methods.learned.weights import load_method_network, method_settings
-from calibnet.network.ablations import ablated
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.text import LONGEST, one_line
+from calibnet.training.ablations import ablated
 from calibnet.training.data import Source, training_sources, validation_sequences
 from calibnet.training.devices import launch
 from calibnet.training.draws import Draws

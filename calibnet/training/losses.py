@@ -10,9 +10,9 @@ from torch import Tensor
 
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.config import NetworkConfig
-from calibnet.network.cost_volume import TEMPERATURE
+from calibnet.network.cost_volume import LOGIT_SCALE
 from calibnet.network.network import NetworkOutput
-from calibnet.network.target import Target, move, quaternion_angle, true_displacement
+from calibnet.network.target import Target, rotation_angle, transform_points, true_displacement
 from calibnet.training.recipe import LossRecipe
 
 
@@ -112,7 +112,7 @@ def cosines_loss(
     scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
 ) -> Tensor:
     """The matching loss of the features' cosines ``[B, D, h_s, w_s]``, as logits."""
-    return scores_loss([TEMPERATURE * score for score in scores], inputs, target, config, recipe)
+    return scores_loss([LOGIT_SCALE * score for score in scores], inputs, target, config, recipe)
 
 
 def feature_losses(
@@ -149,7 +149,7 @@ def hybrid_loss(
     """
     estimate, truth = output.pose.correction, target.correction
     difference = estimate @ torch.linalg.inv_ex(truth).inverse
-    angle = quaternion_angle(difference[:, :3, :3])
+    angle = rotation_angle(difference[:, :3, :3])
     offset = (estimate[:, :3, 3] - truth[:, :3, 3]).norm(dim=-1)
     zero = angle.new_zeros(())
     matching, field, points = zero, zero, zero
@@ -161,7 +161,7 @@ def hybrid_loss(
         field = displacement_loss(output, truth_here, target.visible[0], inputs.cells[0][:, 2], recipe)
         cloud = inputs.cells[-1].flatten(2).transpose(1, 2)
         occupied = cloud[..., 2] > 0
-        distance = (move(estimate, cloud) - move(truth, cloud)).norm(dim=-1) * occupied
+        distance = (transform_points(estimate, cloud) - transform_points(truth, cloud)).norm(dim=-1) * occupied
         points = distance.sum() / occupied.sum().clamp(min=1)
     return Losses(
         matching=recipe.matching * matching,

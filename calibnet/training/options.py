@@ -56,7 +56,7 @@ class TrainingOptions:
     head: Head | None = None
     """Pose head, instead of the preset's."""
     ablation: str | None = None
-    """Row of the paper's ablation, see `calibnet.network.ablations`: the preset without one of its modules."""
+    """Row of the paper's ablation, see `calibnet.training.ablations`: the preset without one of its modules."""
     image_encoder: str | None = None
     """Image encoder instead of the preset's: ``own`` starts from nothing, as other papers' networks do here."""
     uniform: bool = False

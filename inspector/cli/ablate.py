@@ -118,8 +118,8 @@ def measured(
     from calibnet.datasets import PickedFrames, select_frames
     from calibnet.evaluation.ablation import measure_ablation
     from calibnet.evaluation.bench import Bench, initial_rows
+    from calibnet.evaluation.counting import HEIGHT, WIDTH
     from calibnet.geometry import RANGES
-    from calibnet.network.counting import HEIGHT, WIDTH
     from calibnet.training.data import open_data
 
     if range_ not in RANGES:

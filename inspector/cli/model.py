@@ -21,9 +21,9 @@ def info(preset: str, json_file: str | None) -> None:
 
     Multiply-adds are those of one forward pass, one stage, at 256 x 512 pixels.
     """
+    from calibnet.evaluation.counting import HEIGHT, WIDTH, count
     from calibnet.geometry import RANGES
     from calibnet.network.config import load_preset
-    from calibnet.network.counting import HEIGHT, WIDTH, count
     from calibnet.network.network import CalibrationNetwork
 
     prepare_json(json_file)

@@ -10,8 +10,8 @@ import click
 
 from calibnet.geometry import RANGES
 from calibnet.methods.learned.networks import NETWORKS
-from calibnet.network.ablations import ABLATIONS, ablation_folder
 from calibnet.network.heads import HEADS
+from calibnet.training.ablations import ABLATIONS, ablation_folder
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE
 from inspector.cli.options import FOLDER, RANGE, SEED, NumberRange

@@ -6,15 +6,16 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from calibnet.methods.learned.network import MethodLosses, inverse_depth
+from calibnet.methods.learned.network import MethodLosses
 from calibnet.network.batch import NetworkInputs
+from calibnet.network.channels import inverse_depth
 from calibnet.network.pose import project_points
-from calibnet.network.target import move, quaternion_angle
+from calibnet.network.target import rotation_angle, transform_points
 
 
 def angles(estimate: Tensor, truth: Tensor) -> Tensor:
     """Angles ``[B]`` in radians between the rotations of ``[B, 4, 4]``: the distance of their quaternions."""
-    return quaternion_angle(estimate[:, :3, :3] @ truth[:, :3, :3].transpose(1, 2))
+    return rotation_angle(estimate[:, :3, :3] @ truth[:, :3, :3].transpose(1, 2))
 
 
 def smooth_offset(estimate: Tensor, truth: Tensor) -> Tensor:
@@ -35,14 +36,15 @@ FARTHEST_M = 100.0
 def point_distance(estimate: Tensor, truth: Tensor, cells: Tensor) -> Tensor:
     """Mean distance, metres, between where the estimate and where the truth puts the same points."""
     points, there = cloud(cells)
-    distance = (move(estimate, points) - move(truth, points)).square().sum(-1).add(1e-12).sqrt()
+    distance = (transform_points(estimate, points) - transform_points(truth, points)).square().sum(-1).add(1e-12).sqrt()
     return (distance.clamp(max=FARTHEST_M) * there).sum() / there.sum().clamp(min=1)
 
 
 def chamfer_distance(estimate: Tensor, truth: Tensor, cells: Tensor) -> Tensor:
     """Mean distance, metres, of each point to the nearest of the other cloud, both ways."""
     points, there = cloud(cells)
-    between = torch.cdist(move(estimate, points), move(truth, points), compute_mode="donot_use_mm_for_euclid_dist")
+    ours, true = transform_points(estimate, points), transform_points(truth, points)
+    between = torch.cdist(ours, true, compute_mode="donot_use_mm_for_euclid_dist")
     between = between.clamp(max=FARTHEST_M)
     pair = there[:, :, None] & there[:, None]
     between = torch.where(pair, between, torch.full_like(between, FARTHEST_M))
@@ -91,7 +93,8 @@ def photometric_error(estimate: Tensor, truth: Tensor, inputs: NetworkInputs, st
     points, there = cloud(cells)
     size = (cells.shape[2], cells.shape[3])
     above = inputs.image.shape[2] // stride - size[0]
-    maps = [splat(move(pose, points), there, inputs.intrinsics, size, stride, above) for pose in (estimate, truth)]
+    moved = (transform_points(pose, points) for pose in (estimate, truth))
+    maps = [splat(seen, there, inputs.intrinsics, size, stride, above) for seen in moved]
     occupied = (maps[0].detach() > 0) | (maps[1] > 0)
     return ((maps[0] - maps[1]).square() * occupied).sum() / occupied.sum().clamp(min=1)
 

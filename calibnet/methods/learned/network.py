@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
 from calibnet.network.batch import NetworkInputs
-from calibnet.network.features import image_channels
+from calibnet.network.channels import image_channels, inverse_depth
 from calibnet.network.pose import rigid, rotation_from_quaternion
 from calibnet.network.target import Target
 
@@ -94,17 +94,6 @@ def output_layer(inputs: int, outputs: int) -> nn.Linear:
     nn.init.normal_(layer.weight, std=1e-3)
     nn.init.zeros_(layer.bias)
     return layer
-
-
-NEAREST_M = 1.0
-"""Depths below it count as it, before they are inverted."""
-SCALE_M = 4.0
-"""Inverse depths are times this, so that they are about 1 in front of a car."""
-
-
-def inverse_depth(depth: Tensor) -> Tensor:
-    """Depths in metres to inverse depths, 0 where there is none: nearly linear in the shift of a translation."""
-    return torch.where(depth > 0, SCALE_M / depth.clamp(min=NEAREST_M), torch.zeros_like(depth))
 
 
 def fitted_image(inputs: NetworkInputs, height: int, width: int) -> Tensor:

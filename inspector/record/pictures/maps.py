@@ -15,7 +15,7 @@ from inspector import colors
 
 OPACITY = 0.62
 """Opacity of a cell that holds a point."""
-TEMPERATURE = 14.0
+LOGIT_SCALE = 14.0
 """Factor by which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
 
 
@@ -76,7 +76,7 @@ def mass_on_truth(probability: NDArray[np.floating], true: NDArray[np.floating])
 
 def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:
     """``[Dy, Dx, h, w]``: what the matching scores alone, before aggregation, would make of every displacement."""
-    scores = TEMPERATURE * scale.volume.astype(np.float32)
+    scores = LOGIT_SCALE * scale.volume.astype(np.float32)
     weights = np.exp(scores - scores.max(axis=(0, 1)))
     probability: NDArray[np.float32] = weights / weights.sum(axis=(0, 1))
     return probability

@@ -12,8 +12,8 @@ from calibnet.evaluation import ablation
 from calibnet.evaluation.ablation import measure_ablation
 from calibnet.evaluation.published import PUBLISHED_ABLATION
 from calibnet.geometry import RANGES
-from calibnet.network.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.network.network import CalibrationNetwork
+from calibnet.training.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.weights import save_network, weights_path
 from tests.support.scene import Scenes
 from tests.support.tiny import TINY

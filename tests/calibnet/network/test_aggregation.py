@@ -7,18 +7,10 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from calibnet.network.aggregation import (
-    Aggregation,
-    Down,
-    Fusion,
-    Hourglass,
-    Pointwise,
-    WindowConv,
-    double,
-    refine_window,
-)
-from calibnet.network.convolution import HAS_ONEDNN, pack
-from calibnet.network.cost_volume import TEMPERATURE
+from calibnet.network.aggregation import Aggregation, Down, Hourglass, WindowConv
+from calibnet.network.convolution import HAS_ONEDNN, Pointwise, pack
+from calibnet.network.cost_volume import LOGIT_SCALE, Volume
+from calibnet.network.fusion import Fusion, refine_window, upsample_nearest
 from tests.support.tiny import TINY
 
 
@@ -84,7 +76,7 @@ def test_windows_change_neither_cells_nor_channels() -> None:
 
 def test_doubling_repeats_cells_and_nothing_else() -> None:
     volume = noise(2, 3, 3, 2, 3, 4)
-    doubled = double(volume)
+    doubled = upsample_nearest(volume)
     assert doubled.shape == (2, 3, 3, 4, 6, 4)
     for y in range(4):
         for x in range(6):
@@ -116,7 +108,7 @@ def test_going_down_is_a_convolution_of_every_image_of_shared_displacements() ->
 def test_a_fused_volume_is_read_as_if_it_were_made() -> None:
     fusion, head = Fusion(noise(2, 5, 5, 4, 6, 3), noise(2, 5, 5, 2, 3, 3)), Pointwise(3, 2).double()
     assert fusion.coarser is not None
-    volume = fusion.own + refine_window(double(fusion.coarser))
+    volume = fusion.own + refine_window(upsample_nearest(fusion.coarser))
     torch.testing.assert_close(fusion.volume(), volume)
     for found, made in ((fusion.read(head), volume), (Fusion(fusion.own).read(head), fusion.own)):
         expected = torch.einsum("...c,kc->...k", made, head.weight.flatten(1)) + head.bias
@@ -165,7 +157,7 @@ def test_hourglass_is_that_of_the_figure(convolve_finest: bool) -> None:
     config = replace(TINY, scales=(8, 16), volume_channels=(4, 6), convolve_finest=convolve_finest)
     hourglass, (fine, coarse) = Hourglass(config, blocks=1), volumes_of((4, 6), config.window)
     coarse = hourglass.up_blocks[1](hourglass.down_blocks[1](coarse + hourglass.down[0](fine)))
-    fine = fine + double(refine_window(hourglass.up[0](coarse)))
+    fine = fine + upsample_nearest(refine_window(hourglass.up[0](coarse)))
     if convolve_finest:
         block = hourglass.up_blocks[0][0]
         fine = (fine + block.y(block.x(fine))).relu()
@@ -179,18 +171,19 @@ def test_aggregation_scores_every_displacement_of_every_scale(convolve_finest: b
     inputs = TINY.groups + 2 * TINY.concat_channels
     raw = [torch.randn(1, 25, 8 >> scale, 12 >> scale) for scale in range(3)]
     aggregation = Aggregation(replace(TINY, convolve_finest=convolve_finest, hierarchical_fusion=fuse))
-    before, after, logits = aggregation(volumes_of((inputs,) * 3, TINY.window), raw, keep_activations=True)
-    assert [tuple(volume.shape) for volume in before] == [
-        (1, 5, 5, 8, 12, 4), (1, 5, 5, 4, 6, 6), (1, 5, 5, 2, 3, 8),
-    ]  # fmt: skip
-    assert [volume.shape for volume in after] == [volume.shape for volume in before]
+    volumes = [Volume(*both) for both in zip(volumes_of((inputs,) * 3, TINY.window), raw, strict=True)]
+    logits, activations = aggregation(volumes, keep_activations=True)
+    assert activations is not None
+    shapes = [(1, 4, 25, 8, 12), (1, 6, 25, 4, 6), (1, 8, 25, 2, 3)]
+    assert [tuple(volume.shape) for volume in activations.before] == shapes
+    assert [tuple(volume.shape) for volume in activations.after] == shapes
     assert [tuple(scores.shape) for scores in logits] == [(1, 25, 8, 12), (1, 25, 4, 6), (1, 25, 2, 3)]
     for scale, (scores, scale_logits) in enumerate(zip(raw, logits, strict=True)):
         head = aggregation.score[scale]
-        added = F.conv3d(after[scale].flatten(1, 2).movedim(-1, 1), head.weight, head.bias)[:, 0]
-        torch.testing.assert_close(scale_logits, TEMPERATURE * scores + added)
-    nothing, same = aggregation(volumes_of((inputs,) * 3, TINY.window), raw)[1:]
-    assert nothing == []
+        added = F.conv3d(activations.after[scale], head.weight, head.bias)[:, 0]
+        torch.testing.assert_close(scale_logits, LOGIT_SCALE * scores + added)
+    same, nothing = aggregation(volumes)
+    assert nothing is None
     torch.testing.assert_close(same, logits)
 
 

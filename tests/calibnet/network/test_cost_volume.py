@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from calibnet.network.cost_volume import CostVolume, correlate, pairs
+from calibnet.network.cost_volume import CostVolume, concatenation_volume, correlate
 from calibnet.network.displacement import window_offsets
 from tests.support.tiny import TINY
 
@@ -52,7 +52,7 @@ def test_the_lowest_rows_see_the_image_above_them() -> None:
     lidar, image = torch.randn(2, 2, 6, 5, 7, generator=generator)
     low = lidar[:, :, 3:]
     torch.testing.assert_close(correlate(low, image, 2, 3), correlate(lidar, image, 2, 3)[:, :, :, 3:])
-    for part, whole in zip(pairs(low, image, 2), pairs(lidar, image, 2), strict=True):
+    for part, whole in zip(concatenation_volume(low, image, 2), concatenation_volume(lidar, image, 2), strict=True):
         torch.testing.assert_close(part, whole[..., 3:, :])
 
 
@@ -74,7 +74,7 @@ def test_best_match_names_where_the_image_has_the_lidar_cell() -> None:
 def test_pairs_equal_a_loop() -> None:
     torch.manual_seed(0)
     lidar, image = torch.randn(2, 2, 3, 4, 5, dtype=torch.float64)
-    volume = torch.cat(pairs(lidar, image, 2), dim=1)
+    volume = torch.cat(concatenation_volume(lidar, image, 2), dim=1)
     assert volume.shape == (2, 6, 5, 5, 4, 5)
     for dy in range(-2, 3):
         for dx in range(-2, 3):

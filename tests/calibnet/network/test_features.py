@@ -8,8 +8,9 @@ import torch.nn.functional as F
 
 from calibnet.errors import ConfigError
 from calibnet.network import efficientnet
+from calibnet.network.channels import image_channels, lidar_channels
 from calibnet.network.convolution import HAS_ONEDNN, pack
-from calibnet.network.features import FeatureExtractor, image_channels, lidar_channels
+from calibnet.network.features import FeatureExtractor
 from calibnet.network.layers import group_count, norm2d
 from tests.support.tiny import TINY
 

@@ -5,17 +5,16 @@ from dataclasses import replace
 import pytest
 import torch
 
+from calibnet.evaluation.counting import count
 from calibnet.geometry import RANGES
-from calibnet.network.aggregation import refinement
 from calibnet.network.config import load_preset
-from calibnet.network.counting import count
+from calibnet.network.fusion import refinement
 from calibnet.network.network import CalibrationNetwork
 from calibnet.network.target import Target
+from calibnet.runtime.clock import after_each
 from calibnet.training.losses import hybrid_loss
 from calibnet.training.recipe import RECIPE
 from tests.support.tiny import random_inputs, tiny_network
-
-PARTS = ["image_features", "lidar_features", "cost_volumes", "hourglass", "displacement", "pose"]
 
 
 @pytest.mark.parametrize("head", ["geometric", "regression"])
@@ -23,8 +22,10 @@ def test_output_has_the_documented_shapes(head: str) -> None:
     network = tiny_network(head=head)
     parts: list[str] = []
     with torch.inference_mode():
-        output = network(random_inputs(network.config, batch=2), clock=parts.append)
-    assert parts == PARTS
+        with after_each(network.boxes, parts.append):
+            output = network(random_inputs(network.config, batch=2))
+        network(random_inputs(network.config))
+    assert parts == ["lidar_features", "cost_volumes", "hourglass", "displacement", "pose"]
     assert output.pose.correction.shape == (2, 4, 4)
     assert output.field.displacement.shape == output.field.log_scale.shape == (2, 2, 8, 16)
     sizes = [(2, 25, 8, 16), (2, 25, 4, 8), (2, 25, 2, 4)]
@@ -49,12 +50,11 @@ def test_activations_are_kept_only_when_asked_for() -> None:
 
 def test_image_features_may_come_from_an_earlier_call() -> None:
     network = tiny_network()
-    inputs, parts = random_inputs(network.config), list[str]()
+    inputs = random_inputs(network.config)
     with torch.inference_mode():
         features = network.features.image(inputs.image)
-        reused = network(inputs, image_features=features, clock=parts.append)
+        reused = network(inputs, image_features=features)
         fresh = network(inputs)
-    assert parts == PARTS[1:]
     assert torch.equal(reused.pose.correction, fresh.pose.correction)
 
 

@@ -12,7 +12,7 @@ from calibnet.network.batch import NetworkInputs
 from calibnet.network.displacement import DisplacementField
 from calibnet.network.network import NetworkOutput
 from calibnet.network.pose import Pose
-from calibnet.network.target import Target, quaternion_angle, true_displacement
+from calibnet.network.target import Target, rotation_angle, true_displacement
 from calibnet.training.losses import Losses, balanced, displacement_loss, hybrid_loss, matching_loss, scores_loss
 from calibnet.training.recipe import RECIPE
 from tests.support.tiny import TINY, random_inputs
@@ -240,9 +240,9 @@ def test_displacement_loss_rewards_honest_uncertainty() -> None:
 def test_angle_is_exact_and_smooth_near_zero() -> None:
     for degrees in (1e-3, 0.1, 5.0, 90.0, 179.0):
         rotation = rigid((0.0, degrees, 0.0), (0, 0, 0))[:, :3, :3].double()
-        assert float(torch.rad2deg(quaternion_angle(rotation))) == pytest.approx(degrees, rel=1e-2)
+        assert float(torch.rad2deg(rotation_angle(rotation))) == pytest.approx(degrees, rel=1e-2)
     still = torch.eye(3)[None].requires_grad_()
-    quaternion_angle(still).sum().backward()
+    rotation_angle(still).sum().backward()
     assert still.grad is not None and still.grad.isfinite().all()
 
 

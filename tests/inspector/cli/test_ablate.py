@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from calibnet.geometry import RANGES
-from calibnet.network.ablations import ABLATIONS
 from calibnet.network.config import load_preset
 from calibnet.network.network import CalibrationNetwork
+from calibnet.training.ablations import ABLATIONS
 from inspector.cli.errors import run
 from inspector.cli.main import cli
 

@@ -14,7 +14,7 @@ from calibnet.geometry import RANGES
 from calibnet.methods.learned.config import MethodConfig
 from calibnet.methods.learned.networks import NETWORKS
 from calibnet.methods.learned.weights import load_method_network, load_method_stage
-from calibnet.network.ablations import ABLATIONS
+from calibnet.training.ablations import ABLATIONS
 from calibnet.training.build import build
 from calibnet.training.optimizer import update_average
 from calibnet.training.recipe import RECIPE

@@ -14,7 +14,7 @@ from inspector import colors
 from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.lettering import bar_png, font, letter_width, names_png, text_png
 from inspector.record.pictures.maps import (
-    TEMPERATURE,
+    LOGIT_SCALE,
     decidedness,
     mass_on_truth,
     matching_probability,
@@ -91,7 +91,7 @@ def test_mass_on_the_truth_is_what_lies_within_a_cell_of_it() -> None:
 def test_before_aggregation_the_scores_are_weighed_as_the_network_does() -> None:
     from calibnet.network import cost_volume
 
-    assert TEMPERATURE == cost_volume.TEMPERATURE
+    assert LOGIT_SCALE == cost_volume.LOGIT_SCALE
     volume = np.zeros((1, 3, 1, 1), np.float16)
     volume[0, 1] = 0.5
     scale = ScaleTrace(8, volume, volume, np.zeros((1, 1, 2), np.int64), volume[0], volume[0], np.ones((1, 1), bool))

@@ -9,11 +9,12 @@ import pytest
 import torch
 from torch import nn
 
+from calibnet.evaluation.counting import ModuleCost, count
 from calibnet.geometry import RANGES
-from calibnet.network.aggregation import Down, Pointwise
+from calibnet.network.aggregation import Down
 from calibnet.network.config import NetworkConfig, load_preset
+from calibnet.network.convolution import Pointwise
 from calibnet.network.cost_volume import RUN
-from calibnet.network.counting import ModuleCost, count
 from calibnet.network.network import CalibrationNetwork
 from tests.support.tiny import random_inputs, tiny_network
 

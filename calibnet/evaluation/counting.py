@@ -10,6 +10,7 @@ from torch.utils.flop_counter import FlopCounterMode
 
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.network import CalibrationNetwork
+from calibnet.runtime.clock import after_each
 
 HEIGHT, WIDTH = 256, 512
 """Input at which multiply-adds are counted: the paper's."""
@@ -35,22 +36,23 @@ def count(network: CalibrationNetwork, height: int = HEIGHT, width: int = WIDTH)
     Not counted is what the figures of this field leave out too: normalisation, activations,
     interpolation and the pose solver's 6x6 systems.
     """
-    features = network.features
+    features, boxes = network.features, network.boxes
     modules: dict[str, list[nn.Module]] = {
         "image_features": [features.image_stem, features.image_trunk],
+        **{part: [box] for part, box in boxes.items()},
         "lidar_features": [features.lidar_stem, features.lidar_trunk],
-        "cost_volumes": [network.cost_volumes],
-        "hourglass": [network.aggregation],
-        "displacement": [network.displacement],
-        "pose": [network.pose],
     }
     flops = dict.fromkeys(modules, 0)
+    inputs = empty_inputs(network, height, width)
     with torch.no_grad(), FlopCounterMode(display=False) as counter:
 
-        def clock(part: str) -> None:
+        def done(part: str) -> None:
             flops[part] += counter.get_total_flops() - sum(flops.values())
 
-        network(empty_inputs(network, height, width), clock=clock)
+        image_features = features.image(inputs.image)
+        done("image_features")
+        with after_each(boxes, done):
+            network(inputs, image_features)
     parameters = own_parameters(modules)
     return [ModuleCost(part.replace("_", " "), parameters[part], flops[part] // 2) for part in modules]
 
