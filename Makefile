@@ -31,7 +31,7 @@ lint: $(VENV)/installed-dev
 
 pictures: viewer-libraries $(VENV)/installed-dev
 	$(BIN)/calib-inspect demo --drive --headless --save recordings/pictures.rrd
-	$(BIN)/calib-inspect pictures recordings/pictures.rrd --out docs/pictures --size 1366x768 $(PICTURES:%=--tab %)
+	$(BIN)/calib-inspect pictures recordings/pictures.rrd --output docs/pictures --size 1366x768 $(PICTURES:%=--tab %)
 	$(BIN)/calib-inspect demo --range 20/1.5 --log overlays --headless --save recordings/stages.rrd
 	$(BIN)/calib-inspect pictures recordings/stages.rrd --animate docs/pictures/corrected-stage-by-stage.webp
 	$(BIN)/python .ci/live-picture docs/pictures/live.webp

@@ -144,7 +144,7 @@ KINDS = {
     "recording": Kind([sys.executable, "-c", RECORD, "run.rrd", "1000"], "2", 3.0, check_recording),
     "indexing": Kind([sys.executable, "-c", RECORD, "run.rrd", "25"], "indexing", 0.6, check_recording),
     "reporting": Kind(
-        [sys.executable, "-c", COMMAND, "report", "whole.rrd", "--out", "report"], "begun", 12.0, check_report
+        [sys.executable, "-c", COMMAND, "report", "whole.rrd", "--output", "report"], "begun", 12.0, check_report
     ),
     "exporting": Kind(
         [sys.executable, "-c", COMMAND, "export", "whole.rrd", "--format", "json", "--output", "out.json"],
@@ -153,7 +153,7 @@ KINDS = {
         check_export,
     ),
     "fleet": Kind(
-        [sys.executable, "-c", FAKED, "fleet", *CARS, "--out", "fleet", "--workers", "0"], "begun", 15.0, check_fleet
+        [sys.executable, "-c", FAKED, "fleet", *CARS, "--output", "fleet", "--workers", "0"], "begun", 15.0, check_fleet
     ),
     "live": Kind([sys.executable, "-c", FAKED, "live", "folder", CARS[0], "--no-open"], "begun", 15.0, check_cars),
 }

@@ -53,7 +53,7 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option(
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier run."
 )
-@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout, no table.")
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def ablate(
@@ -94,8 +94,7 @@ def ablate(
         content = measured(
             presets or ("compact", "paper"), range_, weights, data, frames, repeats, seed, timed, threads
         )
-    if json_file != "-":
-        print_ablation(content, console_beside(json_file))
+    print_ablation(content, console_beside(json_file))
     write_json(json_file, content)
     if markdown_file is not None:
         write(markdown_file, as_markdown(content).encode(), Kind.EXPORT)

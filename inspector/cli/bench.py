@@ -45,7 +45,9 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 
 
 @click.command()
-@click.option("--methods", default="all", show_default=True, metavar="NAME,NAME", help="Which methods; all for every.")
+@click.option(
+    "--method", "methods", multiple=True, metavar="NAME", help="Method to measure. Repeatable.  [default: all]"
+)
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option(
     "--range", "ranges", multiple=True, type=RANGE, help="Range of the miscalibrations. Repeatable.  [20/1.5, 5/0.5]"
@@ -71,7 +73,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
     help="Also measure with a grey picture and with one of another drive.  [default: yes]",
 )
 @click.option("--preset", default="compact", show_default=True, help="Network of the cascade.")
-@click.option("--weights", type=FOLDER, help="Folder of the weights of other methods.")
+@click.option("--method-weights", type=FOLDER, help="Folder of the weights of other methods.")
 @click.option(
     "--ours", multiple=True, type=NamedFolder(), help="Add a row of the cascade with the weights in DIR. Repeatable."
 )
@@ -86,7 +88,7 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 @click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def bench(
-    methods: str,
+    methods: tuple[str, ...],
     data: tuple[str, ...],
     ranges: tuple[MiscalibrationRange, ...],
     frames: str,
@@ -96,7 +98,7 @@ def bench(
     limit: float,
     audit: bool,
     preset: str,
-    weights: Path | None,
+    method_weights: Path | None,
     ours: tuple[tuple[str, Path], ...],
     masks: Path | None,
     threads: int,
@@ -132,7 +134,7 @@ def bench(
     else:
         if not data:
             raise click.UsageError("--data is needed, for instance --data kitti-raw:DIR:2011_09_26/0048.")
-        measured, bench_methods = set_up(data, ranges, frames, methods, dict(ours), preset, weights, masks)
+        measured, bench_methods = set_up(data, ranges, frames, methods, dict(ours), preset, method_weights, masks)
         measured = replace(measured, repeats=repeats, seed=seed, most=most, limit_s=limit, audit=audit)
         content = run(measured, bench_methods, threads, json_file)
     from inspector.cli.bench_tables import print_bench
@@ -149,10 +151,10 @@ def set_up(
     data: tuple[str, ...],
     ranges: tuple[MiscalibrationRange, ...],
     frames: str,
-    methods: str,
+    methods: tuple[str, ...],
     ours: dict[str, Path],
     preset: str,
-    weights: Path | None,
+    method_weights: Path | None,
     masks: Path | None,
 ) -> tuple[Bench, list[BenchMethod]]:
     """What is measured, and who."""
@@ -164,18 +166,15 @@ def set_up(
     from calibnet.methods.registry import CASCADE, METHODS
     from calibnet.training.data import open_data
 
-    names = tuple(name.strip() for name in methods.split(",") if name.strip())
-    if not names:
-        raise click.UsageError("--methods names none; leave it out for all.")
-    for name in names:
-        if name not in ("all", CASCADE) and name not in METHODS:
+    for name in methods:
+        if name != CASCADE and name not in METHODS:
             raise click.UsageError(f"There is no method {name!r}; choose from {CASCADE}, {', '.join(METHODS.names())}.")
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
     dataset, _, rest = data[0].partition(":")
     root = Path(rest.partition(":")[0])
     measured = Bench(list(sequences), ranges or (RANGES[0], RANGES[2]), beside=lambda: find_sequences(dataset, root))
-    return measured, bench_methods(names, ours, {"weights": weights, "masks": masks}, preset)
+    return measured, bench_methods(methods or ("all",), ours, {"weights": method_weights, "masks": masks}, preset)
 
 
 def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_file: str | None) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from inspector.cli.options import FOLDER, STAGES, THREADS
+from inspector.cli.options import FOLDER, STAGES, THREADS, USUAL_THREADS
 from inspector.cli.output import (
     JSON_FILE,
     console_beside,
@@ -31,15 +31,15 @@ SCENES = 4
 @click.option(
     "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Runs of each of {SCENES} frames."
 )
-@click.option("--threads", type=THREADS, help="Threads of the CPU.  [default: all cores]")
+@click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option("--stages", type=STAGES, default="1-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to time.")
-@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @overwrite_option
 def benchmark(
     repeats: int,
-    threads: int | None,
+    threads: int,
     stages: tuple[int, ...],
     preset: str,
     weights: Path | None,
@@ -59,8 +59,7 @@ def benchmark(
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
     from calibnet.evaluation import benchmark as timing
 
-    if threads is not None:
-        torch.set_num_threads(threads)
+    torch.set_num_threads(threads)
     cascade = Cascade.load(preset, stages, weights)
     for skipped in cascade.skipped:
         say(skipped.reason, err=True)

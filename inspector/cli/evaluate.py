@@ -39,11 +39,10 @@ if TYPE_CHECKING:
 @click.option(
     "--sequences",
     multiple=True,
-    metavar="NAME [NAME]...",
+    metavar="NAME,NAME",
     help="Numbers (kitti-odometry, kitti-tracking, kitti-360), DATE/DRIVE (kitti-raw), splits (kitti-object), SCENE or "
     "SCENE/CAMERA (nuscenes), folders below --root (folder and the datasets of other packages; without it --root).",
 )
-@click.argument("more", nargs=-1, metavar="")
 @click.option(
     "--camera",
     metavar="CAMERA",
@@ -57,7 +56,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within --range]")
 @click.option("--preset", default="compact", show_default=True, help="Network to measure.")
-@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]")
 @click.option(
     "--audit", is_flag=True, help="Repeat the measurement with another drive's image, a grey one, and fewer rings."
 )
@@ -93,7 +92,6 @@ def evaluate(
     dataset: str,
     root: Path,
     sequences: tuple[str, ...],
-    more: tuple[str, ...],
     camera: str | None,
     frames: str,
     range_: MiscalibrationRange,
@@ -118,7 +116,7 @@ def evaluate(
     edges and brightness), after each stage on single frames, and for every drive solved from all its frames: by
     the networks alone and, after stage 5, with its edges aligned.
     """
-    names = [part.strip() for text in (*sequences, *more) for part in text.split(",") if part.strip()]
+    names = [part.strip() for text in sequences for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [
         PickedFrames(sequence, select_frames(sequence, frames)) for sequence in open_parts(dataset, root, names, camera)
     ]

@@ -24,7 +24,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
 @click.command()
 @click.argument("recording", type=RECORDING, required=False, metavar="[RUN.rrd]")
-@click.option("--from", "folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
+@click.option("--folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
 @click.option("--format", "form", type=click.Choice(FORMATS.names()), required=True, help="What to write.")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default without a drive]")
@@ -72,7 +72,7 @@ def export(
     For the recording of a rig, --output is a folder with one file per camera, named like it; --camera chooses one.
     """
     if (recording is None) == (folder is None):
-        raise click.UsageError("Give a recording or --from FOLDER.")
+        raise click.UsageError("Give a recording or --folder DIR.")
     choices = (frame is not None) + median + drive
     if choices > 1:
         raise click.UsageError("Give one of --frame, --median and --drive.")

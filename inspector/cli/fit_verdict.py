@@ -40,7 +40,8 @@ MOST_WORKERS = 8
     help="Further drives, in addition to those of --data, best of eight or more frames. Repeatable.",
 )
 @click.option(
-    "--synthetic",
+    "--synthetic-drives",
+    "synthetic",
     type=click.IntRange(0),
     default=3,
     show_default=True,

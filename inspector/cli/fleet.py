@@ -38,7 +38,7 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
 @click.command()
 @click.argument("sources", nargs=-1, required=True, metavar="DRIVES.csv | FOLDER...")
 @click.option(
-    "--out", required=True, metavar="DIR|URL", help="Folder of all results; give the same folder to continue."
+    "--output", "out", required=True, metavar="DIR|URL", help="Folder of all results; give the same folder to continue."
 )
 @click.option(
     "--workers",

@@ -13,7 +13,7 @@ from inspector.cli.output import make_console, overwrite_option, say
 
 @click.command("fleet-simulate")
 @click.argument("count", type=click.IntRange(1, 100_000), metavar="N")
-@click.option("--out", type=FOLDER, required=True, metavar="DIR", help="New folder of the drives.")
+@click.option("--output", "out", type=FOLDER, required=True, metavar="DIR", help="New folder of the drives.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=4, show_default=True, help="Frames of each drive.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
 def simulate(count: int, out: Path, frames: int, seed: int) -> None:
@@ -32,7 +32,7 @@ def simulate(count: int, out: Path, frames: int, seed: int) -> None:
             out, count, seed, frames, lambda done, total: progress.update(task, completed=done, total=total)
         )
     say(f"{count} drives: {drives}")
-    say(f"Calibrate them: {shlex.join(['calib-inspect', 'fleet', str(drives), '--out', str(out / 'results')])}")
+    say(f"Calibrate them: {shlex.join(['calib-inspect', 'fleet', str(drives), '--output', str(out / 'results')])}")
 
 
 @click.command("fleet-report")
@@ -41,7 +41,7 @@ def simulate(count: int, out: Path, frames: int, seed: int) -> None:
 def report(folder: Path) -> None:
     """Write a page about a fleet: its cars, moves of their mounts, and every drive, worst first.
 
-    DIR is the folder given to `fleet --out`. Each drive links to its report and recording.
+    DIR is the folder given to `fleet --output`. Each drive links to its report and recording.
     """
     from inspector.fleet.page import write_page
     from inspector.fleet.table import TABLE, read_table

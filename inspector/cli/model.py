@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network: compact, paper or another preset.")
-@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout, no table.")
+@click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @overwrite_option
 def info(preset: str, json_file: str | None) -> None:
     """Print the parameters and multiply-adds of a network, by module and in total.
@@ -39,8 +39,7 @@ def info(preset: str, json_file: str | None) -> None:
         "multiply_adds": sum(cost.multiply_adds for cost in costs),
         "modules": modules,
     }
-    if json_file != "-":
-        console_beside(json_file).print(cost_table(content))
+    console_beside(json_file).print(cost_table(content))
     write_json(json_file, content)
 
 

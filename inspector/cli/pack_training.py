@@ -27,7 +27,7 @@ from inspector.cli.output import make_console
 @click.option("--after", type=FOLDER, help="Weights whose residuals are measured, which takes minutes, and packed too.")
 @click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
-@click.option("--out", type=FOLDER, required=True, help="Folder of the parts.")
+@click.option("--output", "out", type=FOLDER, required=True, help="Folder of the parts.")
 @click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Largest size of a part.")
 def pack_training(
     data: tuple[str, ...],
@@ -47,7 +47,7 @@ def pack_training(
     synthetic scenes, in parts of limited size, each of which can be used without the others.
 
     \b
-    calib-inspect pack-training --data kitti-raw:KITTI/raw --data folder:RIGS --out packed
+    calib-inspect pack-training --data kitti-raw:KITTI/raw --data folder:RIGS --output packed
     calib-inspect train --packed packed --range 5/0.5 --minutes 8 --batch 64 --workers 15
     """  # noqa: D301 - click knows a paragraph that must not be wrapped by this character
     from rich.progress import track

@@ -30,7 +30,7 @@ class SizeType(click.ParamType[tuple[int, int]]):
 
 @click.command()
 @click.argument("recording", type=RECORDING, metavar="FILE.rrd")
-@click.option("--out", type=FOLDER, metavar="DIR", help="Folder of the tabs' pictures; created if need be.")
+@click.option("--output", "out", type=FOLDER, metavar="DIR", help="Folder of the tabs' pictures; created if need be.")
 @click.option("--size", type=SizeType(), default="1920x1080", show_default=True, help="Size of the viewer's window.")
 @click.option(
     "--theme", type=click.Choice(["dark", "light"]), default="dark", show_default=True, help="Theme of the viewer."
@@ -58,10 +58,10 @@ def pictures(
     FILE.rrd is the recording of a run, a rig, a comparison, a training or of `watch`; --animate needs that of a run.
 
     Pictures of tabs need a Vulkan driver; Mesa's software driver will do (Debian: mesa-vulkan-drivers). --animate needs
-    none, and without --out takes no pictures of tabs.
+    none, and without --output takes no pictures of tabs.
     """
     if out is None and animate is None:
-        raise click.UsageError("Give --out DIR for pictures of the tabs, --animate FILE for one that moves, or both.")
+        raise click.UsageError("Give --output DIR for pictures of the tabs, --animate FILE for an animation, or both.")
     if animate is not None:
         run = open_run(recording)
         numbers = [recorded.index for recorded in run.frames]

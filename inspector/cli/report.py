@@ -14,7 +14,7 @@ from inspector.cli.output import overwrite_option, say
 
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path), metavar="RUN.rrd")
-@click.option("--out", type=FOLDER, required=True, metavar="DIR", help="Folder of the report; created if need be.")
+@click.option("--output", "out", type=FOLDER, required=True, metavar="DIR", help="Folder of the report.")
 @click.option(
     "--open",
     "serve",

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 @click.option("--prior-rotation", type=ANGLE, help="The rotation is known to this standard deviation per axis.")
 @click.option("--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to use.")
-@click.option("--weights", type=FOLDER, help="Folder of its weights.  [default: those of the package]")
+@click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The extrinsics as JSON; - for stdout.")
 @click.option(
     "--output",

@@ -102,7 +102,7 @@ def next_lines(file: Path, rig: bool = False) -> list[str]:
         else ("The result for other tools", "")
     )
     return [
-        f"A page of it: calib-inspect report {quoted} --out report/ --open",
+        f"A page of it: calib-inspect report {quoted} --output report/ --open",
         f"{what}: calib-inspect export {quoted} --format ros{where}  (or {others})",
     ]
 

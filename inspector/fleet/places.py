@@ -137,7 +137,7 @@ class Store:
             system, root = _system(self.root)
             system.makedirs(root, exist_ok=True)
         except Exception as error:
-            raise ConfigError(f"{self.root} cannot be written ({_reason(error)}); choose another --out.") from None
+            raise ConfigError(f"{self.root} cannot be written ({_reason(error)}); choose another --output.") from None
 
     def read(self, name: str, largest: int) -> bytes | None:
         """A file, or None where there is none that can be read."""

@@ -14,7 +14,7 @@ from inspector.report.metrics import State
 from inspector.report.pictures import depth_scale
 from inspector.report.verdict import GRADES
 
-SERVE_COMMAND = "calib-inspect report {recording} --out . --open"
+SERVE_COMMAND = "calib-inspect report {recording} --output . --open"
 
 
 class Head(NamedTuple):

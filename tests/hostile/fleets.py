@@ -33,7 +33,7 @@ def rows() -> Iterator[Row]:
         yield Row(f"list of drives: {what}", write, code, (words,) if words else (), ("out",))
     for memory in ("-5 potatoes", "0", "4", "1e9GB"):
         yield Row(
-            f"fleet --memory {memory}", lambda _, memory=memory: ["fleet", ".", "--out", "o", "--memory", memory], 2
+            f"fleet --memory {memory}", lambda _, memory=memory: ["fleet", ".", "--output", "o", "--memory", memory], 2
         )
     for make in (fifo, endless, dangling, loop, folder, giant):
         yield Row(f"list of drives: {make.__name__}", partial(_at, make, LIST, _fleet()), 3, (LIST,), ("out",))
@@ -41,7 +41,7 @@ def rows() -> Iterator[Row]:
 
 
 def _fleet() -> list[str]:
-    return ["fleet", LIST, "--out", "out", "--workers", "0"]
+    return ["fleet", LIST, "--output", "out", "--workers", "0"]
 
 
 def _at(make: Callable[[Path], None], name: str, command: list[str], root: Path) -> list[str]:

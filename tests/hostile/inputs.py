@@ -54,7 +54,7 @@ def car_with(usual: str, suffix: str, content: bytes) -> Build:
 def car_exported(root: Path) -> list[str]:
     """Export the calibration of a car's folder, which reads nothing else of it."""
     put(CAR, root)
-    return ["export", "--from", CAR, "--format", "json"]
+    return ["export", "--folder", CAR, "--format", "json"]
 
 
 def odometry(root: Path) -> list[str]:

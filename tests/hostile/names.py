@@ -27,7 +27,7 @@ def exported(name: str, form: str) -> Build:
 
     def made(root: Path) -> list[str]:
         put(CAR, root, name)
-        return ["export", "--from", name, "--format", form]
+        return ["export", "--folder", name, "--format", form]
 
     return made
 
@@ -65,6 +65,6 @@ def rows() -> Iterator[Row]:
         yield Row(f"a recording called {what}: JUnit", checked(name, "--junit", "out.xml"), FINE)
         yield Row(
             f"a recording called {what}: report",
-            lambda root, name=name: ["report", checked(name)(root)[1], "--out", "report"],
+            lambda root, name=name: ["report", checked(name)(root)[1], "--output", "report"],
             FINE,
         )

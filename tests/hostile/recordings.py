@@ -19,7 +19,7 @@ from tests.hostile.rows import FINE, Row, instead_of
 COMMANDS = {
     "check": ["check", "run.rrd", "--json", "-"],
     "export": ["export", "run.rrd", "--format", "json", "--force"],
-    "report": ["report", "run.rrd", "--out", "report"],
+    "report": ["report", "run.rrd", "--output", "report"],
     "compare": ["compare", "run.rrd", "other.rrd", "--save", "both.rrd", "--headless", "--common-frames"],
 }
 WRITTEN = ("report", "both.rrd")

@@ -57,7 +57,7 @@ def test_export_gives_the_drive_s_extrinsic(recording: Path) -> None:
 
 
 def test_report_and_compare_open_it(recording: Path, tmp_path: Path) -> None:
-    CliRunner().invoke(cli, ["report", str(recording), "--out", str(tmp_path / "report")])
+    CliRunner().invoke(cli, ["report", str(recording), "--output", str(tmp_path / "report")])
     assert "fake" in (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
     saved = tmp_path / "both.rrd"
     twice = [str(recording), str(recording), "--names", "a,b", "--headless", "--save", str(saved)]

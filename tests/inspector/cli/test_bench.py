@@ -30,7 +30,20 @@ def measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
     options = [word for kind, file in files.items() for word in (f"--{kind}", file)]
     code = run(
         cli,
-        ["bench", "--methods", "boaster,mover,hungry", "--data", f"folder:{folder}", "--range", "5/0.5", *options],
+        [
+            "bench",
+            "--method",
+            "boaster",
+            "--method",
+            "mover",
+            "--method",
+            "hungry",
+            "--data",
+            f"folder:{folder}",
+            "--range",
+            "5/0.5",
+            *options,
+        ],
     )
     out, err = capsys.readouterr()
     assert code == 0, err
@@ -89,8 +102,8 @@ def test_an_earlier_table_is_shown_without_measuring(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("--methods", "all"), "--data is needed"),
-        (("--methods", "nosuch", "--data", "folder:."), "There is no method 'nosuch'"),
+        ((), "--data is needed"),
+        (("--method", "nosuch", "--data", "folder:."), "There is no method 'nosuch'"),
         (("--ours", "mine", "--data", "folder:."), "is not NAME=DIR"),
         (("--data", "nothing"), "is not of the form DATASET:FOLDER"),
     ],
@@ -104,7 +117,17 @@ def test_a_method_of_another_package_is_a_row(tmp_path: Path, monkeypatch: pytes
     install_toys(tmp_path, monkeypatch)
     folder = write_folder(tmp_path / "own", 2)
     done = start(
-        tmp_path, "bench", "--methods", "nothing,broken", "--data", f"folder:{folder}", "--no-audit", "--json", "-"
+        tmp_path,
+        "bench",
+        "--method",
+        "nothing",
+        "--method",
+        "broken",
+        "--data",
+        f"folder:{folder}",
+        "--no-audit",
+        "--json",
+        "-",
     )
     assert done.returncode == 0, done.stderr
     methods = json.loads(done.stdout)["methods"]

@@ -118,7 +118,7 @@ def test_folder_to_table_and_json(rig: Path, tmp_path: Path, capsys: pytest.Capt
 def test_audit_and_names_after_the_option(rig: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(rig, rig.parent / "other")
     out = tmp_path / "audit.json"
-    where = ["--dataset", "folder", "--root", str(rig.parent), "--sequences", "rig", "other"]
+    where = ["--dataset", "folder", "--root", str(rig.parent), "--sequences", "rig,other"]
     assert run(cli, ["evaluate", *where, "--audit", "--no-classical", "--no-drives", "--json", str(out)]) == 0
     content = json.loads(out.read_text())
     assert [Path(name).name for name in content["sequences"]] == ["rig", "other"] and content["frames"] == 6

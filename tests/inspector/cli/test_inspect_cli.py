@@ -80,7 +80,7 @@ def test_without_display_and_save_the_recording_goes_to_recordings(invoke: Invok
     *before, last = out.splitlines()
     for command in (
         f"rerun {file}",
-        f"calib-inspect report {file} --out report/",
+        f"calib-inspect report {file} --output report/",
         f"calib-inspect export {file} --format",
     ):
         assert any(command in line for line in before), command

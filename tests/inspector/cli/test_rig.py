@@ -251,7 +251,7 @@ def test_what_is_rejected_of_a_rig_is_not_exported(rig: Path, invoke: Invoke, mo
 
 def test_the_report_of_a_rig_shows_all_its_cameras(rig: Path, invoke: Invoke) -> None:
     invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless")
-    code, _, err = invoke("report", "rig.rrd", "--out", "page")
+    code, _, err = invoke("report", "rig.rrd", "--output", "page")
     assert code == 0, err
     page = Path("page/index.html").read_text()
     assert "2 cameras, solved as one rigid rig: corrected by " in page and "Accepted" in page

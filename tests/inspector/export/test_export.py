@@ -193,7 +193,7 @@ def test_the_estimate_from_the_whole_drive(recorded: RecordedRun) -> None:
 def test_a_folders_calibration_keeps_its_distortion(
     export: Callable[..., str], own_folder: Path, fakes: ModuleType
 ) -> None:
-    content = json.loads(export("--from", own_folder, "--format", "json"))
+    content = json.loads(export("--folder", own_folder, "--format", "json"))
     np.testing.assert_array_equal(content["camera_from_lidar"], fakes.REFERENCE)
     assert content["distortion_coefficients"] == [-0.3, 0.1, 0.001, -0.002, 0.05]
     assert (content["image_width"], content["image_height"]) == (640, 480)
@@ -220,14 +220,14 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        ((), 2, "Give a recording or --from"),
-        (("RUN", "--from", "x"), 2, "Give a recording or --from"),
+        ((), 2, "Give a recording or --folder"),
+        (("RUN", "--folder", "x"), 2, "Give a recording or --folder"),
         (("RUN", "--frame", 1, "--median"), 2, "one of --frame, --median and --drive"),
-        (("--from", "x", "--median"), 2, "has one calibration"),
+        (("--folder", "x", "--median"), 2, "has one calibration"),
         (("RUN", "--lidar-frame", "two words"), 2, "no ROS frame name"),
         (("RUN", "--drive"), 3, "record it with --drive"),
         (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),
-        (("--from", "nowhere"), 3, "cannot be read"),
+        (("--folder", "nowhere"), 3, "cannot be read"),
         (("nowhere.rrd",), 3, "There is no recording nowhere.rrd"),
     ],
 )

@@ -32,7 +32,7 @@ def calibrate_with(folder: Path, extrinsic: np.ndarray) -> None:
 
 def test_every_folder_is_a_drive_with_a_row_and_a_folder_of_its_own(invoke: Invoke, cars: Path) -> None:
     calibrate_with(cars / "tuesday", miscalibration([0.0, 0.0, 0.0], [0.0, 0.0, 0.2]) @ REFERENCE)
-    code, out, _ = invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
+    code, out, _ = invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", *HERE)
     assert code == 0
     assert "2 of 2 drives: 1 accepted, 1 rejected" in out
     rows = rows_of(Path("all"))
@@ -48,7 +48,7 @@ def test_every_folder_is_a_drive_with_a_row_and_a_folder_of_its_own(invoke: Invo
 
 def test_a_drive_says_what_verify_says_of_it_by_hand(invoke: Invoke, cars: Path) -> None:
     calibrate_with(cars / "tuesday", miscalibration([1.0, 0.0, 0.0], [0.0, 0.0, 0.0]) @ REFERENCE)
-    invoke("fleet", str(cars / "tuesday"), "--out", "all", *HERE)
+    invoke("fleet", str(cars / "tuesday"), "--output", "all", *HERE)
     hand = (
         "verify",
         "folder",
@@ -71,7 +71,7 @@ def test_a_drive_says_what_verify_says_of_it_by_hand(invoke: Invoke, cars: Path)
 
 
 def test_the_same_call_again_does_nothing(invoke: Invoke, cars: Path, cascade: JudgedCascade) -> None:
-    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", *HERE)
     invoke(*call)
     first = rows_of(Path("all"))
     code, _, err = invoke(*call)
@@ -84,7 +84,7 @@ def test_the_same_call_again_does_nothing(invoke: Invoke, cars: Path, cascade: J
 
 
 def test_what_changed_is_done_again(invoke: Invoke, cars: Path, cascade: JudgedCascade) -> None:
-    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", *HERE)
     invoke(*call)
     calibrate_with(cars / "tuesday", miscalibration([0.0, 3.0, 0.0], [0.0, 0.0, 0.0]) @ REFERENCE)
     invoke(*call)
@@ -95,7 +95,7 @@ def test_what_changed_is_done_again(invoke: Invoke, cars: Path, cascade: JudgedC
 
 
 def test_input_that_only_looks_different_is_not_done_again(invoke: Invoke, cars: Path, cascade: JudgedCascade) -> None:
-    call = ("fleet", str(cars / "monday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), "--output", "all", *HERE)
     invoke(*call)
     os.utime(cars / "monday" / "images" / "0000.png")
     invoke(*call)
@@ -107,7 +107,7 @@ def test_input_that_only_looks_different_is_not_done_again(invoke: Invoke, cars:
 
 
 def test_results_that_are_gone_are_made_again(invoke: Invoke, cars: Path, cascade: JudgedCascade) -> None:
-    call = ("fleet", str(cars / "monday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), "--output", "all", *HERE)
     invoke(*call)
     Path("all/drives/car-a/monday/recording.rrd").unlink()
     invoke(*call)
@@ -119,7 +119,7 @@ def test_a_drive_that_cannot_be_read_is_a_row_with_its_sentence(
 ) -> None:
     for scan in (cars / "tuesday" / "clouds").iterdir():
         os.truncate(scan, 1001)
-    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", *HERE)
     code, out, err = invoke(*call)
     assert code == 0
     assert "1 accepted, 1 failed" in out
@@ -136,7 +136,7 @@ def test_a_drive_that_cannot_be_read_is_a_row_with_its_sentence(
 def test_a_fault_of_the_machine_is_tried_again_at_the_next_call(
     invoke: Invoke, cars: Path, cascade: JudgedCascade, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    call = ("fleet", str(cars / "monday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), "--output", "all", *HERE)
     tries = []
 
     def full(*_: object, **__: object) -> None:
@@ -154,7 +154,7 @@ def test_a_fault_of_the_machine_is_tried_again_at_the_next_call(
 
 
 def test_a_failure_leaves_no_report_of_an_earlier_run(invoke: Invoke, cars: Path) -> None:
-    call = ("fleet", str(cars / "monday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), "--output", "all", *HERE)
     invoke(*call)
     for scan in (cars / "monday" / "clouds").iterdir():
         os.truncate(scan, 1001)
@@ -174,7 +174,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
         return solve(self, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(JudgedCascade, "calibrate_drive", interrupted)
-    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", *HERE)
+    call = ("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", *HERE)
     monkeypatch.setattr("sys.argv", ["calib-inspect", *call, "--force"])
     code, out, err = invoke(*call, "--force")
     assert code == 130
@@ -189,7 +189,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
 def test_names_of_drives_are_quoted_in_paths(invoke: Invoke, tmp_path: Path) -> None:
     write_folder(tmp_path / "data", 2)
     Path("DRIVES.csv").write_text('path,car,drive\ndata,../../up,"<b>\n2"\n')
-    assert invoke("fleet", "DRIVES.csv", "--out", "all", *HERE)[0] == 0
+    assert invoke("fleet", "DRIVES.csv", "--output", "all", *HERE)[0] == 0
     (row,) = rows_of(Path("all")).values()
     assert row.drive == "<b>\\n2"
     assert row.folder == "drives/%2E.%2F..%2Fup/%3Cb%3E%5Cn2"
@@ -200,7 +200,7 @@ def test_a_list_of_kitti_and_folders_is_read(invoke: Invoke, cars: Path) -> None
     Path("DRIVES.csv").write_text(
         "car,drive,date,path,frames,options\na,one,2026-01-02,car-a/monday,0:2,--seed 3\nb,two,,car-a/tuesday,0,\n"
     )
-    assert invoke("fleet", "DRIVES.csv", "--out", "all", *HERE)[0] == 0
+    assert invoke("fleet", "DRIVES.csv", "--output", "all", *HERE)[0] == 0
     rows = rows_of(Path("all"))
     assert (rows["one"].car, rows["one"].date, rows["one"].selection) == ("a", "2026-01-02T00:00:00", "0:2")
     assert (rows["one"].options, rows["two"].frames) == ("--seed 3", 1)
@@ -212,7 +212,7 @@ def test_two_fleets_do_not_write_one_folder(invoke: Invoke, cars: Path) -> None:
 
     Path("all").mkdir()
     claim = Claim(Path("all/fleet.parquet"), Kind.PARQUET)
-    code, _, err = invoke("fleet", str(cars / "monday"), "--out", "all", *HERE)
+    code, _, err = invoke("fleet", str(cars / "monday"), "--output", "all", *HERE)
     claim.release()
     assert code == 3
     assert "is being written by another run" in err

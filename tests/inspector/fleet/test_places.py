@@ -70,7 +70,7 @@ def test_a_copy_has_the_same_content_wherever_it_lies(bucket: str, tmp_path: Pat
 def test_a_drive_on_a_web_server_is_told_by_its_content(
     site: str, invoke: Invoke, cascade: JudgedCascade, tmp_path: Path
 ) -> None:
-    there, call = of_folder(site), ("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")
+    there, call = of_folder(site), ("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")
     with on_this_machine(there) as copy:
         assert content(copy, there) == content(tmp_path / "site/blue/monday", of_folder(tmp_path / "site/blue/monday"))
     assert seen(items_of(there)) == "", "it says nothing of times or sizes"
@@ -132,7 +132,7 @@ def test_a_guess_is_input_as_well(tmp_path: Path) -> None:
 def test_a_bucket_is_read_and_written_as_a_folder_is(invoke: Invoke, bucket: str, cascade: JudgedCascade) -> None:
     memory = fsspec.filesystem("memory")
     Path("DRIVES.csv").write_text(f"path\n{bucket}\n")
-    call = ("fleet", "DRIVES.csv", "--out", "memory://results/all", "--workers", "0")
+    call = ("fleet", "DRIVES.csv", "--output", "memory://results/all", "--workers", "0")
     code, out, _ = invoke(*call)
     assert code == 0
     assert "1 accepted" in out
@@ -146,7 +146,7 @@ def test_a_drive_that_fails_shows_nothing_of_an_earlier_run_in_a_bucket(
     invoke: Invoke, bucket: str, cascade: JudgedCascade, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     memory = fsspec.filesystem("memory")
-    call = ("fleet", "DRIVES.csv", "--out", "memory://results/all", "--workers", "0")
+    call = ("fleet", "DRIVES.csv", "--output", "memory://results/all", "--workers", "0")
     Path("DRIVES.csv").write_text(f"path\n{bucket}\n")
     out = invoke(*call)[1]
     assert "copy memory://results/all to this machine, then: calib-inspect fleet-report" in out
@@ -165,6 +165,6 @@ def test_a_drive_that_fails_shows_nothing_of_an_earlier_run_in_a_bucket(
 
 def test_an_address_that_nothing_reads_is_a_sentence(invoke: Invoke) -> None:
     Path("DRIVES.csv").write_text("path\nnosuch://bucket/drive\n")
-    code, _, err = invoke("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")
+    code, _, err = invoke("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")
     assert code == 0
     assert "nosuch://bucket/drive cannot be opened" in err

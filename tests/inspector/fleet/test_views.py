@@ -217,7 +217,7 @@ def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
     from urllib.parse import unquote
 
     Path("DRIVES.csv").write_text("path,car,drive\ncar-a/monday,50% <a>,x/y?z#w\n")
-    assert invoke("fleet", "DRIVES.csv", "--out", "all", "--workers", "0")[0] == 0
+    assert invoke("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")[0] == 0
     code, out, _ = invoke("fleet-report", "all")
     assert code == 0
     assert out.startswith("Page: all/index.html")
@@ -235,7 +235,7 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
 
     for scan in (cars / "tuesday" / "clouds").iterdir():
         scan.write_bytes(scan.read_bytes()[:1001])
-    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0")
+    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", "--workers", "0")
     rows = [replace(one, by_car="rejected" if one.drive == "monday" else "") for one in rows_of(Path("all")).values()]
     with serve(rows, Path("all").absolute()) as catalogue:
         address, _, entry = catalogue.address.partition("/entry/")
@@ -271,7 +271,7 @@ def test_the_catalogue_in_a_browser_is_behind_the_guard_of_all_pages(monkeypatch
 
 
 def test_a_list_gives_training_the_drives_with_a_good_calibration(invoke: Invoke, cars: Path) -> None:
-    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--out", "all", "--workers", "0", "--frames", "0:1")
+    invoke("fleet", str(cars / "monday"), str(cars / "tuesday"), "--output", "all", "--workers", "0", "--frames", "0:1")
     file = Path("all") / TABLE
     rows = [replace(one, verdict="rejected") if one.drive == "tuesday" else one for one in read_table(file)]
     write_table([replace(one, selection="0:1") for one in rows], file)

@@ -1,6 +1,6 @@
 """Record a sequence as long as KITTI's longest at overview detail, and print memory, size and speed on the way.
 
-    python -m tests.inspector.record.long_run [--frames 4541] [--detail overview] [--small] [--out FILE.rrd]
+    python -m tests.inspector.record.long_run [--frames 4541] [--detail overview] [--small] [--output FILE.rrd]
 
 A few fake frames of KITTI's size are calibrated once and recorded again and again under rising
 numbers, so that the figures are those of the recording alone. With ``--small``, frames of 240 x 72 after one stage.
@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=4541)
     parser.add_argument("--detail", choices=["overview", "full"], default="overview")
     parser.add_argument("--small", action="store_true")
-    parser.add_argument("--out", type=Path, default=Path(tempfile.gettempdir()) / "long_run.rrd")
+    parser.add_argument("--output", type=Path, default=Path(tempfile.gettempdir()) / "long_run.rrd")
     options = parser.parse_args()
     prepared, process = observations(options.small), psutil.Process()
     layout = Layout.of(prepared[0], Contents.of(Detail(options.detail)))

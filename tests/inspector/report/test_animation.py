@@ -101,7 +101,7 @@ def test_the_command_writes_three_frames_or_the_one_asked_for(
 @pytest.mark.parametrize(
     ("options", "code", "sentence"),
     [
-        ([], 2, "Give --out DIR for pictures of the tabs, --animate FILE for one that moves, or both."),
+        ([], 2, "Give --output DIR for pictures of the tabs, --animate FILE for an animation, or both."),
         (["--animate", "x.mp4"], 3, "A moving picture is a .webp or a .gif file; choose such a name instead of x.mp4."),
         (["--animate", "x.gif", "--frame", "9"], 2, "has no frame 9, only 0 to 4."),
     ],

@@ -221,18 +221,18 @@ def test_command_keeps_other_files_and_the_recording(
 ) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "index.html").write_text("my own page")
-    assert call("report", known.path, "--out", tmp_path) == 3
+    assert call("report", known.path, "--output", tmp_path) == 3
     assert (tmp_path / "index.html").read_text() == "my own page"
     assert "not the page of a report but something else; choose another path" in capsys.readouterr().err
-    assert call("report", known.path, "--out", tmp_path, "--overwrite") == 0
+    assert call("report", known.path, "--output", tmp_path, "--overwrite") == 0
     capsys.readouterr()
-    assert call("report", known.path, "--out", tmp_path) == 0  # an earlier report is replaced
+    assert call("report", known.path, "--output", tmp_path) == 0  # an earlier report is replaced
     assert str(tmp_path / "index.html") in capsys.readouterr().out
     assert (tmp_path / "notes.txt").read_text() == "mine"
     assert (tmp_path / "recording.rrd").read_bytes() == known.path.read_bytes()
     assert not (tmp_path / "recording.rrd").samefile(known.path)
     before = (tmp_path / "index.html").read_text()
-    assert call("report", tmp_path / "recording.rrd", "--out", tmp_path) == 0  # its own copy, in place
+    assert call("report", tmp_path / "recording.rrd", "--output", tmp_path) == 0  # its own copy, in place
     assert (tmp_path / "index.html").read_text() == before
     assert not list(tmp_path.rglob("*.partial"))
 
@@ -241,8 +241,8 @@ def test_command_says_in_one_sentence_what_it_cannot_do(
     known: RecordedRun, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert call("report", known.path, "--out", tmp_path / "file" / "below") == 3
-    assert call("report", tmp_path / "missing.rrd", "--out", tmp_path / "report") == 3
+    assert call("report", known.path, "--output", tmp_path / "file" / "below") == 3
+    assert call("report", tmp_path / "missing.rrd", "--output", tmp_path / "report") == 3
     errors = capsys.readouterr().err.splitlines()
     assert len(errors) == 2
     assert "cannot be written" in errors[0] and "missing.rrd" in errors[1]
