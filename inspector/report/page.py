@@ -25,7 +25,7 @@ SETTING_NAMES = {
     "seed": "seed",
     "stages": "stages",
     "preset": "network",
-    "drive": "solved as one drive",
+    "as_one_drive": "solved as one drive",
     "detail": "recorded detail",
     "parts": "recorded parts",
     "color": "points coloured by",

@@ -218,7 +218,7 @@ class RunOptions:
             "detail": str(self.detail or (self._level if self.parts is None else Detail.FULL)),
             "parts": ",".join(sorted(self.contents.parts)),
             "color": str(self.color),
-            "drive": self.solves_drive,
+            "as_one_drive": self.solves_drive,
             **self.labels,
         }
 

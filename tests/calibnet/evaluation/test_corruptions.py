@@ -111,7 +111,8 @@ def test_a_thinned_scan_keeps_one_band_of_so_many() -> None:
 
 
 def test_scans_put_together_lie_on_each_other_where_the_world_stands_still() -> None:
-    drive = SyntheticSequence(seed=4, length=3, rig=KITTI_LIKE)
+    rig = replace(KITTI_LIKE, camera=KITTI_LIKE.camera.resized(310, 94))
+    drive = SyntheticSequence(seed=4, length=3, rig=rig)
     single, three = drive[1], faults.accumulated(drive, 1, 3)(drive[1])
     assert len(three.points) == sum(len(drive[position].points) for position in range(3))
     here, there = drive[1].points[:, :3], drive[0].points[:, :3]
@@ -123,7 +124,8 @@ def test_scans_put_together_lie_on_each_other_where_the_world_stands_still() -> 
 
 
 def test_every_fault_runs_and_names_a_known_cause() -> None:
-    drive = SyntheticSequence(seed=4, length=3, rig=KITTI_LIKE)
+    rig = replace(KITTI_LIKE, camera=KITTI_LIKE.camera.resized(310, 94))
+    drive = SyntheticSequence(seed=4, length=3, rig=rig)
     all_faults = list(corruptions(drive, 1, [FRAME]))
     names = {fault.name for fault in all_faults}
     assert {"late-scan", "accumulated", "mirrored", "rolled", "focal-length", "equidistant", "units"} <= names

@@ -21,7 +21,7 @@ def cascade(monkeypatch: pytest.MonkeyPatch) -> JudgedCascade:
     """What every command in this process calibrates with."""
     from calibnet.cascade import cascade as module
 
-    fake = JudgedCascade()
+    fake = JudgedCascade(stages=(5,), strides=(32,))  # what a fleet does with a drive does not depend on either
     monkeypatch.setattr(module.Cascade, "load", staticmethod(lambda *_, **__: fake))
     return fake
 

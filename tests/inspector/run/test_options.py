@@ -80,7 +80,7 @@ def test_the_identity_has_the_names_that_recordings_always_had() -> None:
         "detail": "full",
         "parts": "curves,scene",
         "color": "depth",
-        "drive": True,
+        "as_one_drive": True,
     }
 
 

@@ -92,6 +92,10 @@ def test_a_killed_run_leaves_what_it_had_recorded(tmp_path: Path) -> None:
     assert sum(chunk.to_record_batch().num_rows for chunk in chunks) >= 2
 
 
+SMALL: dict[str, Any] = {"detail": "overview", "stages": (5,), "strides": (32,)}
+"""As little of a frame as can be recorded."""
+
+
 class BrokenSequence:
     """Raises as a data set would when a file is cut short."""
 
@@ -114,7 +118,7 @@ def test_a_bad_frame_keeps_those_before_it(
 ) -> None:
     file = tmp_path / "run.rrd"
     with pytest.raises(DatasetError, match=r"000002\.bin is cut short.* \(2 of 4 frames\)") as failure:
-        record(file, length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=2), stop_on_bad_frame=True)
+        record(file, length=4, **SMALL, sequence=BrokenSequence(fakes.FakeSequence(4), bad=2), stop_on_bad_frame=True)
     assert str(file) in str(failure.value)
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [0, 1]
 
@@ -123,7 +127,7 @@ def test_bad_frames_are_skipped_named_and_counted(
     record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
 ) -> None:
     file = tmp_path / "run.rrd"
-    summary = record(file, length=5, sequence=BrokenSequence(fakes.FakeSequence(5), bad=(0, 2)))
+    summary = record(file, length=5, **SMALL, sequence=BrokenSequence(fakes.FakeSequence(5), bad=(0, 2)))
     assert summary.frames == 3 and [bad.frame for bad in summary.skipped] == [0, 2]
     assert "2 frames skipped, which could not be used: 0, 2." in summary.lines()
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 3, 4]
@@ -145,7 +149,7 @@ def test_a_frame_that_cannot_be_read_has_the_number_that_its_file_has(
     record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
 ) -> None:
     file = tmp_path / "run.rrd"
-    summary = record(file, length=5, sequence=NumberedFrom1(fakes.FakeSequence(5), bad=2))
+    summary = record(file, length=5, **SMALL, sequence=NumberedFrom1(fakes.FakeSequence(5), bad=2))
     assert [bad.frame for bad in summary.skipped] == [3]
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 2, 4, 5]
     assert [frame for frame, _ in read(file, "skipped", "TextLog:text")] == [3]
@@ -153,7 +157,7 @@ def test_a_frame_that_cannot_be_read_has_the_number_that_its_file_has(
 
 def test_half_of_the_frames_are_too_many_to_skip(record: Callable[..., Any], tmp_path: Path, fakes: ModuleType) -> None:
     with pytest.raises(DatasetError, match=r"2 of 4 frames cannot be used.*Frame 1: .*Frame 3: .*cut short") as failure:
-        record(tmp_path / "run.rrd", length=4, sequence=BrokenSequence(fakes.FakeSequence(4), bad=(1, 3)))
+        record(tmp_path / "run.rrd", length=4, **SMALL, sequence=BrokenSequence(fakes.FakeSequence(4), bad=(1, 3)))
     assert "(2 of 4 frames) is in" in str(failure.value)
 
 
@@ -163,7 +167,7 @@ def test_a_bad_first_frame_leaves_an_older_file_alone(
     file = tmp_path / "run.rrd"
     file.write_bytes(b"an older recording")
     with pytest.raises(DatasetError):
-        record(file, length=1, sequence=BrokenSequence(fakes.FakeSequence(1), bad=0))
+        record(file, length=1, **SMALL, sequence=BrokenSequence(fakes.FakeSequence(1), bad=0))
     assert file.read_bytes() == b"an older recording"
 
 
@@ -179,7 +183,7 @@ def test_a_full_disk_stops_in_time_and_leaves_what_was_recorded(
 
     monkeypatch.setattr(outputs_module.shutil, "disk_usage", Usage)
     with pytest.raises(ConfigError, match=r"is full.*2 of 4 frames"):
-        record(file, length=4)
+        record(file, length=4, **SMALL)
     assert [frame.index for frame in read_run(file).frames] == [0, 1], "there is no room for an index, and none needed"
     assert list(tmp_path.iterdir()) == [file]
 
