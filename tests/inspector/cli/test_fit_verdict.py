@@ -72,7 +72,7 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--synthetic", "0"], "There is nothing to run on: give --data, or --synthetic above 0."),
+        (["--synthetic-drives", "0"], "There is nothing to run on: give --data, or --synthetic-drives above 0."),
         (["--data", "folder:/nowhere"], "There is no folder /nowhere; 'folder:/nowhere' names it."),
         (["--runs", "4"], "Make more runs, or add other data."),
     ],
