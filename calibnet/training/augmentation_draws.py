@@ -1,6 +1,6 @@
-"""What is drawn for one augmented frame: few numbers, on which `augmentation` and `on_device` both act.
+"""The random numbers of one augmented frame, which `augmentation` and `on_device` both apply.
 
-Drawing is apart from acting so that both draw alike, whatever they act with.
+Drawing is separate from applying, so that both implementations draw the same numbers.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ Generator = np.random.Generator
 
 
 def mirrored(camera: PinholeCamera) -> PinholeCamera:
-    """The camera in a mirror: left and right swapped."""
+    """The mirrored camera: left and right swapped."""
     matrix = camera.matrix.copy()
     matrix[0, 2] = camera.width - 1 - matrix[0, 2]
     return PinholeCamera(camera.width, camera.height, matrix)
 
 
 class View(NamedTuple):
-    """A turned camera with another lens.
+    """A virtual camera: rotated, with another lens.
 
     Attributes:
-        near: the frame's camera, its picture resized; what is averaged when a picture is made smaller.
-        camera: the other one, at the network's input size.
-        turn: ``[3, 3]``, of the other one about its centre.
+        near: the frame's camera with its picture resized, which averages pixels before the picture is made smaller.
+        camera: the virtual camera, at the network's input size.
+        turn: ``[3, 3]`` rotation of the virtual camera about its centre.
     """
 
     near: PinholeCamera
@@ -66,19 +66,19 @@ class View(NamedTuple):
 
 
 class Scanner(NamedTuple):
-    """Another scanner: which points it has, and what it says of them. As it stands here it changes nothing.
+    """A virtual scanner: which points it keeps, and how it measures them. The defaults change nothing.
 
     Attributes:
-        turn: ``[3, 3]``, of the scanner whose bands of elevation the points are in.
-        place: of that scanner, metres.
+        turn: ``[3, 3]`` rotation of the virtual scanner, whose bands of elevation divide the points.
+        place: position of the virtual scanner, metres.
         band_rad: width of a band.
-        period: of so many neighbouring bands one is kept.
-        phase: which one.
-        kept: share of the points that is kept, at random.
-        reach_m: distance beyond which none is.
-        range_noise: standard deviation of a point's distance, relative to it.
+        period: one of this many neighbouring bands is kept.
+        phase: which of them is kept.
+        kept: share of the points that is kept at random.
+        reach_m: points farther away than this are dropped.
+        range_noise: relative standard deviation of a point's distance.
         response: factor on the intensity; 0 without intensity.
-        gamma: power that it is raised to.
+        gamma: exponent applied to the intensity.
     """
 
     turn: Rotation = np.eye(3)
@@ -120,14 +120,14 @@ class Scanner(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """Exposure, colours, blur and noise of a picture, whose values lie in 0..1. As it stands here it changes nothing.
+    """Exposure, colours, blur and noise of a picture with values in 0..1. The defaults change nothing.
 
     Attributes:
-        grey: whether it has no colours.
+        grey: whether colours are removed.
         tint: factors on red, green and blue.
-        gamma: power that all values are raised to.
+        gamma: exponent applied to all values.
         contrast: factor on the distance from 0.5.
-        brightness: what is added.
+        brightness: offset of all values.
         blur_px: standard deviation of the blur, pixels; 0 without.
         noise: standard deviation of the noise.
     """

@@ -1,4 +1,4 @@
-"""The adjustment: extrinsic, intrinsics and landmarks, so that landmarks are seen where they were and lie on planes."""
+"""The adjustment of extrinsic, intrinsics and landmarks to the tracks of the landmarks and to the planes of the map."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from calibnet.methods.pcba.tracks import Tracks
 PIXEL = 0.7
 """Standard deviation, in pixels, of where a point is tracked."""
 PLANE_M = 0.04
-"""And, in metres, of how far off its plane it is: the scanner's noise, and that planes are small."""
+"""Standard deviation, in metres, of a landmark's distance from its plane: noise of the scanner, and small planes."""
 FOCAL, CENTRE_PX = 0.02, 10.0
-"""What is known of the intrinsics beforehand, where these are adjusted: a share of the focal length, and pixels."""
+"""Prior standard deviations of adjusted intrinsics: of the focal lengths, relative; of the principal point, pixels."""
 NEAREST_M = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """What an adjustment came to.
+    """The result of an adjustment.
 
     Attributes:
         camera_from_lidar: 4x4.
         camera: with the adjusted intrinsics.
         landmarks: ``[N, 3]`` metres, in the world frame.
-        reprojection: ``[M]``, how far from where it was tracked each is seen, in pixels.
-        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, as far as the residuals tell.
+        reprojection: ``[M]`` reprojection error of each observation, in pixels.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, from the residuals.
         cost: sum of the robust losses.
     """
 
@@ -47,15 +47,15 @@ class Adjusted:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is known before the adjustment.
+    """The input of an adjustment.
 
     Attributes:
         tracks: the observations.
         lidar_from_world: ``[F, 4, 4]`` of the frames.
-        camera: as it is said to be.
-        initial: ``camera_from_lidar`` that was given, 4x4.
-        known: ``[6]`` standard deviations of ``(translation m, rotation rad)`` to which it is known.
-        intrinsics: whether these are adjusted, too.
+        camera: the given camera.
+        initial: the given ``camera_from_lidar``, 4x4.
+        known: ``[6]`` prior standard deviations of ``(translation m, rotation rad)``.
+        intrinsics: whether the intrinsics are adjusted too.
     """
 
     tracks: Tracks
@@ -119,7 +119,7 @@ class Problem:
 def seen(
     landmarks: Floats, tracks: Tracks, lidar_from_world: NDArray[np.float64], extrinsic: Extrinsic, matrix: Transform
 ) -> Floats:
-    """Pixels ``[M, 2]`` at which landmarks would be seen under an extrinsic and a camera matrix."""
+    """Projections ``[M, 2]`` of the landmarks in pixels, under an extrinsic and a camera matrix."""
     poses = (extrinsic @ lidar_from_world)[tracks.frame]
     points = np.einsum("mij,mj->mi", poses[:, :3, :3], landmarks[tracks.landmark]) + poses[:, :3, 3]
     depth = np.maximum(points[:, 2:], NEAREST_M)
@@ -143,7 +143,7 @@ def _vector(change: Transform) -> Floats:
 
 
 def _marginal(normal: Any) -> Matrix6:
-    """Covariance of the first six parameters, all others being what they like."""
+    """Marginal covariance of the first six parameters."""
     from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 

@@ -1,4 +1,4 @@
-"""What a frame of an adjusted drive shows: its tracks, and the planes that lie before the camera."""
+"""Pictures of a frame of an adjusted drive: its tracks, and the planes in front of the camera."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from calibnet.methods.pcba.planes import Planes
 from calibnet.methods.pcba.tracks import Tracks
 
 WIDTH = 960
-"""Pixels across, of the pictures."""
+"""Width of the pictures in pixels."""
 FARTHEST_M = 40.0
 BAD_PX = 3.0
-"""Off where it was tracked, a landmark is fully red."""
+"""Reprojection error, in pixels, at which a landmark is fully red."""
 
 
 def exhibits(
@@ -29,7 +29,7 @@ def exhibits(
         picture: grey, ``[H, W]``.
         position: of the frame in the drive.
         tracks: of the drive.
-        found: what came of them.
+        found: result of the adjustment.
         planes: of the drive's map.
         pose: ``world_from_lidar`` of the frame.
     """

@@ -1,7 +1,7 @@
 """Sparse nonlinear least squares for the adjustment: Levenberg-Marquardt, robust, with sparse normal equations.
 
-`scipy.optimize.least_squares` solves the same with inexact inner steps when the Jacobian is sparse, and stops far from
-the minimum where a few parameters are seen by all residuals, as an extrinsic is.
+`scipy.optimize.least_squares` uses inexact inner steps for a sparse Jacobian, and stops far from the minimum if all
+residuals depend on a few common parameters, such as an extrinsic.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the cost is smallest.
+    """The minimum of the cost.
 
     Attributes:
         x: the parameters.
@@ -46,7 +46,7 @@ def solve(
     start: Floats,
     columns: Columns,
 ) -> Solution:
-    """Make residuals small under the loss ``2 (sqrt(1 + r^2) - 1)``.
+    """Minimise residuals under the robust loss ``2 (sqrt(1 + r^2) - 1)``.
 
     Args:
         residuals: of parameters.

@@ -1,4 +1,4 @@
-"""PCBA as a method of drives: rounds of adjustment, each with planes chosen anew."""
+"""PCBA as a method that solves drives: rounds of adjustment, each with a new assignment of landmarks to planes."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import CANNOT_TELL, BadFrame, Verdict, moved
 
 MOST_FRAMES = 24
-"""Most frames of a drive, from its beginning: successive ones, since points are tracked through them."""
+"""Most frames of a drive: the first ones, which must be successive because points are tracked through them."""
 LEAST_MOTION_M = 2.0
-"""That the car has to drive: from one place nothing is seen twice from different ones."""
+"""Shortest distance, in metres, that the car has to drive: without motion there is no parallax."""
 FEWEST = 60
-"""Landmarks on planes, below which nothing is adjusted."""
+"""Fewest landmarks on planes that are adjusted."""
 MOST_LANDMARKS = 1200
 FARTHEST = 2.0
-"""Multiple of the range beyond which a result is refused: an unconstrained adjustment ends metres away."""
+"""Results farther away than this multiple of the range are refused: an unconstrained adjustment ends metres away."""
 
 
 class Round(NamedTuple):
     """A round of adjustment.
 
     Attributes:
-        within_m: how far a landmark may be from the plane that it is tied to.
-        worst_px: how far off it may be seen in any frame to stay.
-        shift: share of what is known of the translation that it may move by.
+        within_m: largest distance of a landmark from the plane that it is assigned to.
+        worst_px: landmarks with a larger reprojection error in any frame are dropped.
+        shift: factor on the prior standard deviation of the translation.
     """
 
     within_m: float
@@ -54,19 +54,19 @@ TURN = (Round(2.0, 15.0, 0.02), Round(1.5, 8.0, 0.02), Round(1.0, 6.0, 0.1))
 ALL = (Round(2.0, 8.0), Round(1.0, 5.0), Round(0.7, 4.0), Round(0.5, 3.0), Round(0.5, 3.0))
 """Then everything, with points followed anew from where the scan has them by then."""
 COVARIANCE_WIDER = 9.0
-"""Factor of the covariance that residuals tell: registration, rolling shutters and planes err alike in all frames."""
+"""Inflation of the residuals' covariance: errors of registration, shutters and planes are common to all frames."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """The frames of a drive as they are worked with.
+    """The frames of a drive that are used.
 
     Attributes:
         indices: of the frames.
         pictures: grey, ``[H, W]``.
         scans: ``[N, 4]``.
         poses: ``world_from_lidar`` of each.
-        camera: of all of them.
+        camera: common to all frames.
         skipped: frames that could not be read.
     """
 
@@ -88,7 +88,7 @@ class PCBA:
         self.range, self.intrinsics = range_, intrinsics
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """Nothing: a single frame does not move.
+        """Always fails, because a single frame has no motion.
 
         Raises:
             CalibrationError: always.
@@ -212,7 +212,7 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
 
 
 def same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
-    """Whether two pictures are seen alike."""
+    """Whether two cameras have the same intrinsics."""
     return (one.width, one.height) == (other.width, other.height) and np.allclose(one.matrix, other.matrix)
 
 
@@ -225,7 +225,7 @@ def some(tracks: Tracks) -> Tracks:
 
 
 def intrinsics_said(before: PinholeCamera, after: PinholeCamera) -> str:
-    """What was adjusted of a camera, in a sentence."""
+    """A sentence that says how the intrinsics changed."""
     old, new = before.matrix, after.matrix
     return (
         f"Its focal lengths were adjusted from {old[0, 0]:.1f} and {old[1, 1]:.1f} to {new[0, 0]:.1f} and "

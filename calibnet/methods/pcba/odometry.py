@@ -1,4 +1,4 @@
-"""How the car moves: every scan of a drive registered onto those before it."""
+"""LiDAR odometry: every scan of a drive is registered onto those before it."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from calibnet.geometry.types import Transform
 from calibnet.judging.lag import registered
 
 BEFORE = 5
-"""Scans that the next one is registered onto. Onto one alone, the rings on the road pull at each other and make the way
-too short: by 3.5 % in the synthetic world, with these by less than 0.1 %."""
+"""Number of earlier scans that the next one is registered onto. With a single one, rings on the road attract each other
+and the path is too short: by 3.5 % in the synthetic world, with this number by less than 0.1 %."""
 POINT_M, VOXEL_M = 0.25, 1.0
-"""Sides of the cells in which points are averaged, and of those whose points make a Gaussian to be registered onto."""
+"""Sides of the voxels in which points are averaged, and of those whose points form a Gaussian to register onto."""
 FARTHEST_M = 2.0
 FEWEST_POINTS = 500
-"""That have to agree for a registration to be believed."""
+"""Fewest inliers of a registration that is trusted."""
 
 
 def longest_run(scans: Sequence[NDArray[np.float32]]) -> tuple[int, list[Transform]]:
     """The longest run of scans ``[N, 4]`` that can be registered one after the other.
 
-    Each registration begins with the motion before it, since a car goes on as it goes.
+    Each registration starts from the motion before it (constant velocity).
 
     Returns:
         The position of its first scan, and ``world_from_lidar`` of each, 4x4; the first is the identity.
@@ -47,7 +47,7 @@ def longest_run(scans: Sequence[NDArray[np.float32]]) -> tuple[int, list[Transfo
 
 
 def path(poses: Sequence[Transform]) -> tuple[float, float]:
-    """Metres driven, and degrees turned on the way, both summed up."""
+    """Distance driven in metres, and the sum of all rotations in degrees."""
     steps = [pose_vector(invert(a) @ b) for a, b in itertools.pairwise(poses)]
     metres = sum(float(np.linalg.norm(step[:3])) for step in steps)
     return metres, float(np.degrees(sum(float(np.linalg.norm(step[3:])) for step in steps)))
@@ -56,7 +56,7 @@ def path(poses: Sequence[Transform]) -> tuple[float, float]:
 def _onto(
     scan: NDArray[np.float32], past: Sequence[NDArray[np.float32]], poses: Sequence[Transform], motion: Transform
 ) -> Transform | None:
-    """The motion from the last of some scans to the next one; None where too few points agree."""
+    """The motion from the last of some scans to the next one; None if registration fails."""
     import small_gicp
 
     target = [transform_points(invert(poses[-1]) @ pose, one[:, :3]) for one, pose in zip(past, poses, strict=True)]

@@ -1,4 +1,4 @@
-"""The map that the scans of a drive make together, as small planes."""
+"""The map of all scans of a drive, as small planes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from calibnet.geometry.se3 import transform_points
 from calibnet.geometry.types import Floats, Transform
 
 VOXEL_M = 0.15
-"""Side of the cells of which each keeps one point of the map."""
+"""Side of the voxels that keep one point of the map each, in metres."""
 FARTHEST_M = 50.0
-"""From the scanner, of points that come into the map: beyond, scans are too sparse for planes."""
+"""Largest distance of the map's points from the scanner, in metres: farther away, scans are too sparse for planes."""
 NEIGHBOURS = 12
 WIDEST_M = 0.8
-"""Distance to the farthest of these: what is more open is no surface."""
+"""Largest distance to the farthest neighbour of a plane, in metres: sparser points are no surface."""
 FLATTEST = 0.05
 """Most of the variance of neighbours that may lie across their plane, as a share of that along its narrower side."""
 
