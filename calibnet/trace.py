@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.exhibit import Curve, Exhibit
-from calibnet.geometry import MiscalibrationRange, PinholeCamera
+from calibnet.geometry import MiscalibrationRange, PinholeCamera, transform
+from calibnet.geometry.se3 import rotate6, rotated
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform, Vector6
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 
@@ -126,6 +127,19 @@ class StageTrace:
         """``camera_from_lidar`` that its last look started from, 4x4."""
         return self.before if self.last_before is None else self.last_before
 
+    def rotated(self, rotation: Rotation) -> StageTrace:
+        """The same of a camera turned by ``rotation [3, 3]``; `camera`, `detail` and `matches` stay as they are."""
+        turn = transform(rotation, np.zeros(3))
+        return replace(
+            self,
+            before=turn @ self.before,
+            after=turn @ self.after,
+            correction=turn @ self.correction @ turn.T,
+            information=rotated(self.information, rotation),
+            last_before=None if self.last_before is None else turn @ self.last_before,
+            upright=rotation.T if self.upright is None else self.upright @ rotation.T,
+        )
+
     def followed_by(self, further: StageTrace) -> StageTrace:
         """This and a further look of the same stage as one trace; the detail stays that of the first look."""
         mine, its = self.milliseconds, further.milliseconds
@@ -215,6 +229,11 @@ class Estimate:
         """Standard deviation of the translation in centimetres, likewise."""
         return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
 
+    def rotated(self, rotation: Rotation) -> Self:
+        """The same of a camera turned by ``rotation [3, 3]``."""
+        extrinsic = transform(rotation, np.zeros(3)) @ self.camera_from_lidar
+        return replace(self, camera_from_lidar=extrinsic, covariance=rotated(self.covariance, rotation))
+
 
 @dataclass(frozen=True, eq=False)
 class DriveLook:
@@ -233,6 +252,11 @@ class DriveLook:
     offset: Vector6 = field(repr=False)
     information: Matrix6 | None = field(default=None, repr=False)
     match_error_px: float = math.nan
+
+    def rotated(self, rotation: Rotation) -> DriveLook:
+        """The same of a camera turned by ``rotation [3, 3]``."""
+        offset = rotate6(rotation) @ self.offset
+        return replace(self, offset=offset, information=rotated(self.information, rotation))
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +283,18 @@ class DriveEstimate(Estimate):
     looks: tuple[DriveLook, ...] = field(repr=False, default=())
     looked_from: Extrinsic | None = field(repr=False, default=None)
     traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)
+
+    def rotated(self, rotation: Rotation) -> Self:
+        """The same of a camera turned by ``rotation [3, 3]``; without the traces of a method of its own."""
+        turn = transform(rotation, np.zeros(3))
+        return replace(
+            super().rotated(rotation),
+            history=tuple((frame, so_far.rotated(rotation)) for frame, so_far in self.history),
+            networks=None if self.networks is None else self.networks.rotated(rotation),
+            verdict=None if self.verdict is None else self.verdict.rotated(rotation),
+            looks=tuple(look.rotated(rotation) for look in self.looks),
+            looked_from=None if self.looked_from is None else turn @ self.looked_from,
+        )
 
     def inflated(self, factor: float) -> Self:
         """The same with every covariance so many times as large."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from calibnet.geometry import pose_error
-from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.geometry import pose_error, transform
+from calibnet.geometry.se3 import rotated
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
 
 Word = Literal["accepted", "rejected", "cannot tell"]
 ACCEPTED: Word = "accepted"
@@ -92,6 +93,11 @@ class Verdict:
     covariance: Matrix6 | None = field(default=None, repr=False)
     used: int = 1
     skipped: tuple[BadFrame, ...] = ()
+
+    def rotated(self, rotation: Rotation) -> Verdict:
+        """The same on the extrinsic of a camera turned by ``rotation [3, 3]``."""
+        extrinsic = transform(rotation, np.zeros(3)) @ self.camera_from_lidar
+        return replace(self, camera_from_lidar=extrinsic, covariance=rotated(self.covariance, rotation))
 
     @property
     def sigma_rotation_deg(self) -> float | None:

@@ -172,7 +172,7 @@ class Cascade:
         if verdict is None or verdict.word != ACCEPTED:
             lag = None if lags is None else (lags, reach_of(calibrated))
             verdict = self._judged(frame, start, trace, pose_prior, match_error_of(self.stages[0]), lag)
-        return upright.undo_verdict(verdict)
+        return upright.real(verdict)
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -194,7 +194,7 @@ class Cascade:
         def solve(stages: Sequence[Stage]) -> DriveEstimate:
             return solve_drive(stages, frames, start, self.common_error, observer, pose_prior)
 
-        return upright.undo_drive(self._solved(solve, start))
+        return upright.real(self._solved(solve, start))
 
     def calibrate_rig(
         self,
@@ -232,7 +232,7 @@ class Cascade:
             return solve_rig(stages, turned, initial, self.common_error, observer, pose_prior, tolerance)
 
         estimate = self._solved(solve, initial)
-        found = tuple(turn.undo_camera(one) for one, turn in zip(estimate.cameras, upright, strict=True))
+        found = tuple(turn.real(one) for one, turn in zip(estimate.cameras, upright, strict=True))
         return replace(estimate, cameras=found)
 
     def _solved(self, solve: Callable[[Sequence[Stage]], AnyEstimate], initial: Extrinsic) -> AnyEstimate:

@@ -11,29 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibnet.geometry import transform
 from calibnet.geometry.se3 import pose_from_vector, pose_vector
-from calibnet.geometry.types import Rotation
 from calibnet.judging.covariance import CovarianceModel
 from calibnet.trace import StageTrace
 
 
-def seen_by_camera(look: StageTrace, face_from_camera: Rotation) -> StageTrace:
-    """A look through a face with extrinsics, correction and information of the camera; matches stay the face's."""
-    back, axes = transform(face_from_camera.T, np.zeros(3)), np.kron(np.eye(2), face_from_camera)
-    return replace(
-        look,
-        before=back @ look.before,
-        after=back @ look.after,
-        correction=back @ look.correction @ back.T,
-        information=None if look.information is None else axes.T @ look.information @ axes,
-        last_before=None if look.last_before is None else back @ look.last_before,
-        upright=face_from_camera if look.upright is None else look.upright @ face_from_camera,
-    )
-
-
 def joined(looks: Sequence[StageTrace], limit_px: float, model: CovarianceModel) -> StageTrace:
-    """Join looks of one stage through faces, all as `seen_by_camera` gives them, to one.
+    """Join looks of one stage through faces, all turned to the camera (`StageTrace.rotated`), to one.
 
     Each is weighted by its covariance, as measured, which is larger than the one its network states. A face that does
     not fit the scan, such as one filled by the bonnet, is left out where another one fits.

@@ -12,26 +12,23 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from calibnet.cascade.faces import joined, seen_by_camera
+from calibnet.cascade.around import extended, projected
+from calibnet.cascade.faces import joined
 from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import resize_image
-from calibnet.datasets.plausibility import suspicion
 from calibnet.errors import CalibrationError
-from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, orthonormal, scaled, transform
+from calibnet.geometry import RANGES, MiscalibrationRange, PinholeCamera, transform
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.judging.covariance import CovarianceModel
-from calibnet.network.batch import Cut, lidar_input, make_batch
+from calibnet.network.batch import Cut, make_batch
 from calibnet.network.displacement import DisplacementField, expected_error
-from calibnet.network.network import CalibrationNetwork, NetworkOutput
+from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.clock import Clock, after_each
 from calibnet.runtime.precision import autocast
 from calibnet.trace import Matches, StageTrace
 from calibnet.weights.manifest import StageSettings
-
-FEWEST_CELLS = 20
-"""Cells with a LiDAR point below which a pose of six parameters would be a guess."""
 
 
 class View(NamedTuple):
@@ -158,59 +155,39 @@ class Stage:
             except CalibrationError as error:
                 failure = error
                 continue
-            looks.append(seen_by_camera(look, face.face_from_camera))
+            looks.append(look.rotated(face.face_from_camera.T))
         if not looks and failure is not None:
             raise failure
         return joined(looks, self.match_error_limit_px, self.covariance_model)
 
     def _look(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
-        clock, camera = Clock(self.device), self.camera(frame)
-        lidar = lidar_input(frame.points, before, camera, self.network.config.scales)
-        if lidar.occupied.sum() < FEWEST_CELLS:
-            why = suspicion(
-                frame.remarks,
-                "check that the extrinsic maps LiDAR points (x forward, y left, z up) into the camera (x right, "
-                "y down, z forward)",
-            )
-            raise CalibrationError(
-                f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
-                f"stage {self.number}, of {len(frame.points)} points; {why}."
-            )
+        clock, camera, name = Clock(self.device), self.camera(frame), f"stage {self.number}"
+        lidar = projected(frame, before, camera, self.network.config.scales, name)
         clock("projection")
         cut = Cut.of([lidar])
         inputs = make_batch(view.image, [lidar], [camera.matrix], cut)
         with autocast(self.device), after_each(self.network.boxes, clock):
             output = self.network(inputs, view.features, keep_activations=detail)
-        correction = self._correction(output)
-        if not np.isfinite(correction).all():
-            raise CalibrationError(
-                f"Stage {self.number} found no finite correction for frame {frame.index} ({frame.source}); "
-                "train its weights again if this happens on every frame."
-            )
-        information = None if output.pose.information is None else output.pose.information[0].double().cpu().numpy()
+        correction = extended(output.pose.correction[0], self.settings.gain, frame, name)
+        information = output.pose.information
         return StageTrace(
-            self.number,
-            self.range,
-            camera,
-            before,
-            correction @ before,
-            correction,
-            clock.parts,
-            information,
-            stage_detail(self.network.config, lidar, cut, output) if detail else None,
-            float(expected_error(output.field, inputs.cells[0])[0]),
-            matches_of(output.field, inputs.cells[0]),
+            number=self.number,
+            range=self.range,
+            camera=camera,
+            before=before,
+            after=correction @ before,
+            correction=correction,
+            milliseconds=clock.parts,
+            information=None if information is None else information[0].double().cpu().numpy(),
+            detail=stage_detail(self.network.config, lidar, cut, output) if detail else None,
+            match_error_px=float(expected_error(output.field, inputs.cells[0])[0]),
+            matches=matches_of(output.field, inputs.cells[0]),
         )
 
     def is_settled(self, correction: Transform) -> bool:
         """Whether a next stage can take over: what a look has corrected is within that stage's range."""
         following = RANGES[RANGES.index(self.range) + 1 :] if self.range in RANGES else RANGES[-1:]
         return bool(following) and following[0].contains(correction)
-
-    def _correction(self, output: NetworkOutput) -> Transform:
-        """The correction of a batch of one, extended by the stage's gain."""
-        estimate: Transform = output.pose.correction[0].double().cpu().numpy()
-        return scaled(orthonormal(estimate), self.settings.gain) if np.isfinite(estimate).all() else estimate
 
 
 def with_prior(look: StageTrace, pose_prior: PosePrior, model: CovarianceModel) -> StageTrace:

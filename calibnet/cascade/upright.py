@@ -19,11 +19,11 @@ from calibnet.datasets.frame import Frame
 from calibnet.drive.rig import CameraEstimate
 from calibnet.geometry import MiscalibrationRange, PinholeCamera, transform
 from calibnet.geometry.se3 import rotation_from_vector
-from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
-from calibnet.trace import CascadeTrace, DriveEstimate, DriveLook, Estimate, StageTrace
+from calibnet.geometry.types import Extrinsic, Rotation
+from calibnet.trace import CascadeTrace, DriveEstimate, StageTrace
 from calibnet.verdict import Verdict
 
-AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
+AnyResult = TypeVar("AnyResult", StageTrace, Verdict, DriveEstimate, CameraEstimate)
 
 TOLERATED_DEG = 8.0
 """Roll in degrees up to which nothing is resampled: training had as much, and turning an image loses its corners."""
@@ -89,77 +89,13 @@ class Upright:
         """A run on the upright frame as one on the real frame, which started from ``initial``."""
         if not self:
             return trace
-        stages, wider = (tuple(map(self._real_stage, part)) for part in (trace.stages, trace.wider))
-        verdict = None if trace.verdict is None else self.undo_verdict(trace.verdict)
+        stages, wider = (tuple(map(self.real, part)) for part in (trace.stages, trace.wider))
+        verdict = None if trace.verdict is None else self.real(trace.verdict)
         return replace(trace, initial=initial, stages=stages, wider=wider, verdict=verdict)
 
-    def undo_verdict(self, verdict: Verdict) -> Verdict:
-        """The verdict on an upright frame or drive, of the real camera."""
-        if not self:
-            return verdict
-        extrinsic = self._real_extrinsic(verdict.camera_from_lidar)
-        covariance = None if verdict.covariance is None else self._real_matrix(verdict.covariance)
-        return replace(verdict, camera_from_lidar=extrinsic, covariance=covariance)
-
-    def undo_drive(self, estimate: DriveEstimate) -> DriveEstimate:
-        """What a drive of upright frames says, of the real camera."""
-        if not self:
-            return estimate
-        history = tuple((frame, self._real(so_far)) for frame, so_far in estimate.history)
-        networks = None if estimate.networks is None else self._real(estimate.networks)
-        verdict = None if estimate.verdict is None else self.undo_verdict(estimate.verdict)
-        looked_from = None if estimate.looked_from is None else self._real_extrinsic(estimate.looked_from)
-        looks = tuple(map(self._real_look, estimate.looks))
-        return replace(
-            self._real(estimate),
-            history=history,
-            networks=networks,
-            verdict=verdict,
-            looks=looks,
-            looked_from=looked_from,
-        )
-
-    def undo_camera(self, found: CameraEstimate) -> CameraEstimate:
-        """What was found of the upright camera of a rig, of the real camera."""
-        if not self:
-            return found
-        alone = None if found.alone is None else np.kron(np.eye(2), self.rotation).T @ found.alone
-        return replace(
-            found,
-            camera_from_lidar=self._real_extrinsic(found.camera_from_lidar),
-            covariance=self._real_matrix(found.covariance),
-            alone=alone,
-            alone_covariance=None if found.alone_covariance is None else self._real_matrix(found.alone_covariance),
-        )
-
-    def _real_stage(self, stage: StageTrace) -> StageTrace:
-        back = transform(self.rotation.T, np.zeros(3))
-        return replace(
-            stage,
-            before=back @ stage.before,
-            after=back @ stage.after,
-            correction=back @ stage.correction @ back.T,
-            information=None if stage.information is None else self._real_matrix(stage.information),
-            upright=self.rotation if stage.upright is None else stage.upright @ self.rotation,
-            last_before=None if stage.last_before is None else back @ stage.last_before,
-        )
-
-    def _real_extrinsic(self, camera_from_lidar: Extrinsic) -> Extrinsic:
-        return transform(self.rotation.T, np.zeros(3)) @ camera_from_lidar
-
-    def _real_look(self, look: DriveLook) -> DriveLook:
-        information = None if look.information is None else self._real_matrix(look.information)
-        return replace(look, offset=np.kron(np.eye(2), self.rotation).T @ look.offset, information=information)
-
-    def _real(self, estimate: AnyEstimate) -> AnyEstimate:
-        extrinsic = self._real_extrinsic(estimate.camera_from_lidar)
-        return replace(estimate, camera_from_lidar=extrinsic, covariance=self._real_matrix(estimate.covariance))
-
-    def _real_matrix(self, of_pose: Matrix6) -> Matrix6:
-        """A covariance or information of ``(translation, rotation)`` in the real camera's axes."""
-        axes = np.kron(np.eye(2), self.rotation)
-        real: Matrix6 = axes.T @ of_pose @ axes
-        return real
+    def real(self, result: AnyResult) -> AnyResult:
+        """What was found of the upright camera, of the real one."""
+        return result.rotated(self.rotation.T) if self else result
 
 
 def roll_of(camera_from_lidar: Extrinsic) -> float:

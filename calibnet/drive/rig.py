@@ -36,10 +36,10 @@ from calibnet.drive.solve import (
     drive_look,
 )
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
-from calibnet.geometry import is_finest
+from calibnet.geometry import is_finest, transform
 from calibnet.geometry.prior import PosePrior
-from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector
-from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
+from calibnet.geometry.se3 import adjoint, invert, pose_from_vector, pose_vector, rotate6, rotated
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Transform, Vector6
 from calibnet.trace import DriveEstimate, DriveLook, Estimate
 from calibnet.verdict import BadFrame
 
@@ -65,6 +65,16 @@ class CameraEstimate:
     match_error_px: float = math.nan
     alone: Vector6 | None = field(default=None, repr=False)
     alone_covariance: Matrix6 | None = field(default=None, repr=False)
+
+    def rotated(self, rotation: Rotation) -> CameraEstimate:
+        """The same of a camera turned by ``rotation [3, 3]``."""
+        return replace(
+            self,
+            camera_from_lidar=transform(rotation, np.zeros(3)) @ self.camera_from_lidar,
+            covariance=rotated(self.covariance, rotation),
+            alone=None if self.alone is None else rotate6(rotation) @ self.alone,
+            alone_covariance=rotated(self.alone_covariance, rotation),
+        )
 
 
 @dataclass(frozen=True, eq=False)

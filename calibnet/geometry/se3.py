@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from calibnet.geometry.types import Extrinsic, Floats, Rotation, Transform, Vector3, Vector6
+from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Rotation, Transform, Vector3, Vector6
+
+AnyMatrix = TypeVar("AnyMatrix", Matrix6, Matrix6 | None)
 
 
 def transform(rotation: ArrayLike, translation: ArrayLike) -> Transform:
@@ -107,6 +110,19 @@ def adjoint(camera_from_rig: Transform) -> Floats:
     """``[6, 6]``: the small motion ``(translation, rotation)`` of a camera that one of the rig is."""
     rotation = camera_from_rig[:3, :3]
     return np.block([[rotation, _cross(camera_from_rig[:3, 3]) @ rotation], [np.zeros((3, 3)), rotation]])
+
+
+def rotate6(rotation: Rotation) -> Floats:
+    """``[6, 6]``: turns vectors ``(translation, rotation)`` by a rotation ``[3, 3]``."""
+    return np.kron(np.eye(2), rotation).astype(np.float64)
+
+
+def rotated(matrix: AnyMatrix, rotation: Rotation) -> AnyMatrix:
+    """A covariance or information ``[6, 6]`` of ``(translation, rotation)`` in rotated axes; None stays None."""
+    if matrix is None:
+        return matrix
+    axes = rotate6(rotation)
+    return np.asarray(axes @ matrix @ axes.T, np.float64)
 
 
 def euler_xyz(rotation: NDArray[np.floating]) -> Vector3:

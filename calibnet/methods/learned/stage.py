@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from calibnet.cascade.stage import FEWEST_CELLS, View
+from calibnet.cascade.around import extended, projected
+from calibnet.cascade.stage import View
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import resize_image
-from calibnet.datasets.plausibility import suspicion
-from calibnet.errors import CalibrationError
 from calibnet.exhibit import Exhibit
-from calibnet.geometry import MiscalibrationRange, PinholeCamera, orthonormal, scaled
+from calibnet.geometry import MiscalibrationRange, PinholeCamera
 from calibnet.geometry.types import Extrinsic
 from calibnet.methods.learned.network import MethodNetwork
-from calibnet.network.batch import lidar_input, make_batch
+from calibnet.network.batch import make_batch
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
 from calibnet.trace import StageTrace
@@ -82,28 +80,28 @@ class MethodStage:
         Raises:
             CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
         """
-        clock, camera, name = Clock(self.device), self.camera(frame), self.network.NAME
-        lidar = lidar_input(frame.points, before, camera, self.network.config.scales)
-        if lidar.occupied.sum() < FEWEST_CELLS:
-            why = suspicion(frame.remarks, "check that the extrinsic maps LiDAR points into the camera")
-            raise CalibrationError(
-                f"Only {lidar.occupied.sum()} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before "
-                f"{name}'s network of {self.range.label}; {why}."
-            )
+        clock, camera, name = (
+            Clock(self.device),
+            self.camera(frame),
+            f"{self.network.NAME}'s network of {self.range.label}",
+        )
+        lidar = projected(frame, before, camera, self.network.config.scales, name)
         clock("projection")
         inputs = make_batch(view.image, [lidar], [camera.matrix])
         with autocast(self.device):
             output = self.network(inputs)
         clock("network")
-        estimate = output.correction[0].double().cpu().numpy()
-        if not np.isfinite(estimate).all():
-            raise CalibrationError(
-                f"{name}'s network of {self.range.label} found no finite correction for frame {frame.index} "
-                f"({frame.source}); train it again if this happens on every frame."
-            )
-        correction = scaled(orthonormal(estimate), self.settings.gain)
-        trace = StageTrace(self.number, self.range, camera, before, correction @ before, correction, clock.parts)
-        return replace(trace, exhibits=exhibits(output.shown)) if detail else trace
+        correction = extended(output.correction[0], self.settings.gain, frame, name)
+        return StageTrace(
+            number=self.number,
+            range=self.range,
+            camera=camera,
+            before=before,
+            after=correction @ before,
+            correction=correction,
+            milliseconds=clock.parts,
+            exhibits=exhibits(output.shown) if detail else (),
+        )
 
 
 def exhibits(shown: dict[str, Tensor]) -> tuple[Exhibit, ...]:

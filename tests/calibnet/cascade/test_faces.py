@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from calibnet.alignment import gather
 from calibnet.cascade import Cascade, Stage
-from calibnet.cascade.faces import joined, seen_by_camera
+from calibnet.cascade.faces import joined
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, miscalibration, pose_error, project, rotation_from_vector, transform
 from calibnet.geometry.se3 import pose_from_vector
@@ -54,7 +54,7 @@ def saying(face: np.ndarray, truth: np.ndarray, sigma: np.ndarray, error_px: flo
         5, range_, None, before, correction @ before, correction, {"network": 1.0},
         np.diag(sigma**-2.0) + range_.information, match_error_px=error_px,
     )  # fmt: skip
-    return seen_by_camera(look, face)
+    return look.rotated(face.T)
 
 
 MODEL = CovarianceModel()
