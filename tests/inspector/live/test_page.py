@@ -65,8 +65,13 @@ def serve(tmp_path: Path) -> Iterator[Open]:
         server.__exit__(None, None, None)
 
 
+def fresh(browser: Browser) -> Page:
+    """A window in which Playwright may wait by evaluating, which the page's policy forbids."""
+    return browser.new_page(viewport={"width": 1366, "height": 768}, bypass_csp=True)
+
+
 def opened(browser: Browser, address: str) -> Page:
-    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    page = fresh(browser)
     page.requested = []  # type: ignore[attr-defined]
     page.on("request", lambda request: page.requested.append(request.url))  # type: ignore[attr-defined]
     page.on("pageerror", lambda error: page.requested.append(f"fault: {error}"))  # type: ignore[attr-defined]
@@ -146,6 +151,23 @@ def test_drag_let_go_and_see_the_answer(browser: Browser, make: Callable[..., Li
     assert not [url for url in page.requested if not url.startswith(("http://127.0.0.1", "http://localhost", "data:"))]  # type: ignore[attr-defined]
 
 
+def test_the_page_and_its_viewer_keep_to_the_policy(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    from playwright.sync_api import expect
+
+    page = browser.new_page(viewport={"width": 1366, "height": 768})
+    complaints: list[str] = []
+    page.on("console", lambda said: complaints.append(said.text))
+    page.goto(serve(make()))
+    expect(page.locator("#caption")).not_to_be_empty(timeout=PATIENCE)
+    page.keyboard.press("Enter")
+    says(page, "#word", "Accepted")
+    hint = page.frame_locator("#viewer").locator("#hint")
+    expect(hint).to_have_text("Taking in your first try.", timeout=PATIENCE)
+    assert not [text for text in complaints if "Content Security Policy" in text]
+
+
 def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:
     session = make()
     page = opened(browser, serve(session))
@@ -199,7 +221,7 @@ def test_a_pose_that_was_set_without_a_connection_is_sent_when_there_is_one(
 ) -> None:
     session = make()
     sockets: list[Any] = []
-    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    page = fresh(browser)
     page.route_web_socket(re.compile("/control$"), lambda socket: (sockets.append(socket), socket.connect_to_server()))
     page.goto(serve(session))
     page.wait_for_function("document.getElementById('caption').textContent !== ''")
@@ -216,7 +238,7 @@ def test_a_pose_that_was_set_without_a_connection_is_sent_when_there_is_one(
 def test_a_picture_that_did_not_come_is_asked_for_again(
     browser: Browser, make: Callable[..., LiveSession], serve: Open
 ) -> None:
-    page = browser.new_context(viewport={"width": 1366, "height": 768}).new_page()
+    page = fresh(browser)
     asked: list[str] = []
 
     def fail_first(route: Any) -> None:
