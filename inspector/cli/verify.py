@@ -59,6 +59,7 @@ def verify_sequence(
         if not causes:
             raise
         return conclude(unfit(UNKNOWN, str(error), causes), json_file)
+    prepare_json(json_file)  # once more, since it is known now what is read
     options = checked(sequence, {**asked, "as_is": not disturbed(asked)})
     several = len(options.positions) > 1
     if several and options.drive is False:

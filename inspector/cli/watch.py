@@ -51,6 +51,7 @@ def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing,
     options = checked(
         opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}
     )
+    prepare_json(json_file)  # once more, since it is known now what is read
     record = bool(viewing.save or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, viewing, None) if record else Outputs()
     with recording_to(outputs):

@@ -212,6 +212,24 @@ def _not_begun(client: Client, works: dict[Any, Any]) -> list[Any]:
     return [future for future in works if str(future.key) not in begun and not future.done()]
 
 
+def _register(client: Client, plugin: Any) -> None:
+    """Have every worker prepared, now or when it comes; one that dies meanwhile is replaced, and asked again.
+
+    Raises:
+        EngineError: it happens again and again.
+    """
+    for rest in reversed(range(1 + TRIES)):
+        try:
+            client.register_plugin(plugin, name="calib-inspect")
+            return
+        except OSError:  # as Dask says that a connection was closed
+            if not rest:
+                raise EngineError(
+                    "Workers die before they begin; see whether the machine has memory for them."
+                ) from None
+            time.sleep(POLL_S)
+
+
 def _lost(client: Client) -> EngineError:
     where = client.scheduler.address if client.scheduler is not None else "the scheduler"
     return EngineError(f"The scheduler at {where} went away, and what it was doing with it.")
@@ -236,7 +254,7 @@ def _client(engine: Engine) -> Iterator[Client]:
                     f"No scheduler answers at {engine.scheduler} ({type(error).__name__}); start one with "
                     "`dask scheduler`, or leave --scheduler out."
                 ) from None
-            client.register_plugin(_worker_plugin(engine.prepare, 0, ours=False), name="calib-inspect")
+            _register(client, _worker_plugin(engine.prepare, 0, ours=False))
         else:
             environment = {name: str(engine.threads) for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")}
             environment["MALLOC_TRIM_THRESHOLD_"] = "65536"  # give back what a large drive took
@@ -254,7 +272,7 @@ def _client(engine: Engine) -> Iterator[Client]:
                 )
             )
             client = stack.enter_context(Client(cluster))
-            client.register_plugin(_worker_plugin(engine.prepare, engine.threads, ours=True), name="calib-inspect")
+            _register(client, _worker_plugin(engine.prepare, engine.threads, ours=True))
         yield client
 
 

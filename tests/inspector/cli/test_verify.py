@@ -229,3 +229,15 @@ def test_kitti_is_verified_as_it_is(invoke: Invoke, kitti_folder: Path) -> None:
     code, out, err = invoke("seq", "04", "--root", str(kitti_folder / "odometry"), "--frames", "0:2")
     assert code in (0, 1, 4) and out.startswith("Verdict: ")
     assert "from the calibration as it is" in err
+
+
+def test_what_is_read_is_no_output_which_is_said_before_the_work(
+    invoke: Invoke, own_folder: Path, cascade: Cascade
+) -> None:
+    cascade.failure = AssertionError("It began to work.")
+    guess = Path("guess.json")
+    guess.write_text(json.dumps({"camera_from_lidar": REFERENCE.tolist()}))
+    before = guess.read_bytes()
+    code, _, err = invoke("folder", str(own_folder), "--guess", "guess.json", "--json", "guess.json")
+    assert code == 3 and "guess.json is read by this run and is not replaced" in err
+    assert guess.read_bytes() == before

@@ -20,7 +20,7 @@ from calibnet.runtime.interruption import StopRequest
 from inspector.fleet import engine as module
 from inspector.fleet.engine import Engine, EngineError, run_all
 
-pytest.importorskip("distributed", reason="the extra [fleet] is not installed")
+CommClosedError = pytest.importorskip("distributed", reason="the extra [fleet] is not installed").comm.CommClosedError
 
 
 def note(folder: Path, line: str) -> None:
@@ -238,3 +238,26 @@ def module_port() -> int:
     from inspector.programs import free_port
 
     return free_port()
+
+
+class DyingWorkers:
+    """A client some of whose workers die while they are prepared."""
+
+    def __init__(self, deaths: int) -> None:
+        self.deaths, self.asked = deaths, 0
+
+    def register_plugin(self, plugin: Any, name: str) -> None:
+        self.asked += 1
+        if self.asked <= self.deaths:
+            raise CommClosedError("Stream is closed")
+
+
+def test_a_worker_that_dies_while_it_is_prepared_is_no_end() -> None:
+    client = DyingWorkers(deaths=2)
+    module._register(client, None)  # type: ignore[arg-type]
+    assert client.asked == 3
+
+
+def test_workers_that_always_die_before_they_begin_are_one_sentence() -> None:
+    with pytest.raises(EngineError, match="Workers die before they begin"):
+        module._register(DyingWorkers(deaths=99), None)  # type: ignore[arg-type]
