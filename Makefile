@@ -1,7 +1,7 @@
 # make demo   install what is missing, run the main job on the synthetic world
 # make test   install what is missing, run the tests (PYTEST_ARGS=... to choose some)
 # make lint   ruff and mypy
-# make pictures  take the pictures of README.md and docs/ anew, in the real viewer
+# make pictures  retake the pictures of README.md and docs/, in the real viewer
 # make clean  remove what these made
 #
 # Needs Python 3.11 or newer (PYTHON=... to choose one). Installs into .venv, nothing into the system,

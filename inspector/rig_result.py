@@ -13,7 +13,7 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
-COLUMNS = ("camera", "verdict", "off the reference", "sure to (1σ)", "alone it says", "corrected by", "matches off")
+COLUMNS = ("camera", "verdict", "off the reference", "uncertainty (1σ)", "camera alone", "corrected by", "match error")
 """Columns of the table with a row per camera, what matters most first: a narrow window cuts off the rest."""
 
 

@@ -36,9 +36,7 @@ def certainty(verdict: Verdict) -> str:
     """How sure the result is, in degrees and centimetres; empty where nothing states it."""
     if verdict.covariance is None:
         return ""
-    return (
-        f"Sure to {verdict.sigma_rotation_deg:.2f}° / {verdict.sigma_translation_cm:.1f} cm (one standard deviation)."
-    )
+    return f"±{verdict.sigma_rotation_deg:.2f}° / {verdict.sigma_translation_cm:.1f} cm (1σ)."
 
 
 def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:

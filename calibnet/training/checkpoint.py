@@ -74,7 +74,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Tensor], State]:
     try:
         content = parse_json(metadata[KEY])
     except ValueError as error:
-        raise WeightsError(f"{origin} is no JSON ({error}); {remedy}.") from None
+        raise WeightsError(f"{origin} is not JSON ({error}); {remedy}.") from None
     return tensors, validated(State, content, origin, WeightsError, remedy)
 
 

@@ -68,7 +68,7 @@ def read_list(file: Path) -> tuple[ListedDrive, ...]:
         there = [name for name in COLUMNS if name in pq.read_schema(file).names]
         rows = pq.read_table(file, columns=there).to_pylist()
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise DatasetError(f"{file} is no Parquet table ({one_line(str(error), 200)}); {REMEDY}.") from None
+        raise DatasetError(f"{file} is not a Parquet table ({one_line(str(error), 200)}); {REMEDY}.") from None
     return validated(tuple[ListedDrive, ...], rows, f"List {file}", DatasetError, REMEDY)
 
 

@@ -111,7 +111,7 @@ def read_header(path: Path) -> Header:
     try:
         content = parse_json(metadata[HEADER])
     except ValueError as error:
-        raise WeightsError(f"{origin} is no JSON ({error}); copy or train it again.") from None
+        raise WeightsError(f"{origin} is not JSON ({error}); copy or train it again.") from None
     return validated(Header, content, origin, WeightsError, "copy or train it again")
 
 

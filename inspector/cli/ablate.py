@@ -123,7 +123,7 @@ def measured(
 
     if range_ not in RANGES:
         ranges = ", ".join(str(one) for one in RANGES)
-        raise click.UsageError(f"--range {range_} is none of those that networks are trained for: {ranges}.")
+        raise click.UsageError(f"--range {range_} is not one that networks are trained for: {ranges}.")
     torch.set_num_threads(threads)
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]

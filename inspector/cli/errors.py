@@ -124,7 +124,7 @@ def unforeseen(error: BaseException) -> int:
         where = f" together with {name}"
     package = package_at_fault(error)
     whose, whom = (f"the package {package}", " to its makers") if package else ("calib-inspect", "")
-    sentence = f"A fault of {whose} ended this ({one_line(what, 300)}). Please report it{whom}{where}."
+    sentence = f"Internal error in {whose} ({one_line(what, 300)}). Please report it{whom}{where}."
     return fail(sentence, ExitCode.UNFORESEEN)
 
 

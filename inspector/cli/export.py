@@ -80,7 +80,7 @@ def export(
         raise click.UsageError("--frame, --median and --drive choose from a recording; a folder has one calibration.")
     for name in (camera_frame, lidar_frame):
         if ROS_NAME.fullmatch(name) is None:
-            raise click.UsageError(f"{name!r} is no ROS frame name; use letters, digits, _ and /.")
+            raise click.UsageError(f"{name!r} is not a valid ROS frame name; use letters, digits, _ and /.")
 
     from inspector.export.exported import FrameNames
     from inspector.read.rig import is_rig
@@ -126,7 +126,7 @@ def export_rig(
         names = ", ".join(one.name for one in rig.solved.cameras)
         raise click.UsageError(f"Give a folder with --output for all cameras, or one with --camera: {names}.")
     if output.exists() and not output.is_dir():
-        raise click.UsageError(f"--output {output} is no folder, and the rig has several cameras; or choose --camera.")
+        raise click.UsageError(f"--output {output} is not a folder, which several cameras need; or choose --camera.")
     output.mkdir(parents=True, exist_ok=True)
     codes = []
     for solved, said in zip(rig.solved.cameras, ros_names([one.name for one in rig.solved.cameras]), strict=True):

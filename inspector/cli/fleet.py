@@ -198,7 +198,7 @@ def settled(outcome: Outcome[Task, Row]) -> Row:
         return note_failure(task, error)
     if type(error).__name__ == "KilledWorker":
         sentence = (
-            "Its worker ended while doing it, twice; if that was for want of memory, give --memory or fewer --workers."
+            "Two workers died while processing it; if they ran out of memory, set --memory or use fewer --workers."
         )
         return failed_row(task.drive, sentence)
     return failed_row(task.drive, f"The engine failed on it ({type(error).__name__}: {error}).")

@@ -253,7 +253,7 @@ def _failed(error: BaseException) -> DriveFailed:
     if isinstance(error, MemoryError):
         return DriveFailed("There is not enough memory for it.")
     sentence = environment_sentence(error) if isinstance(error, OSError | ImportError) else None
-    fault = f"A fault of calib-inspect ended it ({one_line(f'{type(error).__name__}: {error}', 300)}); see {LOG}."
+    fault = f"Internal error in calib-inspect ({one_line(f'{type(error).__name__}: {error}', 300)}); see {LOG}."
     return DriveFailed(sentence or fault)
 
 

@@ -126,7 +126,7 @@ def check_completion() -> None:
     if not asked:
         return
     if not re.fullmatch("(bash|zsh|fish)_(source|complete)", asked):
-        raise ConfigError(f"{COMPLETES}={asked[:40]!r} is no request of a shell; unset it, or see --help.")
+        raise ConfigError(f"{COMPLETES}={asked[:40]!r} is not a request of a shell; unset it, or see --help.")
     if asked.endswith("_complete"):
         word = ".*" if asked.startswith("fish") else r"\d{1,4}"  # fish gives the word itself, the others its place
         if "COMP_WORDS" not in os.environ or not re.fullmatch(word, os.environ.get("COMP_CWORD", "\n")):
@@ -162,7 +162,7 @@ def cli() -> None:
     """
     threads = os.environ.get("OMP_NUM_THREADS", "1")
     if not re.fullmatch(r"\s*0*[1-9]\d{0,3}\s*(,\s*\d+\s*)*", threads):
-        raise ConfigError(f"OMP_NUM_THREADS={threads[:40]!r} is no number of threads; unset it, or give one from 1 on.")
+        raise ConfigError(f"OMP_NUM_THREADS={threads[:40]!r} is not a number of threads; unset it or give 1 or more.")
 
 
 RERUN_LOG = "warn,re_log_encoding::rrd::file_sink=error"

@@ -127,7 +127,7 @@ class PartsType(click.ParamType[frozenset[Part]]):
         parts = [part.strip() for part in str(value).split(",")]
         unknown = [part for part in parts if part not in list(Part)]
         if unknown:
-            self.fail(f"{unknown[0]!r} is no part of a frame; choose from {', '.join(Part)}.", param, ctx)
+            self.fail(f"{unknown[0]!r} is not a part of a frame; choose from {', '.join(Part)}.", param, ctx)
         return frozenset(map(Part, parts))
 
 
@@ -150,7 +150,7 @@ class NumberRange(click.FloatRange):
         """Parse the text and hold it against the limits."""
         number = float(super().convert(cast(float, value), param, ctx))
         if not math.isfinite(number):
-            self.fail(f"{value} is no finite number.", param, ctx)
+            self.fail(f"{value} is not a finite number.", param, ctx)
         return number
 
 
@@ -181,7 +181,7 @@ class Size(click.ParamType[int]):
             return value
         match = re.fullmatch(rf"(\d{{1,9}}(?:\.\d{{1,9}})?) ?({'|'.join(UNITS)})", value)
         if match is None:
-            self.fail(f"{value!r} is no size; write it as 30MiB or 4GB.", param, ctx)
+            self.fail(f"{value!r} is not a valid size; write it as 30MiB or 4GB.", param, ctx)
         return int(float(match[1]) * UNITS[match[2]])
 
 

@@ -191,9 +191,7 @@ def train(
         raise click.UsageError("--ablation trains one stage: give --range instead of --all.")
 
     if (method or ablation) and range_ not in RANGES:
-        raise click.UsageError(
-            f"--range {range_} is none of those that networks run at: {', '.join(map(str, RANGES))}."
-        )
+        raise click.UsageError(f"--range {range_} is not one that networks run at: {', '.join(map(str, RANGES))}.")
 
     from calibnet.training.schedule import all_stages
 

@@ -219,7 +219,7 @@ def _date(text: str, origin: str) -> str:
     try:
         return datetime.fromisoformat(text).isoformat() if text else ""
     except ValueError:
-        raise ConfigError(f"{origin}: date {text!r} is none such as 2026-03-01 or 2026-03-01T14:05.") from None
+        raise ConfigError(f"{origin}: date {text!r} is not a date, for instance 2026-03-01T14:05.") from None
 
 
 def _words(text: str, origin: str, base: Path) -> tuple[str, ...]:

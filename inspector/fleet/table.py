@@ -167,7 +167,7 @@ def worst_first(rows: Iterable[Row]) -> list[Row]:
 def off(row: Row) -> float:
     """How far off a drive's calibration is: in tolerances of `calibnet.judging.verify.DRIVE`, or in two deviations.
 
-    Whichever is more counts, so that what moved far for want of frames does not stand before what is sure.
+    Whichever is more counts, so that a large but uncertain movement does not come before a certain one.
     """
     turn = (row.moved_deg or 0.0) / math.hypot(DRIVE.tolerances[-1].rotation_deg, 2 * (row.sigma_deg or 0.0))
     shift = (row.moved_cm or 0.0) / math.hypot(DRIVE.tolerances[-1].translation_cm, 2 * (row.sigma_cm or 0.0))
@@ -208,7 +208,7 @@ def read_table(file: Path) -> list[Row]:
         rows = pq.read_table(file).to_pylist()
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         said = one_line(str(error), 200)
-        raise DatasetError(f"{file} is no Parquet table ({said}); make it with `calib-inspect fleet`.") from None
+        raise DatasetError(f"{file} is not a Parquet table ({said}); make it with `calib-inspect fleet`.") from None
     return list(validated(tuple[Row, ...], rows, str(file), DatasetError, "make it with `calib-inspect fleet`"))
 
 

@@ -33,7 +33,7 @@ def points_bytes(frame: Frame) -> bytes:
 
 
 def shown(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
-    """Positions, intensities and edges of every point, or of every so-and-so-many-th of a huge cloud."""
+    """Positions, intensities and edges of every point, or of every n-th of a huge cloud."""
     every = -(-len(frame.points) // MOST_POINTS)
     points = frame.points[::every]
     low, high = colors.robust_limits(points[:, 3])

@@ -183,7 +183,7 @@ def try_lines(made: dict[str, Any]) -> list[str]:
     word = "no verdict" if verdict is None else verdict["word"]
     head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {word.upper()}."
     reason = [] if verdict is None else [verdict["text"]]
-    sure = [] if sigma is None else [f"Sure to {sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
+    sure = [] if sigma is None else [f"±{sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
     rows = []
     for position, step in enumerate(made["steps"]):
         name = f"after {step['name']}" if position else "from"

@@ -70,7 +70,7 @@ def read_rig(path: Path) -> RecordedRig:
     with understood(path):
         text = _said(file)
         if text is None:
-            raise RecordingError(f"{path} is no recording of a rig; `calib-inspect rig` makes one.")
+            raise RecordingError(f"{path} is not a recording of a rig; `calib-inspect rig` makes one.")
         said = json.loads(text)
         cameras = tuple(_camera(name, one, path) for name, one in said["cameras"].items())
         if not cameras:

@@ -79,7 +79,7 @@ def camera_of(row: dict[str, Any], path: Path) -> CameraModel:
     camera = validated(_Camera, said, f"{path}: a camera", RecordingError, "record it again")
     matrix = np.reshape(camera.matrix, (3, 3))
     if camera.width * camera.height > MOST_PIXELS or not (matrix[0, 0] > 0 and matrix[1, 1] > 0):
-        raise RecordingError(f"{path} has a camera that is none; record it again.")
+        raise RecordingError(f"{path} has an invalid camera; record it again.")
     return CameraModel(camera.width, camera.height, matrix, camera.model, np.array(camera.coefficients))
 
 

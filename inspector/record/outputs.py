@@ -184,7 +184,7 @@ def _address(url: str) -> tuple[str, int]:
     except ValueError:  # a port that is none, a bracket too many
         host = None
     if host is None or address.scheme not in ("rerun", "rerun+http", "rerun+https"):
-        raise ConfigError(f"--connect {url} is no address such as rerun+http://127.0.0.1:9876/proxy.")
+        raise ConfigError(f"--connect {url} is not a valid address, for instance rerun+http://127.0.0.1:9876/proxy.")
     return host, port
 
 

@@ -52,7 +52,7 @@ def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
 
 
 def untrained(content: dict[str, Any]) -> str:
-    """Which rows have no errors for want of weights, in a sentence; empty where all have them."""
+    """The sentence that says which rows have no errors because their weights are missing; empty where all have them."""
     which = []
     for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
         rows = [row for row in content["rows"] if row["preset"] == preset]

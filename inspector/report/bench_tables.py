@@ -12,7 +12,7 @@ from inspector.report.bench_summary import LEGEND, summary
 
 Table = tuple[list[str], list[list[str]]]
 TITLE = "All methods on the same frames"
-WORDS = frozenset(("method", "of", "rig", "trained there", "trained on", "measured on", "says who", "range"))
+WORDS = frozenset(("method", "of", "rig", "trained there", "trained on", "measured on", "source", "range"))
 """Heads of columns that hold words; all others hold figures."""
 
 
@@ -85,4 +85,4 @@ def _claims(content: dict[str, Any]) -> Table:
     for name, result in published_results(content):
         errors = f"{result['rotation_deg']:g}°", f"{result['translation_cm']:g} cm"
         body.append([name, result["range"], *errors, result["rig"], result["source"]])
-    return ["method", "range", "rotation", "translation", "measured on", "says who"], body
+    return ["method", "range", "rotation", "translation", "measured on", "source"], body

@@ -133,7 +133,7 @@ def read_table(source: Path, command: str) -> dict[str, Any]:
     try:
         content = parse_json(read_text(source, f"The table of {command}", error=ConfigError))
     except ValueError as error:
-        raise ConfigError(f"{source} is no JSON ({error}); {remedy}.") from None
+        raise ConfigError(f"{source} is not JSON ({error}); {remedy}.") from None
     if not isinstance(content, dict) or content.get("table") != command:
         raise ConfigError(f"{source} was not written by `calib-inspect {command} --json`; {remedy}.")
     validated({"bench": _Bench, "ablate": _Ablation}[command], content, str(source), ConfigError, remedy)

@@ -148,7 +148,7 @@ def _curve_views(layout: Layout) -> list[View]:
         )
         for kind, unit in kinds
     ]
-    return [*errors, curve_view("Fit: matches off by [px]", FIT)] if layout.with_fit else errors
+    return [*errors, curve_view("Fit: match error [px]", FIT)] if layout.with_fit else errors
 
 
 def _log_errors(rec: Subtree, observation: Observation) -> None:

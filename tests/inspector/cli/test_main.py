@@ -203,7 +203,7 @@ def test_what_no_shell_says_of_a_line_is_a_sentence(
     assert errors.run(cli, []) == 3
     seen = capsys.readouterr()
     assert seen.out == ""
-    assert re.fullmatch(r"calib-inspect: .*(no request of a shell|not what a shell sets); .*\n", seen.err)
+    assert re.fullmatch(r"calib-inspect: .*(not a request of a shell|not what a shell sets); .*\n", seen.err)
 
 
 @pytest.mark.parametrize("threads", ["abc", "-1", "0", "", "2;3", "9" * 50])
@@ -213,7 +213,7 @@ def test_a_number_of_threads_that_is_none_is_a_sentence(
     monkeypatch.setenv("OMP_NUM_THREADS", threads)
     assert errors.run(cli, ["info"]) == 3
     assert capsys.readouterr().err == (
-        f"calib-inspect: OMP_NUM_THREADS={threads[:40]!r} is no number of threads; unset it, or give one from 1 on.\n"
+        f"calib-inspect: OMP_NUM_THREADS={threads[:40]!r} is not a number of threads; unset it or give 1 or more.\n"
     )
 
 

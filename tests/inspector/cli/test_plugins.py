@@ -74,11 +74,11 @@ BODIES = {
     "raise SystemExit(0)": (3, "The export format 'mine' of package mine cannot be imported (SystemExit: 0)"),
     "def f(e): raise ValueError('bad')": (
         70,
-        "A fault of the package mine ended this (ValueError: bad). Please report",
+        "Internal error in the package mine (ValueError: bad). Please report",
     ),
     "def f(e): raise SystemExit(0)": (
         70,
-        "A fault of the package mine ended this (SystemExit: 0). Please report",
+        "Internal error in the package mine (SystemExit: 0). Please report",
     ),
     "def f(e): return 5": (3, "The export format 'mine' gives int instead of text; update its package."),
 }

@@ -98,7 +98,7 @@ def test_a_camera_of_nuscenes_may_stand_in_the_name_of_the_sequence(tmp_path: Pa
         ("path,dataset,sequence\nx,kitti-odometry,04 --save=/etc/x\n", "row 1 .*is not SEQUENCE, for instance 04"),
         ("path,dataset,sequence\nx,kitti-odometry,--save=x\n", "row 1 .*must not begin with a dash"),
         ("path,dataset,sequence\nx,kitti-raw,0005\n", "row 1 .*is not DATE/DRIVE, for instance 2011_09_26/0005"),
-        ("path,date\nx,yesterday\n", "row 1 .*date 'yesterday' is none"),
+        ("path,date\nx,yesterday\n", "row 1 .*date 'yesterday' is not a date"),
         ("path,options\nx,'\n", "row 1 .*options cannot be split"),
         ("path,drive\nx,one\ny,one\nx/../x,one\n", "row 3 .* and .*row 1 .*are both called"),
         ('path\n"x\n', "row 1: unexpected end"),

@@ -186,7 +186,7 @@ def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"PAR1 and nothing more", b"{}"])
 def test_what_is_no_table_is_a_sentence(tmp_path: Path, data: bytes) -> None:
     (tmp_path / TABLE).write_bytes(data)
-    with pytest.raises(DatasetError, match="is no Parquet table"):
+    with pytest.raises(DatasetError, match="is not a Parquet table"):
         read_table(tmp_path / TABLE)
 
 

@@ -95,7 +95,7 @@ def test_the_verdict_is_recorded_and_shown_with_what_was_skipped(
     assert recorded.drive_verdict.skipped == (BadFrame(1, "It is cut short."),)
     text = shown(tmp_path / "drive.rrd")
     assert text.startswith("# Cannot tell\n\nEdges disagree.\n\n- **time-offset**: Scans seem 0.1 s later")
-    assert "Sure to 0.30° / 7.0 cm (one standard deviation)." in text
+    assert "±0.30° / 7.0 cm (1σ)." in text
     assert "- frame 1: It is cut short." in text
 
 
