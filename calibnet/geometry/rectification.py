@@ -145,7 +145,8 @@ def _reach(camera: CameraModel, direction: list[float], most: float) -> float:
     """Degrees from the axis up to which the picture shows a direction; at least one step."""
     angles = np.radians(np.arange(STEP_DEG, most + STEP_DEG / 2, STEP_DEG))
     rays: Floats = np.column_stack([np.outer(np.sin(angles), direction), np.cos(angles)])
-    (u, v), valid = camera.see(rays).pixels.T, camera.see(rays).valid
-    shown = valid & (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
+    seen = camera.see(rays)
+    u, v = seen.pixels.T
+    shown = seen.valid & (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
     count = len(shown) if shown.all() else int(shown.argmin())
     return max(count, 1) * STEP_DEG
