@@ -38,7 +38,7 @@ OWN = tuple(
 )
 """Entities of every run that are compared."""
 RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
-DRIVES_ARE_LEVEL = "level: whole drive as one"
+DRIVES_ARE_LEVEL = "flat line: whole drive as one"
 """What the legend says of lines that are the same at all frames."""
 CHUNKS_A_FLUSH = 16
 
