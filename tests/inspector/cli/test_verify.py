@@ -91,7 +91,7 @@ def own_folder(tmp_path: Path) -> Path:
 def test_a_good_calibration_is_accepted_and_nothing_is_written(invoke: Invoke, own_folder: Path) -> None:
     code, out, _ = invoke("folder", str(own_folder))
     assert code == 0 and out.count("\n") == 1
-    assert out.startswith("Verdict: accepted. The calibration is off by no more than 0.3° / 8 cm: by 0.00° ± 0.10° ")
+    assert out.startswith("Verdict: accepted. The calibration is off by no more than 0.3° / 8 cm: 0.00° ± 0.10° ")
     assert {path.name for path in Path().iterdir()} == {"own"}
 
 
@@ -111,7 +111,7 @@ def test_a_single_frame_is_held_against_wider_limits(invoke: Invoke, own_folder:
     small = ("--miscalibrate", "0,0,0.6,0,0,0")
     assert invoke("folder", str(own_folder), *small)[0] == 1
     code, out, _ = invoke("folder", str(own_folder), *small, "--frames", "1")
-    assert code == 0 and "no more than 1° / 25 cm: by 0.60°" in out
+    assert code == 0 and "no more than 1° / 25 cm: 0.60°" in out
 
 
 @pytest.mark.parametrize(
