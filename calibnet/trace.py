@@ -245,6 +245,7 @@ class DriveLook:
         offset: ``[6]``, ``(translation m, rotation rad)`` from there to where it believes the extrinsic to be.
         information: ``[6, 6]`` of it as the network states it, or None.
         match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
+        lens: logarithm of how much another lens lowers the cost of its matches, see `calibnet.judging.predictors`.
     """
 
     frame: int
@@ -252,6 +253,7 @@ class DriveLook:
     offset: Vector6 = field(repr=False)
     information: Matrix6 | None = field(default=None, repr=False)
     match_error_px: float = math.nan
+    lens: float = math.nan
 
     def rotated(self, rotation: Rotation) -> DriveLook:
         """The same of a camera turned by ``rotation [3, 3]``."""

@@ -17,6 +17,7 @@ from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
+from calibnet.judging.predictors import lens_gain, misfits
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
@@ -122,7 +123,8 @@ def solve_drive(
 
 def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
     """What one look at one frame of a drive says, as the drive keeps it."""
-    return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px)
+    lens = lens_gain(*misfits(look))
+    return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px, lens)
 
 
 class FrameLook(NamedTuple):

@@ -88,7 +88,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     Raises:
         CalibrationError: too few runs end right, or wrong.
     """
-    classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES)
+    classifier, figures, kept = fit_classifier(runs, DRIVE_LIMITS, FEWEST_DRIVES, near_counts=False)
     # only accepted runs count: a few gross errors would inflate the covariance of all
     accepted = [run for run in kept if error_probability(run, classifier) < classifier.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
@@ -104,7 +104,7 @@ def error_probability(run: VerdictRun, classifier: Classifier) -> float:
 
 
 def fit_classifier(
-    runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST
+    runs: Sequence[VerdictRun], limits: tuple[float, float], fewest: int = FEWEST, near_counts: bool = True
 ) -> tuple[Classifier, FitFigures, list[VerdictRun]]:
     """Fit a classifier to runs, and measure it on sequences left out.
 
@@ -112,6 +112,7 @@ def fit_classifier(
         runs: runs with a known error.
         limits: largest error, in degrees and centimetres, of a good result.
         fewest: number of good, and of wrong, results that is required.
+        near_counts: whether runs that end near a limit (`NEAR`) count where a result may be accepted.
 
     Returns:
         The classifier, its figures, and the plain runs that it does not reject.
@@ -131,7 +132,8 @@ def fit_classifier(
     wrong_or_right = (~good).astype(np.intp)
     odds = left_out(values, wrong_or_right, 2, RIDGE, [run.sequence for run in asked])[:, 0]
     plain = np.array([run.plain for run in asked], bool)
-    accepted_below = threshold(odds, ~good, FALSE_ACCEPTS * len(runs))
+    counts = np.array([near_counts or not is_near(run, limits) for run in asked], bool)
+    accepted_below = threshold(odds[counts], ~good[counts], FALSE_ACCEPTS * counted(runs, limits, near_counts))
     rejected_above = max(float(np.quantile(odds[good], 1 - GOOD_REJECTED)), accepted_below)
     (intercept,), (weights,) = regression(values, wrong_or_right, 2, RIDGE)
     classifier = Classifier(
@@ -178,6 +180,11 @@ def _curve(
         }
         for share in CURVE
     ]
+
+
+def counted(runs: Sequence[VerdictRun], limits: tuple[float, float], near_counts: bool) -> int:
+    """How many runs there are, with or without those that end near a limit."""
+    return sum(near_counts or not is_near(run, limits) for run in runs)
 
 
 def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:

@@ -24,18 +24,24 @@ class DrivePredictors:
     Attributes:
         match_error: logarithm of the frames' median match error in the last look, in pixels.
         aligned: logarithm of how far the alignment of edges moved the networks' result, in centimetres.
+        lens: the frames' median logarithm of how much another lens lowers the cost of the matches.
     """
 
     match_error: float
     aligned: float
+    lens: float
 
 
 def drive_predictors(estimate: DriveEstimate) -> DrivePredictors | None:
     """The predictors of a drive; None if the method reports no frames."""
     if not estimate.looks:
         return None
-    match_error = float(np.median([look.match_error_px for look in estimate.looks]))
-    return DrivePredictors(math.log(max(match_error, LEAST)), math.log(max(aligned_cm(estimate), LEAST)))
+    looks = estimate.looks
+    return DrivePredictors(
+        match_error=math.log(max(float(np.median([look.match_error_px for look in looks])), LEAST)),
+        aligned=math.log(max(aligned_cm(estimate), LEAST)),
+        lens=float(np.median([look.lens for look in looks])),
+    )
 
 
 def aligned_cm(estimate: DriveEstimate) -> float:

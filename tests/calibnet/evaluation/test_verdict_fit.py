@@ -9,6 +9,7 @@ import pytest
 
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.verdict_fit import (
+    fit_classifier,
     fit_covariance,
     fit_drives,
     fit_frames,
@@ -71,6 +72,20 @@ def test_runs_near_a_limit_are_set_aside_in_a_curve_of_their_own() -> None:
     assert is_near(replace(made[0], rotation_deg=0.3), (0.25, 99.0)) and not is_near(made[0], (9.0, 99.0))
 
 
+def test_runs_near_a_limit_may_be_left_out_of_what_is_accepted() -> None:
+    """Ten wrong runs look best of all, and end near a limit: where these count, next to nothing is accepted."""
+    made = [
+        replace(run, translation_cm=27.5, rotation_deg=0.3, predictors={**(run.predictors or {}), "match_error": 1.0})
+        if not run.good and run.number % 40 == 1
+        else run
+        for run in runs(800, CovarianceModel())
+    ]
+    strict, lenient = (fit_classifier(made, (1.0, 25.0), near_counts=counts) for counts in (True, False))
+    assert strict[0].accepted_below < lenient[0].accepted_below
+    assert strict[1].false_accept_rate <= 0.01 < lenient[1].false_accept_rate < 0.03
+    assert strict[1].acceptance_of_good < lenient[1].acceptance_of_good
+
+
 def test_what_predictors_do_not_tell_is_not_accepted() -> None:
     classifier, _, figures = fit_frames(runs(800, CovarianceModel(), sharpness=0.0), BOTH)
     assert figures.acceptance_of_good < 0.1 and classifier.accepted_below < 0.5
@@ -102,10 +117,10 @@ def test_a_drive_s_covariance_is_widened_to_its_errors() -> None:
         replace(
             run,
             information=np.linalg.inv(CovarianceModel().covariance(STATED, *BOTH, run.match_error_px) / 4).tolist(),
-            predictors={"match_error": (run.predictors or {})["match_error"], "aligned": 0.0},
+            predictors={"match_error": (run.predictors or {})["match_error"], "aligned": 0.0, "lens": 0.0},
         )
         for run in runs(400, CovarianceModel())
     ]
     classifier, inflation, figures = fit_drives(made)
     assert inflation == pytest.approx(4.0, rel=0.15) and figures.nees == pytest.approx(1.0, abs=1e-4)
-    assert classifier.weights["match_error"] > 1 and set(classifier.weights) == {"match_error", "aligned"}
+    assert classifier.weights["match_error"] > 1 and set(classifier.weights) == {"match_error", "aligned", "lens"}

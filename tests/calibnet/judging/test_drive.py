@@ -32,7 +32,7 @@ def estimate(
     sigma = [centimetres / 100] * 3 + [float(np.radians(degrees))] * 3
     skipped = tuple(BadFrame(frame, "It is cut short.") for frame in range(bad))
     looks = tuple(
-        DriveLook(frame, frame, np.array([0, 0, halves / 100 * (frame > 4), 0, 0, 0]), None, error)
+        DriveLook(frame, frame, np.array([0, 0, halves / 100 * (frame > 4), 0, 0, 0]), None, error, -0.1)
         for frame in range(10)
     )
     there = miscalibration([0, 0, yaw], [0, 0, ahead]) @ REFERENCE
@@ -96,7 +96,7 @@ def test_by_no_coefficients_no_drive_is_accepted() -> None:
 def test_predictors_of_a_drive() -> None:
     found = drive_predictors(estimate(yaw=2.5, halves=24))
     assert found is not None
-    assert vars(found) == pytest.approx({"match_error": np.log(1.5), "aligned": np.log(1e-6)})
+    assert vars(found) == pytest.approx({"match_error": np.log(1.5), "aligned": np.log(1e-6), "lens": -0.1})
     assert halves_cm(estimate(halves=24).looks) == pytest.approx(24)
     assert apart(np.zeros(6), np.array([0, 0, 0, 0, np.radians(0.3), 0])) == pytest.approx(8.0)
     silent = replace(estimate(), looks=())
