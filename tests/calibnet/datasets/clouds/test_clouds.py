@@ -172,6 +172,15 @@ def test_a_table_without_a_coordinate_names_what_it_has(write_layout):
         layout.open()[1]
 
 
+def test_a_table_with_two_columns_of_one_name_is_refused(write_layout):
+    layout = write_layout("folder")
+    layout.scans[1].unlink()
+    path = layout.scans[1].with_suffix(".feather")
+    feather.write_feather(table(scan()).rename_columns(["x", "x", "z", "intensity"]), path)
+    with pytest.raises(DatasetError, match="several of its columns are called 'x'"):
+        layout.open()[1]
+
+
 def test_a_transposed_array_is_refused_by_name(write_layout):
     layout = write_layout("folder")
     layout.scans[1].unlink()
