@@ -176,7 +176,8 @@ def test_a_table_with_two_columns_of_one_name_is_refused(write_layout):
     layout = write_layout("folder")
     layout.scans[1].unlink()
     path = layout.scans[1].with_suffix(".feather")
-    feather.write_feather(table(scan()).rename_columns(["x", "x", "z", "intensity"]), path)
+    whole = table(scan())
+    feather.write_feather(whole.rename_columns(["x" if name == "y" else name for name in whole.column_names]), path)
     with pytest.raises(DatasetError, match="several of its columns are called 'x'"):
         layout.open()[1]
 
