@@ -110,9 +110,10 @@ def _columns(read: Any, data: bytes) -> Columns:
     if table.num_rows > MOST_POINTS:
         raise CloudError(f"it holds {table.num_rows:,} points, and {MOST_POINTS:,} are the most that are read")
     columns: Columns = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        if table.column_names.count(name) > 1:
+    names = [name.lower() for name in table.column_names]
+    for name, column in zip(names, table.columns, strict=True):
+        if names.count(name) > 1:
             raise CloudError(f"several of its columns are called {name!r}")
         if pa.types.is_floating(column.type) or pa.types.is_integer(column.type):
-            columns.setdefault(name.lower(), column.to_numpy(zero_copy_only=False))
+            columns[name] = column.to_numpy(zero_copy_only=False)
     return columns
