@@ -40,5 +40,8 @@ class Drive:
             return frame
         return replace(frame, camera_from_lidar=transform(REFERENCE[:3, :3], [position, 0, 0]))
 
+    def index_of(self, position: int) -> int:
+        return self.numbers[position]
+
     def __iter__(self) -> Iterator[Frame]:
         return (self[position] for position in range(len(self)))

@@ -89,7 +89,7 @@ def calibrated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...,
         file = tmp_path / "run.rrd"
         sequence = open_sequence("folder", folder)
         away = miscalibration([1, 0, 0], [0, 0, 0])
-        viewing = Viewing(file, True, False, "127.0.0.1", None)
+        viewing = Viewing(file, True, False, None, None)
         assert calibrate(sequence, viewing=viewing, report=None, miscalibration=away, method=method, **asked) == 0
         return file
 

@@ -224,7 +224,7 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
         (("RUN", "--folder", "x"), 2, "Give a recording or --folder"),
         (("RUN", "--frame", 1, "--median"), 2, "one of --frame, --median and --drive"),
         (("--folder", "x", "--median"), 2, "has one calibration"),
-        (("RUN", "--lidar-frame", "two words"), 2, "no ROS frame name"),
+        (("RUN", "--lidar-frame", "two words"), 2, "not a valid ROS frame name"),
         (("RUN", "--drive"), 3, "record it with --drive"),
         (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),
         (("--folder", "nowhere"), 3, "cannot be read"),

@@ -62,7 +62,7 @@ def test_every_stage_and_scale_has_its_views() -> None:
 @pytest.mark.parametrize(
     ("has_reference", "contents", "absent"),
     [
-        (False, Contents.of(Detail.FULL), ("eference", "error", "true", "iscalibrated")),
+        (False, Contents.of(Detail.FULL), ("eference", "otation error", "ranslation error", "true", "iscalibrated")),
         (True, Contents.of(Detail.OVERVIEW), ("matching scores", "sliders", "a tile a displacement")),
         (True, Contents.of(Detail.CUSTOM, frozenset({Part.SCENE})), ("After", "error", "hourglass", "displacement")),
         (
