@@ -28,8 +28,13 @@ class Claim:
         earlier: where a file of the same kind lies that was there before; None without one.
     """
 
-    def __init__(self, path: Path, kind: Kind) -> None:
+    def __init__(self, path: Path, kind: Kind, patience_s: float = PATIENCE_S) -> None:
         """Claim a file that is new or of the same kind; nothing of it changes before `begin`.
+
+        Args:
+            path: the file.
+            kind: what it holds.
+            patience_s: how long another process that writes it is waited for.
 
         Raises:
             OutputError: it may not be written (see `check_output`), or another process is writing it.
@@ -38,7 +43,7 @@ class Claim:
         self.earlier: Path | None = None
         self._lock: FileLock | None = None
         check_output(path, kind)
-        self._lock = _lock(path)
+        self._lock = _lock(path, patience_s)
 
     @classmethod
     def of_new(cls, path: Path, kind: Kind) -> Claim:
@@ -48,7 +53,7 @@ class Claim:
             if os.path.lexists(candidate):
                 continue
             with contextlib.suppress(BusyError):
-                claim = cls(candidate, kind)
+                claim = cls(candidate, kind, patience_s=0)  # the next name is as good
                 if not os.path.lexists(candidate):
                     return claim
                 claim.release()  # another run has just ended
@@ -110,7 +115,7 @@ def locked(path: Path, patience_s: float = PATIENCE_S) -> Iterator[None]:
         _unlock(lock)
 
 
-def _lock(path: Path, patience_s: float = PATIENCE_S) -> FileLock:
+def _lock(path: Path, patience_s: float) -> FileLock:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=patience_s)
