@@ -15,8 +15,8 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verd
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Largest standard deviations, over all axes, of a drive that is judged."""
 FEWEST_JUDGED = 4
-"""Fewest frames of a drive that can be accepted. Two or three mostly show one place, most such drives end outside the
-limits, and no predictor tells which (docs/decisions.md, "Drives")."""
+"""Fewest frames of a drive that can be accepted; those of several cameras at one moment count once. Two or three mostly
+show one place, most such drives end outside the limits, and no predictor tells which (docs/decisions.md, "Drives")."""
 HALVES_CM, ALIGNED_CM = 15.0, 7.0
 """Differences between the halves of a drive, and between its networks and its edges, above which the reason mentions
 them; rotations are converted as in `calibnet.judging.drive_predictors`."""
@@ -60,9 +60,11 @@ def _word(
         )
     if isinstance(classifier, str):
         return CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}"
-    if used < FEWEST_JUDGED:
+    moments = min(used, len({look.position for look in estimate.looks}) or used)
+    if moments < FEWEST_JUDGED:
         needed = f"a drive needs {FEWEST_JUDGED} to be accepted, preferably of different places"
-        return CANNOT_TELL, f"{used} frames agree, but {needed}."
+        of_them = "" if moments == used else f" of {moments} moments"
+        return CANNOT_TELL, f"{used} frames{of_them} agree, but {needed}."
     predictors = drive_predictors(estimate)
     if predictors is None:
         return CANNOT_TELL, "Its frames hold too little information to judge the drive."

@@ -76,7 +76,13 @@ def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
     assert verdict.word == "cannot tell" and verdict.reason.startswith(
         "3 frames agree, but a drive needs 4 to be accepted"
     )
-    assert judge_drive(replace(few, frames=4), REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"
+    four = replace(few, frames=4, looks=estimate().looks[:4])
+    assert judge_drive(four, REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"
+    two_cameras = replace(four, looks=(*four.looks[:2], *four.looks[:2]))
+    verdict = judge_drive(two_cameras, REFERENCE, RANGES[2], CLASSIFIER)
+    assert verdict.word == "cannot tell" and verdict.reason.startswith(
+        "4 frames of 2 moments agree, but a drive needs 4"
+    )
 
 
 def test_a_start_in_the_corner_of_the_range_is_within_it() -> None:
