@@ -39,6 +39,8 @@ class Channel:
         msgtype: of ROS 2.
         decode: makes a message of its bytes, with the fields that ROS has; None where nobody here reads it.
         stamp: the time that it says, in seconds; 0 for none.
+        store: the types that a message of ROS is decoded with, those of its own definition; None for another message.
+        old: whether it is one of ROS 1.
     """
 
     id: int
@@ -46,6 +48,8 @@ class Channel:
     msgtype: str
     decode: Decode | None
     stamp: Callable[[bytes], float]
+    store: Any = None
+    old: bool = False
 
 
 def is_foreign(path: Path) -> bool:
@@ -120,9 +124,13 @@ def _channel(channel: Any, schema: Any) -> Channel:
     package, _, last = name.rpartition("/")
     kind = f"{package.removesuffix('/msg')}/msg/{last}" if package else name
     old = channel.message_encoding == "ros1"
-    known = kind in READ and channel.message_encoding in ("ros1", "cdr")
-    decode_ros = _ros(kind, old, schema.data.decode() if schema.encoding.endswith("msg") else "") if known else None
-    return Channel(channel.id, channel.topic, kind, decode_ros, lambda data: stamp_of(data, not old))
+    if kind not in READ or channel.message_encoding not in ("ros1", "cdr"):
+        return Channel(channel.id, channel.topic, kind, None, lambda data: stamp_of(data, not old))
+    store = _store(kind, old, schema.data.decode() if schema.encoding.endswith("msg") else "")
+    read = store.deserialize_ros1 if old else store.deserialize_cdr
+    return Channel(
+        channel.id, channel.topic, kind, lambda data: read(data, kind), lambda data: stamp_of(data, not old), store, old
+    )
 
 
 def _decoder(encoding: str, schema: Any) -> Decode | None:
@@ -136,16 +144,9 @@ def _decoder(encoding: str, schema: Any) -> Decode | None:
     return None
 
 
-def _ros(kind: str, old: bool, definition: str) -> Decode:
-    """The decoder of a message of ROS, by the definition that came with it or, without one, by ROS's own."""
-    store = _store(kind, old, definition)
-    if old:
-        return lambda data: store.deserialize_ros1(data, kind)
-    return lambda data: store.deserialize_cdr(data, kind)
-
-
 @cache
 def _store(kind: str, old: bool, definition: str) -> Any:
+    """What decodes a message of ROS, by the definition that came with it or, without one, by ROS's own."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     if not definition.strip():

@@ -17,7 +17,7 @@ from calibnet.runtime.reading import MEGABYTE, require_file
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
-    from rosbags.interfaces.typing import Typesdict
+    from rosbags.typesys.store import Typestore
 
 KINDS = (".bag", ".db3", ".mcap")
 """What a bag's file is called: ROS 1, and the two storages of ROS 2."""
@@ -91,13 +91,14 @@ class BagRecording:
                         "mcap merge A.mcap B.mcap -o AB.mcap."
                     )
                 self._reader = McapFile(self.paths[0])
+                for channel in self._reader.connections:
+                    if channel.store is not None:
+                        self._check_definitions(channel.store, channel.old)
             else:
-                ros2 = get_typestore(Stores.ROS2_HUMBLE)
-                standard = get_typestore(Stores.ROS1_NOETIC) if old else ros2
+                standard = get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
                 self._reader = AnyReader(self.paths, default_typestore=standard)
                 self._reader.open()
-                # the stored messages of ROS 1 lack TFMessage, which is the same in both
-                self._check_definitions(self._reader.typestore.fielddefs, ros2.fielddefs | standard.fielddefs)
+                self._check_definitions(self._reader.typestore, old)
         weakref.finalize(self, _close, self._reader)
 
     @property
@@ -159,14 +160,23 @@ class BagRecording:
                 "recover`), or copy it again."
             ) from None
 
-    def _check_definitions(self, own: Typesdict, standard: Typesdict) -> None:
+    def _check_definitions(self, store: Typestore, old: bool) -> None:
         """Hold what a bag says of the messages that are read from it against what they are.
+
+        Args:
+            store: the types that its messages are decoded with.
+            old: whether they are of ROS 1.
 
         Raises:
             DatasetError: a field is missing there, or of another type.
         """
-        for name in sorted(own.keys() & DEFINED):
-            fields = dict(own[name][1])
+        from rosbags.typesys import Stores, get_typestore
+
+        standard = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
+        if old:  # whose stored messages lack TFMessage, which is the same in both
+            standard |= get_typestore(Stores.ROS1_NOETIC).fielddefs
+        for name in sorted(store.fielddefs.keys() & DEFINED):
+            fields = dict(store.fielddefs[name][1])
             wrong = [field for field, kind in standard[name][1] if fields.get(field) != kind]
             if wrong:
                 raise DatasetError(

@@ -56,3 +56,13 @@ def test_what_is_missing_is_listed(tmp_path: Path) -> None:
     bag.write("/cam/image", "CompressedImage", image_of(FRAMES[0], 1.0), 1.0)
     with pytest.raises(DatasetError, match=r"no point clouds; there are: /cam/image \(1 CompressedImage\)"):
         Bag([bag.close()])
+
+
+@pytest.mark.parametrize("encoding", ["ros1", "cdr"])
+def test_messages_of_ros_that_are_defined_otherwise_are_one_sentence(encoding: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "drive.mcap", encoding)
+    content = path.read_bytes()
+    assert b"uint32 point_step" in content
+    path.write_bytes(content.replace(b"uint32 point_step", b"uint32 point_stop"))
+    with pytest.raises(DatasetError, match=r"defines sensor_msgs/msg/PointCloud2 without point_step"):
+        Bag([path])
