@@ -57,7 +57,8 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
     assert "300 runs of frames on 7 sequences.\n150 of them have no fault" in result.stderr
     coefficients = load_coefficients(load_manifest("compact", weights), weights)
     assert coefficients.missing == "" and coefficients.fitted["seed"] == 0
-    assert set(coefficients.weights) == set(RANGES[2:]) and coefficients.fitted["frames"]["false_accept_rate"] == 0.01
+    assert set(coefficients.weights) == set(RANGES[2:])
+    assert coefficients.fitted["frames"]["false_accept_rate"] == pytest.approx(1 / 300)  # at most 0.5 %
     assert coefficients.drive is not None and coefficients.drive.weights["match_error"] > 1
     assert coefficients.lens is not None and coefficients.fitted["lenses"]["runs"] == 120
     assert "120 runs on 5 sequences, 60 of them with a fault of the lens." in result.stderr
