@@ -1,10 +1,11 @@
 """Fuzzing of every parser: coverage-guided by atheris where that is installed, else by random changes alone.
 
-    python -m tests.fuzz [--seconds 5] [--corpus FOLDER] [TARGET ...]
+    python -m tests.fuzz [--seconds 5] [--corpus FOLDER] [--random [--seed 0]] [TARGET ...]
 
 Each target is run in a process of its own, on whole inputs and what earlier runs found (`KEPT`); with ``--corpus`` what
 it finds is kept. An input may end in an error of ours only; anything else, a crash, or more than `HANG_S` is a finding,
-which is printed and kept as a file. `.ci/run` gives each target 5 seconds; an hour each is for the hand.
+which is printed and kept as a file. `.ci/run` gives each target 5 seconds of the same random changes every time, so
+that a finding there comes from what was changed in the code; new ones, for an hour each, are for the hand.
 """
 
 from __future__ import annotations
@@ -304,8 +305,16 @@ def changed(data: bytes, words: tuple[bytes, ...], draw: random.Random, others: 
     return bytes(content[:LARGEST])
 
 
-def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True) -> int:
-    """Run one target in this process; returns the number of inputs, and raises at a finding."""
+def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True, seed: int | None = None) -> int:
+    """Run one target in this process; returns the number of inputs, and raises at a finding.
+
+    Args:
+        name: of the target.
+        seconds: how long.
+        corpus: folder of inputs to begin with, beside what is kept; guided runs add to it.
+        guided: by coverage, where atheris is installed.
+        seed: of the random changes; None for others every time.
+    """
     signal.signal(signal.SIGALRM, _hang)
     try_one(name, TARGETS[name].seeds[0])  # what is imported lazily counts for no input
     _limit_memory()
@@ -316,9 +325,9 @@ def fuzz(name: str, seconds: float, corpus: Path | None, guided: bool = True) ->
             guided = False
     if guided:
         return _guided(atheris, name, seconds, corpus)
-    target, draw, pool = TARGETS[name], random.Random(time.time_ns()), [*TARGETS[name].seeds, *kept(name)]
+    target, draw, pool = TARGETS[name], random.Random(seed), [*TARGETS[name].seeds, *kept(name)]
     if corpus is not None and corpus.is_dir():
-        pool += [path.read_bytes() for path in corpus.iterdir()]
+        pool += [path.read_bytes() for path in sorted(corpus.iterdir())]
     count, end = 0, time.monotonic() + seconds
     while time.monotonic() < end:
         data = changed(draw.choice(pool), target.words, draw, pool)
@@ -410,6 +419,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=5.0)
     parser.add_argument("--corpus", type=Path, help="Folder of corpora, one a target; made if need be.")
     parser.add_argument("--random", action="store_true", help="Random changes, all targets in this one process.")
+    parser.add_argument("--seed", type=int, help="Of --random: the same changes every time.")
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     total, failed = 0, []
@@ -417,9 +427,8 @@ def main() -> int:
         count, found = 0, ""
         if asked.random or asked.here:
             try:
-                count = fuzz(
-                    name, asked.seconds, asked.corpus and asked.corpus / name.replace(" ", "-"), not asked.random
-                )
+                corpus = asked.corpus and asked.corpus / name.replace(" ", "-")
+                count = fuzz(name, asked.seconds, corpus, not asked.random, asked.seed)
             except BaseException as error:
                 found = f"{type(error).__name__}: {error}"
         else:

@@ -149,8 +149,13 @@ def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection
     Args:
         camera: of the pictures as they were taken.
         rotation: ``[3, 3]``, of the rectified camera from that one.
-        projection: ``[3, 3]``, of the rectified camera, for pictures of the same size.
+        projection: ``[3, 3]``, of the rectified camera, for pictures of the same size. One that is no camera matrix,
+            as of drivers that leave it empty, says nothing.
     """
+    if not (np.isfinite(projection).all() and (projection[2] == (0, 0, 1)).all() and projection[1, 0] == 0):
+        return None
+    if not (np.diag(projection) > 0).all() or not rotation.any():
+        return None
     right, bottom, (u, v) = camera.width - 1.0, camera.height - 1.0, projection[:2, 2]
     middles = np.array([[0.0, v, 1.0], [right, v, 1.0], [u, 0.0, 1.0], [u, bottom, 1.0]])
     with np.errstate(all="ignore"):

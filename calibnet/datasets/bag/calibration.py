@@ -82,7 +82,7 @@ def _of_info(bag: BagRecording, asked: str | None, image: str) -> tuple[CameraMo
     rectified = is_rectified(image)
     camera = ros.camera(content, where, rectified)
     projection, rotation = np.array(content["P"]), np.array(content["R"])
-    if rectified or not (projection.size == 12 and projection.any() and rotation.size == 9 and rotation.any()):
+    if rectified or projection.size != 12 or rotation.size != 9:
         return camera, None
     return camera, rectification(camera, rotation.reshape(3, 3), projection.reshape(3, 4)[:, :3])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,6 +77,16 @@ def test_a_matrix_of_larger_pictures_is_a_suspect(tmp_path: Path) -> None:
     assert [remark.name for remark in mixed.remarks] == ["picture-size"]
     assert "rectified already" in mixed.remarks[0].text
     assert not Bag([bag_of(tmp_path / "right", topics, **P)])[0].remarks
+
+
+@pytest.mark.parametrize(
+    "p", [np.zeros(12), [9, 0, 4, 0, 0, 0, 3, 0, 0, 0, 1, 0], [9, 0, 4, 0, 9, 9, 3, 0, 0, 0, 1, 0]]
+)
+def test_a_projection_that_is_no_camera_says_nothing_of_others(p: Sequence[float], tmp_path: Path) -> None:
+    frame = Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, p=np.array(p, float))])[0]
+    assert frame.original is not None
+    assert_allclose(frame.original.camera.matrix, FRAME.camera.matrix)
+    assert not frame.remarks
 
 
 def test_a_calibration_of_another_camera_is_not_taken(tmp_path: Path) -> None:
