@@ -40,8 +40,9 @@ GRID, SEEN = 40, 0.5
 """Places across a rectified picture, and the share of them that at least shows something of any real lens."""
 BLACK = (0.05, 0.2)
 """Shares of a side by which a rectified picture may reach beyond the original on one side, and on the other."""
-GREY_LEVELS = 24
-"""A picture that shines no brighter than this has lost its upper bits."""
+DARK, DARKEST = 24, 15
+"""A picture that shines no brighter than the first seems to have lost its upper bits; the second is four bits of eight,
+which is all that 12 bits leave where the high byte of 16 is read."""
 WRAPPED, GREY = 0.01, 0.3
 """Shares of neighbouring pixels half the range apart, and of grey pixels, where upper bits were cut off. Real pictures
 have 0.0005 of the former; 10 or 12 bits cut to their lower eight have 0.01 to 0.2, and black and white is not grey."""
@@ -280,12 +281,12 @@ def several(points: NDArray[np.float32]) -> Implausible | None:
 def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
     """Whether a picture ``[H, W, 3]`` lost its upper or its lower bits on the way to eight."""
     rows = image[::ROW_STEP, :, 1].astype(np.int16)
-    if 0 < rows.max() <= GREY_LEVELS:
+    if 0 < rows.max() <= DARK:
         text = (
             f"no pixel is brighter than {rows.max()} of 255; if the camera gives 10 or 12 bits, "
             "shift the picture's values up before they are cut to eight"
         )
-        return Implausible("bit-depth", text)
+        return Implausible("bit-depth", text, certain=bool(rows.max() <= DARKEST))
     jumps = float((np.abs(np.diff(rows, axis=1)) > 128).mean())
     if jumps < WRAPPED or float(((rows > 64) & (rows < 192)).mean()) < GREY:
         return None

@@ -74,10 +74,10 @@ def judge(
             word, _because(reason, causes), last.after, going, causes, covariance(trace, coefficients.covariance)
         )
 
-    if float(frame.image[::ROW_STEP].std(axis=(0, 1)).max()) < BLANK:
-        return verdict(REJECTED, "The picture is blank.")
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)
+    if float(frame.image[::ROW_STEP].std(axis=(0, 1)).max()) < BLANK:
+        return verdict(REJECTED, "The picture is blank.")
     if not trace.fits:
         reason = (
             f"Picture and scan do not fit together: the expected match error is {last.match_error_px:.1f} px, where at "

@@ -111,7 +111,8 @@ def texture(seed: int = 0) -> np.ndarray:
         (lambda picture: picture / 16, []),
         (lambda picture: picture / 16 * 0.2, []),  # dusk
         (lambda picture: 255.0 * (picture > 2000), []),  # black and white
-        (lambda picture: picture / 256, [("bit-depth", False)]),  # 12 bits taken for 16: no brighter than 15
+        (lambda picture: picture / 256, [("bit-depth", True)]),  # 12 bits taken for 16: no brighter than 15
+        (lambda picture: picture / 200, [("bit-depth", False)]),  # no brighter than 20
         (lambda picture: picture.astype(np.int64) % 256, [("bit-depth", False)]),  # the upper four bits cut off
     ],
 )

@@ -116,6 +116,8 @@ def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
     assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The picture is blank."
+    upper_bits_lost = replace(FRAME, image=FRAME.image >> 6)  # hardly anything is left, and that is why
+    assert [one.name for one in judge(upper_bits_lost, GUESS, trace, CLASSIFIER).causes] == ["bit-depth"]
 
 
 def test_what_could_not_be_run_is_rejected_where_it_started() -> None:
