@@ -178,11 +178,11 @@ def news(rows: Sequence[Row]) -> Iterator[str]:
 
 def needs_work_or_checked(task: Task) -> Row | None:
     """The row of a drive that is done; None where it is not, and its options can be read."""
-    from inspector.cli.fleet_drive import check_options, needs_work
+    from inspector.cli.fleet_drive import needs_work, read_options
 
     row = needs_work(task)
     if row is None:
-        check_options(task)
+        read_options(task)
     return row
 
 

@@ -1,40 +1,36 @@
-"""One drive of a fleet: `calib-inspect verify` on it in this process, its results in a folder of its own, its row."""
+"""One drive of a fleet: verified in this process as `calib-inspect verify` does, with a folder of results and a row."""
 
 from __future__ import annotations
 
-import json
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import click
 from click.core import ParameterSource
 
 from calibnet.errors import CalibnetError, CalibrationError, ConfigError, DatasetError
-from calibnet.runtime.reading import protecting_inputs, read_file
+from calibnet.runtime.reading import protecting_inputs
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import keeping_others
 from inspector.cli.errors import environment_sentence
 from inspector.cli.run_options import verify_options
-from inspector.cli.sequences import over_sequences
+from inspector.cli.sequences import Opening, over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
-from inspector.fleet.table import FAILED, METRICS, PAGE, RECORDING, VERDICT, Row, flat, of_verdict, row_of
-
-if TYPE_CHECKING:
-    from calibnet.datasets import Sequence
+from inspector.fleet.table import FAILED, Row, flat, of_verdict, row_of
+from inspector.report.files import METRICS, PAGE, RECORDING
 
 DECIDED = ("save", "serve", "bind", "connect", "report", "json_file", "overwrite")
 """Options of `verify` that the fleet decides itself."""
-LOG = "log.txt"
-LONGEST_JSON = 64 << 20
+VERDICT, LOG = "verdict.json", "log.txt"
+"""Files of a drive beside those of its report."""
 
 _one_at_a_time = Lock()
 """What a run prints and reads is known for the whole process."""
@@ -71,35 +67,55 @@ class Task:
     force: bool = False
     run: str = ""
 
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """Arguments of `calib-inspect verify` but for its outputs."""
-        command, *rest = self.drive.arguments()
+    def arguments(self, path: str | None = None) -> tuple[str, ...]:
+        """Arguments of `calib-inspect verify` but for its outputs; with a path, of data that lies there."""
+        command, *rest = self.drive.arguments(path)
         return (command, "--detail", self.detail, *rest)
 
 
-def check_options(task: Task) -> dict[str, Any]:
-    """Read the options of a drive as its worker will, and hand them back.
+class Asked(NamedTuple):
+    """What a drive's row asks of `verify`, as the command reads it.
+
+    Attributes:
+        opening: opens its frames.
+        options: of `inspector.cli.verify.verify_sequence`.
+    """
+
+    opening: Opening
+    options: dict[str, Any]
+
+
+def read_options(task: Task, path: str | None = None) -> Asked:
+    """Read the options of a drive.
+
+    Args:
+        task: the drive.
+        path: where its data lies, if that is not its own path.
 
     Raises:
         ConfigError: there is something wrong with them; the sentence says whose they are.
     """
-    arguments = list(task.arguments)
-    group = _commands(lambda opening, **asked: 0)
-    command = group.commands[arguments[0]]
+    name, *arguments = task.arguments(path)
+    command = _COMMANDS.commands[name]
     try:
-        context = command.make_context(arguments[0], arguments[1:])
+        context = command.make_context(name, arguments)
+        asked: Asked = command.invoke(context)
     except click.ClickException as error:
         raise ConfigError(f"{task.drive.origin}: {one_line(error.format_message())}") from None
     except (click.exceptions.Exit, click.Abort):
         raise ConfigError(
             f"{task.drive.origin}: its options ask for help; calib-inspect verify --help gives it."
         ) from None
-    for name in DECIDED:
-        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            option = next(one.opts[0] for one in command.params if one.name == name)
+    for decided in DECIDED:
+        if context.get_parameter_source(decided) is ParameterSource.COMMANDLINE:
+            option = next(one.opts[0] for one in command.params if one.name == decided)
             raise ConfigError(f"{task.drive.origin}: {option} is not for a single drive; leave it out.")
-    return dict(context.params)
+    return asked
+
+
+_COMMANDS = click.Group("verify")
+"""The subcommands of `verify`, which hand back what they are asked instead of doing it."""
+over_sequences(_COMMANDS, lambda opening, **options: Asked(opening, options), lambda _: verify_options(), "Verify")
 
 
 def key_of(task: Task) -> Key:
@@ -109,9 +125,9 @@ def key_of(task: Task) -> Key:
         ConfigError: something is wrong with its options.
         DatasetError: its files cannot be listed.
     """
-    asked = check_options(task)
-    weights = weights_digest(asked["preset"], asked["weights"])
-    return Key(task.arguments, weights, seen(items_of(task.drive)))
+    options = read_options(task).options
+    weights = weights_digest(options["preset"], options["weights"])
+    return Key(task.arguments(), weights, seen(items_of(task.drive)))
 
 
 def weights_digest(preset: str, folder: Path | None) -> str:
@@ -166,50 +182,29 @@ def do_drive(task: Task) -> Row:
 
 
 def _verified(task: Task, path: Path, started: float) -> Row:
-    """Run `verify` on a drive, with all output in its folder, and make its row."""
+    """Verify a drive, with all output in its folder, and make its row."""
+    from inspector.cli.verify import verify_sequence
+
     drive = task.drive
+    opening, options = read_options(task, str(path))
     with task.store.workplace(drive.folder) as folder:
         _clear(folder)
-        command, *arguments = drive.arguments(str(path))
-        results = ["--json", str(folder / VERDICT), "--report", str(folder)]
-        words = [command, "--detail", task.detail, *results, *arguments]
         try:
             with _logged(folder / LOG):
-                _commands(partial(_verify, labels=drive.labels)).main(words, "verify", standalone_mode=False)
-        except click.Abort:
-            raise KeyboardInterrupt from None  # click makes the one of the other
+                results = {"json_file": str(folder / VERDICT), "report": folder}
+                found = verify_sequence(opening, labels=drive.labels, **{**options, **results})
         except Exception as error:
             failed = _failed(error)
             _record_sentence(drive, folder, FAILED, "", failed.sentence)
             raise failed from None
-        said = json.loads(read_file(folder / VERDICT, "Verdict", LONGEST_JSON))
-        columns = of_verdict(said) | {"given_camera_from_lidar": _given(folder / METRICS)}
+        if found.summary is not None and found.summary.interrupted:
+            raise KeyboardInterrupt
+        columns = of_verdict(found.verdict) | {"given_camera_from_lidar": flat(found.given)}
         if not (folder / RECORDING).exists():
             _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])
         files = {"json": VERDICT, "report": PAGE, "recording": RECORDING}
         there = {name: f"{drive.folder}/{file}" for name, file in files.items() if (folder / file).exists()}
     return row_of(drive, **columns, **there, seconds=time.monotonic() - started)
-
-
-def _given(metrics: Path) -> tuple[float, ...] | None:
-    """The calibration that a drive had, from the figures of its report; None where there is no report."""
-    if not metrics.exists():
-        return None
-    frames = json.loads(read_file(metrics, "Figures of a report", LONGEST_JSON))["per_frame"]
-    return flat(frames[0]["initial_camera_from_lidar"])
-
-
-def _commands(act: Callable[..., int]) -> click.Group:
-    """The subcommands of `verify`, with another action."""
-    group = click.Group("verify")
-    over_sequences(group, act, lambda _: verify_options(), "Verify")
-    return group
-
-
-def _verify(opening: Callable[[], Sequence], **asked: Any) -> int:
-    from inspector.cli.verify import verify_sequence
-
-    return verify_sequence(opening, **asked)
 
 
 @contextmanager

@@ -33,7 +33,7 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
     """
     write_report_of(recording, out)
     if with_viewer:
-        from inspector.report.write import VIEWER
+        from inspector.report.files import VIEWER
         from inspector.serving.viewer_files import fetch_viewer
 
         fetch_viewer(out / VIEWER)

@@ -67,7 +67,8 @@ def recording_to(outputs: Outputs) -> Iterator[None]:
 def choose_outputs(options: RunOptions, viewing: Viewing, report: Path | None) -> Outputs:
     """Where the recording goes, found out to work; a report keeps it, if nothing else does."""
     if report is not None:
-        from inspector.report.write import RECORDING, check_folder
+        from inspector.report.files import RECORDING
+        from inspector.report.write import check_folder
 
         check_folder(report)
         viewing = replace(viewing, save=viewing.save or report / RECORDING)

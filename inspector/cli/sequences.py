@@ -20,7 +20,7 @@ Opening = Callable[[], "Sequence"]
 
 def over_sequences(
     group: click.Group,
-    act: Callable[..., int],
+    act: Callable[..., object],
     options: Callable[[Source], Decorator],
     verb: str,
     sources: Iterable[Source] = SOURCES,
@@ -29,7 +29,7 @@ def over_sequences(
 
     Args:
         group: that they belong to.
-        act: called with what opens the sequence, and with the options; returns the exit code.
+        act: called with what opens the sequence, and with the options; returns what the command does, an exit code.
         options: for a kind of data, gives a command the options that do not say what is opened.
         verb: how the help of each begins, before the data's name.
         sources: the kinds of data.
@@ -38,8 +38,8 @@ def over_sequences(
         group.add_command(_command(source, act, options(source), verb))
 
 
-def _command(source: Source, act: Callable[..., int], options: Decorator, verb: str) -> click.Command:
-    def run(**asked: Any) -> int:
+def _command(source: Source, act: Callable[..., object], options: Decorator, verb: str) -> click.Command:
+    def run(**asked: Any) -> object:
         opened = {name: asked.pop(name) for name in names}
         if not source.one_mount and asked.get("drive") is None:
             asked["drive"] = False

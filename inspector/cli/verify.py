@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,9 +18,10 @@ from inspector.cli.run_options import verify_options
 from inspector.cli.sequences import Opening, disturbed, over_sequences
 
 if TYPE_CHECKING:
-    from calibnet.verdict import Verdict
+    from calibnet.datasets import Sequence
     from inspector.cli.viewing import Viewing
     from inspector.run.options import RunOptions
+    from inspector.run.verify import Verified
 
 
 @click.group()
@@ -38,8 +40,8 @@ def verify() -> None:
 
 def verify_sequence(
     opening: Opening, *, json_file: str | None, viewing: Viewing, report: Path | None, **asked: Any
-) -> int:
-    """Judge the calibration of a sequence; returns the exit code.
+) -> Verified:
+    """Judge the calibration of a sequence, say the verdict, and write whatever was asked for.
 
     Args:
         opening: opens the sequence.
@@ -48,18 +50,30 @@ def verify_sequence(
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
-    prepare_json(json_file)
     from calibnet.judging.verify import named_cause, unfit
-    from inspector.run.verify import UNKNOWN
+    from inspector.record.outputs import Outputs
+    from inspector.run.verify import UNKNOWN, Verified, verify_session
 
+    prepare_json(json_file)
     try:
         sequence = opening()
     except CalibnetError as error:
-        causes = named_cause(error)
-        if not causes:
+        if not (causes := named_cause(error)):
             raise
-        return conclude(unfit(UNKNOWN, str(error), causes), json_file)
+        return told(Verified(unfit(UNKNOWN, str(error), causes), UNKNOWN), json_file)
     prepare_json(json_file)  # once more, since it is known now what is read
+    options = options_to_verify(sequence, asked)
+    record = bool(viewing.save or report or viewing.serve or viewing.connect)
+    outputs = choose_outputs(options, viewing, report) if record else Outputs()
+    with recording_to(outputs):
+        found = told(verify_session(prepare(options, outputs, verify=True), record), json_file)
+        if found.summary is not None:
+            finish(found.summary, outputs, report, on_stderr=json_file == "-")
+    return found
+
+
+def options_to_verify(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
+    """The options of a run that judges one calibration, by the drive where there are several frames."""
     options = checked(sequence, {**asked, "as_is": not disturbed(asked)})
     several = len(options.positions) > 1
     if several and options.drive is False:
@@ -67,34 +81,25 @@ def verify_sequence(
             f"The frames of {sequence.name} are of several mounts, and verify judges one calibration; "
             "choose one frame, for instance with --frames 0."
         )
-    options = replace(options, drive=several)
-    return verify_run(options, json_file, viewing, report)
+    return replace(options, drive=several)
 
 
-def verify_run(options: RunOptions, json_file: str | None, viewing: Viewing, report: Path | None) -> int:
-    """Run what the verdict needs, record it where that was asked for, and say the verdict."""
-    from inspector.record.outputs import Outputs
-    from inspector.run.verify import verify_session
-
-    record = bool(viewing.save or report or viewing.serve or viewing.connect)
-    outputs = choose_outputs(options, viewing, report) if record else Outputs()
-    with recording_to(outputs):
-        verdict, summary = verify_session(prepare(options, outputs, verify=True), record)
-        if summary is None:
-            return conclude(verdict, json_file)
-        code = conclude(verdict, json_file, quiet=True)  # the summary's last line says it
-        return finish(summary, outputs, report, on_stderr=json_file == "-") or code
-
-
-def conclude(verdict: Verdict, json_file: str | None, quiet: bool = False) -> ExitCode:
-    """Write the JSON, say the verdict, and hand back the exit code."""
+def told(found: Verified, json_file: str | None) -> Verified:
+    """Write the verdict as JSON and, unless the last line of a summary will, say it."""
     from inspector.run.verify import as_json
     from inspector.verdicts import line
 
-    write_json(json_file, as_json(verdict))
-    if not quiet:
-        say(line(verdict), err=json_file == "-")
-    return VERDICT_CODES[verdict.word]
+    write_json(json_file, as_json(found.verdict))
+    if found.summary is None:
+        say(line(found.verdict), err=json_file == "-")
+    return found
 
 
-over_sequences(verify, verify_sequence, lambda _: verify_options(), "Verify")
+def _command(opening: Opening, **asked: Any) -> ExitCode:
+    """What the command does, and ends with."""
+    found = verify_sequence(opening, **asked)
+    interrupted = found.summary is not None and found.summary.interrupted
+    return ExitCode.INTERRUPTED if interrupted else VERDICT_CODES[found.verdict.word]
+
+
+over_sequences(verify, _command, lambda _: verify_options(), "Verify")

@@ -14,21 +14,15 @@ from calibnet.runtime.writing import Kind, write_whole
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted, told_together
 from inspector.fleet.table import APART, FAILED, ORDER, TABLE, Row, off, worst_first
+from inspector.report.files import PAGE, result_picture
 from inspector.report.template import html_page, stylesheet
 
-PAGE = "index.html"
 MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and mounts on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
 LONGEST_REASON = 300
 """Characters; the whole of it is in the table and in the drive's log."""
-PICTURES = tuple(
-    f"pictures/{name}_{result}.jpg"
-    for result in ("whole-drive-as-one", "corrected")
-    for name in ("median", "best", "worst")
-)
-"""Pictures of a drive's report, of which the first is shown: the result on its middle frame, or on another one."""
 
 
 def write_page(rows: Sequence[Row], folder: Path) -> Path:
@@ -139,10 +133,10 @@ def _pair(head: str, degrees: float | None, centimetres: float | None, key: floa
 
 def _picture(row: Row, folder: Path) -> str:
     """The report's own overlay, small."""
-    there = [path for path in (f"{row.folder}/{name}" for name in PICTURES) if (folder / path).is_file()]
-    if not row.report or not there:
+    file = result_picture(folder / row.folder) if row.report else None
+    if file is None:
         return ""
-    picture = f'<img loading="lazy" src="{_link(there[0])}" alt="Points over a frame">'
+    picture = f'<img loading="lazy" src="{_link(f"{row.folder}/{file}")}" alt="Points over a frame">'
     return f'<a href="{_link(row.report)}">{picture}</a>'
 
 

@@ -18,7 +18,7 @@ from calibnet.runtime.reading import require_file
 from calibnet.runtime.schema import validated
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
-from calibnet.verdict import CAUSES
+from calibnet.verdict import CAUSES, Verdict
 from inspector.fleet.drives import Drive
 
 TABLE = "fleet.parquet"
@@ -29,8 +29,6 @@ APART: ByCar = "apart"
 """Word for a drive that says something else than the others of its car."""
 ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
 """Words for a drive by all that is known of it, worst first."""
-RECORDING, VERDICT, PAGE, METRICS = "recording.rrd", "verdict.json", "index.html", "metrics.json"
-"""Files of a drive, in its folder."""
 LARGEST = 1 << 30
 
 Sixteen = Annotated[tuple[float, ...], Len(16, 16)]
@@ -141,21 +139,20 @@ def row_of(drive: Drive, **what_came: Any) -> Row:
     )
 
 
-def of_verdict(content: dict[str, Any]) -> dict[str, Any]:
-    """The columns that the JSON of a verdict fills, as `calibnet.verdict.Verdict.as_dict` writes it."""
-    sigma = content["sigma"] or {"rotation_deg": None, "translation_cm": None, "covariance": None}
+def of_verdict(verdict: Verdict) -> dict[str, Any]:
+    """The columns that a verdict fills."""
     return {
-        "verdict": content["verdict"],
-        "cause": ", ".join(cause["name"] for cause in content["causes"] if cause["name"] in CAUSES),
-        "reason": one_line(content["reason"]),
-        "moved_deg": content["moved"]["rotation_deg"],
-        "moved_cm": content["moved"]["translation_cm"],
-        "sigma_deg": sigma["rotation_deg"],
-        "sigma_cm": sigma["translation_cm"],
-        "camera_from_lidar": flat(content["camera_from_lidar"]),
-        "covariance": flat(sigma["covariance"]),
-        "frames": content["frames"]["used"],
-        "skipped": len(content["frames"]["skipped"]),
+        "verdict": verdict.word,
+        "cause": ", ".join(cause.name for cause in verdict.causes if cause.name in CAUSES),
+        "reason": one_line(verdict.reason),
+        "moved_deg": verdict.moved[0],
+        "moved_cm": verdict.moved[1],
+        "sigma_deg": verdict.sigma_rotation_deg,
+        "sigma_cm": verdict.sigma_translation_cm,
+        "camera_from_lidar": flat(verdict.camera_from_lidar),
+        "covariance": None if verdict.covariance is None else flat(verdict.covariance),
+        "frames": verdict.used,
+        "skipped": len(verdict.skipped),
     }
 
 
@@ -212,6 +209,6 @@ def read_table(file: Path) -> list[Row]:
     return list(validated(tuple[Row, ...], rows, str(file), DatasetError, "make it with `calib-inspect fleet`"))
 
 
-def flat(matrix: Sequence[Sequence[float]] | None) -> tuple[float, ...] | None:
-    """A matrix row by row, as a row of the table has it."""
-    return None if matrix is None else tuple(float(value) for line in matrix for value in line)
+def flat(matrix: Extrinsic | Matrix6) -> tuple[float, ...] | None:
+    """A matrix row by row, as a row of the table has it; None for one that is not known."""
+    return tuple(matrix.ravel().tolist()) if np.isfinite(matrix).all() else None

@@ -15,6 +15,7 @@ from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic, Floats
 from calibnet.verdict import WORDS
 from inspector.read.run import RecordedFrame, RecordedRun
+from inspector.report.files import EXAMPLES
 
 DISTANCE_M = 10.0
 """Frames are ranked by how far, at most, a point at this distance is misplaced."""
@@ -145,7 +146,7 @@ class Figures:
     def examples(self) -> dict[str, int]:
         """Positions of the worst, the median and the best frame; a frame appears once."""
         order = self.ranking()
-        chosen = {order[-1]: "worst", order[(len(order) - 1) // 2]: "median", order[0]: "best"}
+        chosen = dict(zip((order[-1], order[(len(order) - 1) // 2], order[0]), EXAMPLES, strict=True))
         return {name: position for position, name in chosen.items()}
 
     def as_dict(self) -> dict[str, Any]:

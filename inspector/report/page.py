@@ -7,10 +7,10 @@ from html import escape
 from typing import Any, NamedTuple
 
 from calibnet.geometry import PoseError
-from calibnet.verdict import REJECTED
 from inspector.read.run import RecordedRun
 from inspector.record.contents import Coloring
 from inspector.report.charts import charts
+from inspector.report.files import AS_ONE, LEFT
 from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.tables import axes_table, stages_table
 from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
@@ -42,10 +42,6 @@ AGAINST_MEDIAN = (
     "There is no reference: in its place stands the median of all corrected extrinsics, so the figures say how far "
     "the frames scatter, not how right they are."
 )
-
-
-ALONE, AS_ONE, LEFT = "this frame alone", "whole drive as one", f"{REJECTED} and left as it was"
-"""Names of a frame's own result, where another leads, of that, and of a result that is not believed."""
 
 
 class Example(NamedTuple):

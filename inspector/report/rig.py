@@ -10,10 +10,11 @@ from pathlib import Path
 from calibnet.runtime.writing import Kind, write_whole
 from inspector import entities
 from inspector.read.rig import RecordedRig
+from inspector.report.files import PICTURES, RECORDING
 from inspector.report.pictures import draw_overlay
 from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
 from inspector.report.verdict import GRADES
-from inspector.report.write import PICTURES, RECORDING, write_files
+from inspector.report.write import write_files
 from inspector.rig_result import CameraResult
 from inspector.verdicts import explained
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from starlette.applications import Starlette
 
-from inspector.report.write import METRICS, PAGE, PICTURES, RECORDING, VIEWER
+from inspector.report.files import METRICS, PAGE, PICTURES, RECORDING, VIEWER
 from inspector.serving.files import file_route
 from inspector.serving.viewer_files import VIEWER_FILES
 

@@ -18,14 +18,12 @@ from inspector import entities
 from inspector.read.pictures import OverlayPoints
 from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.read.understood import RecordingError
+from inspector.report.files import ALONE, AS_ONE, CORRECTED, LEFT, METRICS, PAGE, PICTURES, RECORDING, picture_file
 from inspector.report.metrics import Figures
-from inspector.report.page import ALONE, AS_ONE, LEFT, Example, make_page
+from inspector.report.page import Example, make_page
 from inspector.report.pictures import draw_overlay
 
-PAGE, METRICS, RECORDING, PICTURES = "index.html", "metrics.json", "recording.rrd", "pictures"
 Shown = TypeVar("Shown")
-VIEWER = "viewer"
-"""Folder of the web viewer's files, where they are kept beside the page."""
 
 
 def check_folder(folder: Path) -> None:
@@ -126,7 +124,7 @@ def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) ->
     size = (camera.width, camera.height)
     files = {}
     for shown, points in _overlays(run, run.frames[position]).items():
-        files[shown] = f"{PICTURES}/{name}_{shown.replace(' ', '-')}.jpg"
+        files[shown] = picture_file(name, shown)
         write_whole(folder / files[shown], draw_overlay(image, *points, size), Kind.JPEG)
     return Example(name, position, files)
 
@@ -142,7 +140,7 @@ def _overlays(run: RecordedRun, frame: RecordedFrame) -> Mapping[str, OverlayPoi
     if run.believes_drive:
         with contextlib.suppress(RecordingError):  # of the drive nothing was drawn on this frame
             return shown | {ALONE: own, AS_ONE: run.overlay(entities.OVERLAY_DRIVE, index)}
-    return shown | {LEFT if frame.rejected else "corrected": own}
+    return shown | {LEFT if frame.rejected else CORRECTED: own}
 
 
 def cannot_write(error: OSError, folder: Path) -> ConfigError:

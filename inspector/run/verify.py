@@ -75,15 +75,27 @@ class Readable:
         raise DatasetError(f"{len(self.unread)} of {len(self)} frames cannot be read{share}. {each}")
 
 
-def verify_session(session: Session, record: bool) -> tuple[Verdict, Summary | None]:
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """What came of judging a calibration.
+
+    Attributes:
+        verdict: on it.
+        given: the calibration that was judged, 4x4; `UNKNOWN` where the input cannot even be made into a frame.
+        summary: of a recorded run; None where nothing was recorded.
+    """
+
+    verdict: Verdict
+    given: Extrinsic = field(repr=False)
+    summary: Summary | None = None
+
+
+def verify_session(session: Session, record: bool) -> Verified:
     """Judge the calibration that a session starts from, by its only frame or by the drive.
 
     Args:
         session: with ``verify`` set.
         record: run it as it is, recording included; otherwise only what the verdict needs is computed.
-
-    Returns:
-        The verdict, and the summary of a recorded run.
 
     Raises:
         DatasetError: half of the frames or more cannot be read.
@@ -94,18 +106,19 @@ def verify_session(session: Session, record: bool) -> tuple[Verdict, Summary | N
     try:
         given = session.start.initial(frames.first())
         if not record:
-            return _judge(session, frames, given), None
+            return Verified(_judge(session, frames, given), given)
         summary = session.run()
         if summary.given_verdict is None:
             raise KeyboardInterrupt
-        return summary.given_verdict, summary
+        return Verified(summary.given_verdict, given, summary)
     except (CalibrationError, DatasetError) as error:
         causes = named_cause(error)
         if not causes:
             frames.check()
             if record and isinstance(error, DatasetError):
                 raise
-        return unfit(given, str(error), causes or suspected(session.cascade, frames, given)), summary
+        causes = causes or suspected(session.cascade, frames, given)
+        return Verified(unfit(given, str(error), causes), given, summary)
 
 
 def as_json(verdict: Verdict) -> dict[str, object]:

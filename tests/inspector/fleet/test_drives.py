@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from calibnet.datasets.published import PUBLISHED, options_of
 from calibnet.errors import ConfigError
-from inspector.cli.fleet_drive import Task, check_options
+from inspector.cli.fleet_drive import Task, read_options
 from inspector.fleet.drives import Drive, find_drives
 from inspector.fleet.places import Store
 
@@ -58,7 +59,7 @@ def test_rows_are_the_commands_that_do_the_same_by_hand(tmp_path: Path) -> None:
 def test_what_a_row_says_counts_more_than_what_is_said_of_all(tmp_path: Path) -> None:
     common = "--frames : --camera 3 --seed 1"
     (drive,) = listed(tmp_path, "path,frames,camera,options\nmine,0:5,2,--seed 7\n", common)
-    asked = check_options(Task(drive, Store(str(tmp_path / "out"))))
+    asked = read_options(Task(drive, Store(str(tmp_path / "out")))).options
     assert (asked["frames"], asked["camera"], asked["seed"]) == ("0:5", "2", 7)
 
 
@@ -71,11 +72,13 @@ def test_every_published_dataset_of_drives_can_be_in_a_list(tmp_path: Path, data
             listed(tmp_path, text)
         return
     (drive,) = listed(tmp_path, text)
-    asked = check_options(Task(drive, Store(str(tmp_path / "out"))))
-    assert (drive.arguments()[0], asked["root"], str(asked["camera"])) == (published.command, tmp_path / "data", "1")
-    asked["drive"] = asked.get("number")  # what the dataset calls so; the option --drive is of the run
+    opening = read_options(Task(drive, Store(str(tmp_path / "out")))).opening
+    assert isinstance(opening, partial)
+    named = opening.keywords
+    assert (drive.arguments()[0], named["root"], str(named["camera"])) == (published.command, tmp_path / "data", "1")
+    named["drive"] = named.get("number")  # what the dataset calls so
     opened = options_of(dataset, published.example, "")
-    assert opened.items() <= asked.items()
+    assert opened.items() <= named.items()
 
 
 def test_a_camera_of_nuscenes_may_stand_in_the_name_of_the_sequence(tmp_path: Path) -> None:
