@@ -1,4 +1,4 @@
-"""``calib-inspect ablate``: the paper's ablation, measured: what each module costs and what it is worth."""
+"""``calib-inspect ablate``: the paper's ablation study: cost and benefit of each module of the network."""
 
 from __future__ import annotations
 
@@ -31,27 +31,36 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
-@click.option("--preset", "presets", multiple=True, help="Network. Repeatable.  [default: compact and paper]")
-@click.option("--range", "range_", type=RANGE, default="5/0.5", show_default=True, help="Range of weights and errors.")
+@click.option(
+    "--preset", "presets", multiple=True, help="Network to measure. Repeatable.  [default: compact and paper]"
+)
+@click.option(
+    "--range",
+    "range_",
+    type=RANGE,
+    default="5/0.5",
+    show_default=True,
+    help="Range of the miscalibrations, and of the weights measured.",
+)
 @click.option(
     "--weights",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
-    help="Folder that `train --ablation NAME --output DIR` filled, a folder a row within it.",
+    help="Folder written by `train --ablation NAME --output DIR`, with one subfolder per row.",
 )
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
-@click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations a frame.")
+@click.option("--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations per frame.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
 @click.option(
     "--timed",
     type=click.IntRange(0),
     default=3,
     show_default=True,
-    help="Number of timed looks, of which the median is shown; 0 for none.",
+    help="Number of timed passes, of which the median is reported; 0 to measure no latency.",
 )
 @click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option(
-    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier run."
+    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing; print the tables of this earlier JSON file."
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
@@ -72,9 +81,9 @@ def ablate(
 ) -> None:
     """Measure the paper's five ablations and the whole network: cost and errors of each.
 
-    Parameters, multiply-adds, latency and errors are listed beside the paper's. Errors are those after one look of the
-    network for --range, for the rows whose weights are in --weights. Latency is that of one look on the first frame of
-    --data. The preset paper has no weights; its latencies take a minute or two of CPU time.
+    Lists parameters, multiply-adds, latency and errors beside the paper's. Errors are measured after one pass of the
+    network for --range, for the rows whose weights are in --weights. Latency is that of one pass over the first frame
+    of --data. The preset paper has no weights; its latencies take a minute or two of CPU time.
 
     \b
     calib-inspect train --ablation aggregation --range 5/0.5 --samples 10000 --uniform --packed PARTS --output ROWS
@@ -111,7 +120,7 @@ def measured(
     timed: int,
     threads: int,
 ) -> dict[str, Any]:
-    """Measure what is asked for, with progress; returns what JSON files hold."""
+    """Measure what the options ask for, showing progress; returns the content of the JSON file."""
     import torch
 
     from calibnet.datasets import PickedFrames, select_frames
@@ -123,7 +132,7 @@ def measured(
 
     if range_ not in RANGES:
         ranges = ", ".join(str(one) for one in RANGES)
-        raise click.UsageError(f"--range {range_} is not one that networks are trained for: {ranges}.")
+        raise click.UsageError(f"--range {range_} has no network; choose from {ranges}.")
     torch.set_num_threads(threads)
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
@@ -152,7 +161,7 @@ def measured(
 
 
 def print_ablation(content: dict[str, Any], console: Console) -> None:
-    """The tables on the terminal, costs and errors apart since it is narrow, and which rows have no errors."""
+    """Print costs and errors as two tables, narrow enough for a terminal, and name the rows without errors."""
     from rich import box
     from rich.table import Table
 
@@ -163,7 +172,7 @@ def print_ablation(content: dict[str, Any], console: Console) -> None:
         for chosen in (COSTS, ERRORS):
             kept = [k for k in range(1, len(heads)) if heads[k] in chosen]
             if len(kept) < 2:
-                continue  # nothing but what the paper says
+                continue  # only the paper's figures
             table = Table(title=preset, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
             table.add_column(heads[0], no_wrap=True)
             for k in kept:

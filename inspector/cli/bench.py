@@ -1,4 +1,4 @@
-"""``calib-inspect bench``: the paper's table of systems, measured: all methods on the same frames."""
+"""``calib-inspect bench``: the paper's comparison of systems: all methods on the same frames."""
 
 from __future__ import annotations
 
@@ -30,17 +30,17 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 class NamedFolder(click.ParamType[tuple[str, Path]]):
-    """``NAME=DIR`` to both."""
+    """``NAME=DIR``, parsed to the name and the folder."""
 
     name = "NAME=DIR"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, Path]:
-        """Split it; a value that is split already is kept."""
+        """Split the text; a pair is returned as it is."""
         if isinstance(value, tuple):
             return value
         name, equals, folder = str(value).partition("=")
         if not (name and equals and folder):
-            self.fail(f"{value!r} is not NAME=DIR, for instance cascade-10k=weights/10k.", param, ctx)
+            self.fail(f"{value!r} is not of the form NAME=DIR; write for instance cascade-10k=weights/10k.", param, ctx)
         return name, Path(folder)
 
 
@@ -58,19 +58,17 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
     type=click.IntRange(2),
     default=12,
     show_default=True,
-    help="Most frames of a sequence or drive to measure.",
+    help="Largest number of frames measured per sequence or drive.",
 )
 @click.option(
     "--repeats", type=click.IntRange(1), default=1, show_default=True, help="Miscalibrations per frame or drive."
 )
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of the miscalibrations.")
-@click.option(
-    "--limit", type=NumberRange(1), default=300.0, show_default=True, help="Time limit for a row, in seconds."
-)
+@click.option("--limit", type=NumberRange(1), default=300.0, show_default=True, help="Time limit per row, in seconds.")
 @click.option(
     "--audit/--no-audit",
     default=True,
-    help="Also measure with a grey picture and with one of another drive.  [default: yes]",
+    help="Also measure with a grey image and with an image of another drive.  [default: yes]",
 )
 @click.option("--preset", default="compact", show_default=True, help="Network of the cascade.")
 @click.option("--method-weights", type=FOLDER, help="Folder of the weights of other methods.")
@@ -80,11 +78,11 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 @click.option("--masks", type=FOLDER, metavar="DIR", help="Masks for calib-anything, as in seq.")
 @click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option(
-    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing: make tables of this JSON of an earlier bench."
+    "--from", "source", type=FILE, metavar="FILE", help="Measure nothing; print the tables of this earlier JSON file."
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Also as CSV, a line a row.")
-@click.option("--html", "html_file", type=FILE, metavar="FILE", help="Also as a page.")
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Also as CSV, one line per row.")
+@click.option("--html", "html_file", type=FILE, metavar="FILE", help="Also as an HTML page.")
 @click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def bench(
@@ -111,7 +109,7 @@ def bench(
     """Measure all methods on the same frames from the same miscalibrations, on rigs they were trained on and on others.
 
     One row per method, range and rig: errors, refused runs, success rates, cost, training data, results with a grey
-    picture and with one of another drive, and the figures of its paper. A method that cannot run, because it lacks
+    image and with an image of another drive, and the figures of its paper. A method that cannot run, because it lacks
     weights or because the car stands still, gets a row that says so.
     """
     from calibnet.runtime.writing import Kind
@@ -140,7 +138,7 @@ def bench(
     from inspector.cli.bench_tables import print_bench
 
     print_bench(content, console_beside(json_file))
-    if source is not None or json_file == "-":  # what was measured has been written method by method
+    if source is not None or json_file == "-":  # otherwise the file has been written after every method
         write_json(json_file, content)
     for file, made, kind in outputs:
         if file is not None:
@@ -157,7 +155,7 @@ def set_up(
     method_weights: Path | None,
     masks: Path | None,
 ) -> tuple[Bench, list[BenchMethod]]:
-    """What is measured, and who."""
+    """The measurement, and the methods that take part."""
     from calibnet.datasets import PickedFrames, select_frames
     from calibnet.datasets.discovery import find_sequences
     from calibnet.evaluation.bench import Bench
@@ -168,7 +166,7 @@ def set_up(
 
     for name in methods:
         if name != CASCADE and name not in METHODS:
-            raise click.UsageError(f"There is no method {name!r}; choose from {CASCADE}, {', '.join(METHODS.names())}.")
+            raise click.UsageError(f"{name!r} is not a method; choose from {CASCADE}, {', '.join(METHODS.names())}.")
     opened = [sequence for spec in data for sequence in open_data(spec)]
     sequences = [PickedFrames(sequence, select_frames(sequence, frames)) for sequence in opened]
     dataset, _, rest = data[0].partition(":")
@@ -178,7 +176,7 @@ def set_up(
 
 
 def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_file: str | None) -> dict[str, Any]:
-    """Measure; after every method the JSON file is written, so that what was measured is not lost."""
+    """Measure all methods; the JSON file is written after each, so that an interruption loses little."""
     import cv2
     import torch
 
@@ -206,7 +204,7 @@ def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_fi
 
 
 def described(measured: Bench, threads: int) -> dict[str, Any]:
-    """What was measured on."""
+    """Settings and machine of the measurement."""
     import platform
 
     from calibnet import __version__

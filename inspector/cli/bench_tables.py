@@ -1,4 +1,4 @@
-"""What `bench` prints: the tables of the page, as narrow as a terminal is."""
+"""Tables that `bench` prints: those of its HTML page, narrow enough for a terminal."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 def print_bench(content: dict[str, Any], console: Console) -> None:
-    """A line a method for each range, then one a rig; what they cost, and what their papers report, line by line."""
+    """Print a row per method for each range, a row per rig, the costs, and the figures of the papers."""
     console.print(about(content), LEGEND, sep="\n")
     for range_ in content["ranges"]:
-        for title, heads in (("mean errors", ERRORS), ("with pictures that are not the scan's", PICTURES)):
+        for title, heads in (("mean errors", ERRORS), ("with images that do not belong to the scan", PICTURES)):
             table = _summary(content, range_, title, heads)
             if len(table.columns) > 2:
                 console.print(table)
@@ -68,7 +68,7 @@ def _pair(median: float | None, p95: float | None) -> str:
 
 
 def _costs(content: dict[str, Any]) -> Table:
-    table = _table("What they cost")
+    table = _table("Cost")
     for head in ("parameters", "multiply-adds", "a frame", "samples"):
         table.add_column(head, justify="right", no_wrap=True)
     for name, entry in content["methods"].items():

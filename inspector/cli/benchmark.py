@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from calibnet.evaluation.benchmark import Benchmark
 
 SCENES = 4
-"""Frames of the synthetic world that are timed in turn: a scan of KITTI's size each."""
+"""Frames of the synthetic world that are timed in turn, each with a scan of KITTI's size."""
 
 
 @click.command()
 @click.option(
-    "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Runs of each of {SCENES} frames."
+    "--repeats", type=click.IntRange(1), default=8, show_default=True, help=f"Timed runs on each of {SCENES} frames."
 )
 @click.option("--threads", type=THREADS, default=USUAL_THREADS, show_default=True, help="Threads of the CPU.")
 @click.option("--stages", type=STAGES, default="1-5", show_default=True, help="Stages to run.")
@@ -47,9 +47,9 @@ def benchmark(
 ) -> None:
     """Time the cascade on frames of the synthetic world with a scanner like KITTI's.
 
-    Times are medians over single frames, from a frame in memory to its extrinsic, including the projection; and of each
-    stage's network on several frames at once. A network of another paper is timed alternately with them, so that the
-    ratio is meaningful on a busy machine too.
+    Reports the median time per frame, from a frame in memory to its extrinsic, including the projection, and the time
+    of each stage's network on batches of frames. A network of another paper is timed in alternation, so that the ratio
+    is meaningful on a busy machine too.
     """
     prepare_json(json_file)
     import torch
@@ -72,7 +72,7 @@ def benchmark(
 
 
 def report(result: Benchmark, console: Console) -> None:
-    """Print the machine, a row a part and a column a stage, and the whole."""
+    """Print the machine, a table with a row per part and a column per stage, and the total."""
     from rich import box
     from rich.table import Table
 
@@ -83,19 +83,19 @@ def report(result: Benchmark, console: Console) -> None:
         highlight=False,
         soft_wrap=True,
     )
-    table = Table(title="Milliseconds a frame", title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(title="Milliseconds per frame", title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("")
     for stage in result.stages:
         table.add_column(f"stage {stage.number}\n{stage.range}", justify="right")
     rows = {part.replace("_", " "): [stage.parts[part] for stage in result.stages] for part in result.stages[0].parts}
     rows["the whole stage"] = [stage.milliseconds for stage in result.stages]
     for size in result.stages[0].batches:
-        rows[f"network alone, {size} at once"] = [stage.batches[size] for stage in result.stages]
+        rows[f"network alone, batch of {size}"] = [stage.batches[size] for stage in result.stages]
     for name, numbers in rows.items():
         table.add_row(name, *(f"{number:.1f}" for number in numbers))
     console.print(table)
     shared = ", ".join(f"{part.replace('_', ' ')} {value:.1f}" for part, value in result.shared.items())
-    console.print(f"Once a frame: {shared}. The whole cascade: {result.cascade:.1f} ms a frame.", highlight=False)
+    console.print(f"Once per frame: {shared}. The whole cascade: {result.cascade:.1f} ms per frame.", highlight=False)
     console.print(
         f"A network of LCCNet's shape, timed in turn: {result.reference:.1f} ms. The whole cascade takes "
         f"{result.ratio:.2f} times as long as five of them.",

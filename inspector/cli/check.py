@@ -19,23 +19,30 @@ LIMIT = NumberRange(min=0.0)
 @click.argument("recording", type=RECORDING, metavar="RUN.rrd")
 @click.option("--max-rotation", type=LIMIT, metavar="DEG", help="Largest rotation error allowed, in degrees.")
 @click.option("--max-translation", type=LIMIT, metavar="CM", help="Largest translation error allowed, in centimetres.")
-@click.option("--max-sigma-rotation", type=LIMIT, metavar="DEG", help="Largest stated uncertainty of the rotation, 1σ.")
-@click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
+@click.option(
+    "--max-sigma-rotation",
+    type=LIMIT,
+    metavar="DEG",
+    help="Largest stated uncertainty of the rotation (1σ), in degrees.",
+)
+@click.option("--max-sigma-translation", type=LIMIT, metavar="CM", help="The same for the translation, in centimetres.")
 @click.option(
     "--max-scatter-rotation",
     type=LIMIT,
     metavar="DEG",
-    help="Largest rotation of a frame from the median of the frames, in degrees.",
+    help="Largest rotation between a frame's result and the median of all frames, in degrees.",
 )
-@click.option("--max-scatter-translation", type=LIMIT, metavar="CM", help="Likewise in translation, centimetres.")
+@click.option(
+    "--max-scatter-translation", type=LIMIT, metavar="CM", help="The same for the translation, in centimetres."
+)
 @click.option("--max-unused", type=LIMIT, metavar="PERCENT", help="Largest share of rejected and skipped frames.")
-@click.option("--max-fit", type=LIMIT, metavar="PX", help="Largest match error that the last stage expects.")
+@click.option("--max-fit", type=LIMIT, metavar="PX", help="Largest match error that the last stage expects, in pixels.")
 @click.option(
     "--statistic",
     type=click.Choice(["median", "p95", "max", "drive"]),
     default="median",
     show_default=True,
-    help="Which error the limits apply to: a statistic over the frames, or the error of the drive's extrinsic.",
+    help="Error that the limits apply to: a statistic over the frames, or the error of the drive's extrinsic.",
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="The verdict as JSON; - for stdout.")
 @click.option("--junit", "junit_file", type=OUTPUT_FILE, metavar="FILE", help="Also as JUnit XML.")

@@ -33,8 +33,8 @@ def compare(
 ) -> int:
     """Put recorded runs of one sequence side by side: other weights, miscalibration or preset.
 
-    Shows what each made of the whole drive, their error curves in one plot, and a table of medians, 95th
-    percentiles and success rates of single frames with the differences to the first run.
+    Shows each run's result for the whole drive, all error curves in one plot, and a table of the single frames'
+    medians, 95th percentiles and success rates with the differences from the first run.
     """
     if len(recordings) < 2:
         raise click.UsageError("Give two recordings or more.")
@@ -64,7 +64,7 @@ def compare(
 
 
 def lines(comparison: Comparison) -> Iterator[str]:
-    """A sentence on each run: how far off it is or, without a reference, how far from the first."""
+    """One sentence per run: its error or, without a reference, its distance from the first run."""
     for run in comparison.runs:
         drive, metrics, off = run.run.drive_error, run.corrected, "off"
         if metrics is None and run is not comparison.first:
@@ -80,7 +80,7 @@ def lines(comparison: Comparison) -> Iterator[str]:
 
 
 def finish(comparison: Comparison, outputs: Outputs) -> int:
-    """Print how the runs did and where the comparison is; serve until Ctrl-C where that was asked for."""
+    """Print the errors of the runs and where the comparison was saved; with --serve, serve it until Ctrl-C."""
     for line in lines(comparison):
         say(line)
     if outputs.file is not None:

@@ -1,4 +1,4 @@
-"""The one place where an error becomes a sentence on stderr and an exit code."""
+"""Turns every error into one sentence on stderr and an exit code."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SYSTEM_PACKAGES = {
 
 
 class ExitCode(IntEnum):
-    """What the process tells its caller."""
+    """Exit codes of the process."""
 
     OK = 0
     CHECK_FAILED = 1
@@ -49,7 +49,7 @@ VERDICT_CODES = {
     "rejected": ExitCode.CHECK_FAILED,
     "cannot tell": ExitCode.CANNOT_TELL,
 }
-"""What a command that judges ends with, by the word of its verdict."""
+"""Exit codes of the commands that judge, by the word of the verdict."""
 
 
 def run(command: click.Command, arguments: list[str] | None = None) -> int:
@@ -57,7 +57,7 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
 
     Args:
         command: the root group.
-        arguments: what follows the program's name, by default of this process.
+        arguments: what follows the program's name; by default this process's own arguments.
 
     Returns:
         The exit code.
@@ -94,21 +94,21 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
     except Exception as error:  # the last net: nobody sees a traceback
         return unforeseen(error)
     except BaseException as error:
-        if type(error).__name__ != "PanicException":  # Rust code gave up, which is no Exception
+        if type(error).__name__ != "PanicException":  # a panic of Rust code is not an Exception
             raise
         return unforeseen(error)
     return result if isinstance(result, int) else ExitCode.OK
 
 
 def fail(sentence: str, code: ExitCode = ExitCode.BAD_INPUT) -> int:
-    """Print one sentence on stderr and hand back the exit code."""
+    """Print one sentence on stderr; returns the exit code."""
     with contextlib.suppress(OSError, AttributeError):  # stderr may be closed
         click.echo(f"calib-inspect: {one_line(sentence)}", err=True)
     return code
 
 
 def unforeseen(error: BaseException) -> int:
-    """Say that something went wrong which nobody thought of, and keep what its makers need to know in a file."""
+    """Report an internal error, and keep what its makers need to know in a file."""
     from platform import platform
 
     from calibnet import __version__
@@ -129,7 +129,7 @@ def unforeseen(error: BaseException) -> int:
 
 
 def environment_sentence(error: OSError | ImportError) -> str | None:
-    """Say what is wrong with the machine and what to do, or None when ``error`` is not of that kind."""
+    """What is wrong with the machine and what to do; None where ``error`` is of another kind."""
     library = re.search(r"(lib\S+\.so[.\d]*): cannot open shared object file", str(error))
     if library:
         name = library[1]

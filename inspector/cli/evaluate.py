@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 @click.option(
     "--camera",
     metavar="CAMERA",
-    help="2 or CAM_BACK, for instance.  [default: the dataset's own, as its command has it]",
+    help="Camera, for instance 2 or CAM_BACK.  [default: that of the dataset's own command]",
 )
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option(
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
     "methods",
     multiple=True,
     type=click.Choice(METHODS.names()),
-    help="Also measure this method on the same frames, or on drives if it only solves drives. Repeatable.",
+    help="Method to measure as well, on the same frames, or on drives if it only solves drives. Repeatable.",
 )
 @click.option("--method-weights", type=FOLDER, help="Folder of the weights of --method.  [default: that of --weights]")
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
@@ -111,10 +111,10 @@ def evaluate(
 ) -> None:
     """Measure the cascade's errors: every frame starts from random miscalibrations (seeded) of the dataset's extrinsic.
 
-    Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success
-    rates: for the initial error, a classical refinement (edges and reflectance of the scan onto the image's
-    edges and brightness), after each stage on single frames, and for every drive solved from all its frames: by
-    the networks alone and, after stage 5, with its edges aligned.
+    Prints mean, median, standard deviation, 95th percentile, per-axis mean absolute errors and success rates: of the
+    initial error, of a classical refinement (edges and reflectance of the scan aligned with the image's edges and
+    brightness), of every stage on single frames, and of every drive solved from all its frames, by the networks alone
+    and with its edges aligned after stage 5.
     """
     names = [part.strip() for text in sequences for part in text.split(",") if part.strip()]
     opened: list[Sequence] = [
@@ -161,7 +161,7 @@ def evaluate(
 
 
 def open_reference(name: str, range_: MiscalibrationRange, weights: Path | None) -> Calibrator:
-    """Another method, with the weights of a folder where it has any."""
+    """Open another method, with the weights in a folder if it uses weights."""
     told = {"weights": weights} if accepts(METHODS.load(name), "weights") else {}
     return open_method(name, range_, **told)
 

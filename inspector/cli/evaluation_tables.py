@@ -1,4 +1,4 @@
-"""What `evaluate` prints: tables of rotation, translation and success, and what the audit says, in words."""
+"""Tables that `evaluate` prints of rotation, translation and success, and sentences on verdicts and the audit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_evaluation(evaluation: Evaluation, console: Console) -> None:
-    """Print what was measured on, then tables of rotation, translation and success."""
+    """Print the frames measured on, then tables of rotation, translation and success."""
     runs = len(evaluation.runs)
     console.print(
         f"{', '.join(evaluation.sequences)} ({evaluation.rig}): {evaluation.frames} frames x {evaluation.repeats} = "
@@ -54,8 +54,8 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
 
 
 def print_battery(battery: Battery, console: Console) -> None:
-    """Print a row a fault and strength, and the two rates that matter."""
-    table = plain_table("Battery: what the verdict said of frames with a fault")
+    """Print a row per fault and strength, and the rates of false and of right acceptance."""
+    table = plain_table("Battery: verdicts on frames with a fault")
     for heading in ("runs", "accepted, right", "accepted, wrong", "rejected", "cannot tell", "cause right"):
         table.add_column(heading, justify="right")
     for row in battery.rows:
@@ -71,7 +71,7 @@ def print_battery(battery: Battery, console: Console) -> None:
 
 
 def coverage_sentences(evaluation: Evaluation) -> Iterator[str]:
-    """How stated covariances compare with errors, and what was said of drives."""
+    """How the stated covariances compare with the errors, and the verdicts on drives."""
     for of, coverage in (
         ("frames that are not rejected", evaluation.coverage),
         ("accepted frames", evaluation.coverage_accepted),
@@ -84,26 +84,26 @@ def coverage_sentences(evaluation: Evaluation) -> Iterator[str]:
 
 
 def audit_sentence(evaluation: Evaluation) -> str:
-    """What is left of the initial rotation error with the true image and without it."""
+    """The share of the initial rotation error that is left with the true image and with others."""
     initial = evaluation.initial.rotation_deg.median
     left = {"the true image": evaluation.final, f"images of {evaluation.audit_images}": evaluation.audit["swapped"]}
     left |= {"a grey image": evaluation.audit["grey"], "half the rings": evaluation.audit["thinned"]}
     shares = ", ".join(f"{metrics.rotation_deg.median / initial:.0%} with {name}" for name, metrics in left.items())
-    return f"Of the initial rotation error (median) is left: {shares}."
+    return f"Share of the initial rotation error (median) that is left: {shares}."
 
 
 def verdict_sentence(evaluation: Evaluation) -> str:
-    """How many runs have which verdict, and how many of the audit's were rejected."""
+    """The number of runs with each verdict, and how many of the audit's runs were rejected."""
     counts = ", ".join(f"{count} {word}" for word, count in evaluation.verdicts.items())
     with_audit = ", ".join(f"{count} with the audit's {name}" for name, count in evaluation.audit_rejected.items())
-    return f"Of {len(evaluation.runs)} runs: {counts}." + (f" Rejected besides: {with_audit}." if with_audit else "")
+    return f"Of {len(evaluation.runs)} runs: {counts}." + (f" Also rejected: {with_audit}." if with_audit else "")
 
 
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:
-    """A row for each of ``rows``; per axis the mean absolute error."""
+    """A table with one row for each of ``rows``; columns per axis are mean absolute errors."""
     table = plain_table(title)
     largest = max(max(figures.values()) for _, figures in rows)
-    decimals = min(decimals, max(0, 4 - len(f"{largest:.0f}")))  # numbers wider than that would not fit
+    decimals = min(decimals, max(0, 4 - len(f"{largest:.0f}")))  # wider numbers would not fit
     for heading in rows[0][1]:
         table.add_column(heading, justify="right")
     for name, figures in rows:
@@ -112,7 +112,7 @@ def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: 
 
 
 def success_table(rows: list[tuple[str, Metrics]]) -> Table:
-    """The share of runs below both limits."""
+    """A table of the share of runs below both limits."""
     table = plain_table("Success rate")
     table.add_column("< 2° and < 5 cm", justify="right")
     table.add_column("< 1° and < 2.5 cm", justify="right")
@@ -122,7 +122,7 @@ def success_table(rows: list[tuple[str, Metrics]]) -> Table:
 
 
 def plain_table(title: str) -> Table:
-    """An empty table that fits into 80 columns, its first column being the row's name."""
+    """An empty table for 80 columns, whose first column names the row."""
     from rich import box
     from rich.table import Table
 

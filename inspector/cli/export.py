@@ -24,18 +24,18 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 
 @click.command()
 @click.argument("recording", type=RECORDING, required=False, metavar="[RUN.rrd]")
-@click.option("--folder", type=FOLDER, help="Export the calibration.yaml of this folder, not a recording.")
-@click.option("--format", "form", type=click.Choice(FORMATS.names()), required=True, help="What to write.")
+@click.option("--folder", type=FOLDER, help="Export the calibration.yaml of this folder instead of a recording.")
+@click.option("--format", "form", type=click.Choice(FORMATS.names()), required=True, help="Format to write.")
 @click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The extrinsic of this frame.")
 @click.option("--median", is_flag=True, help="The median of all frames' extrinsics.  [default without a drive]")
 @click.option("--drive", is_flag=True, help="The extrinsic of the drive.  [default where it was solved]")
-@click.option("--force", is_flag=True, help="Write a rejected extrinsic all the same.")
+@click.option("--force", is_flag=True, help="Write the extrinsic even if it is rejected.")
 @click.option("--camera", metavar="NAME", help="The camera of a rig.  [default: all, into the folder --output]")
 @click.option(
     "--output",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Where to write; of all cameras of a rig a folder.  [default: stdout]",
+    help="File to write; for all cameras of a rig, a folder.  [default: stdout]",
 )
 @overwrite_option
 @click.option("--camera-frame", default="camera_optical_frame", show_default=True, help="ROS name of the camera.")
@@ -63,8 +63,8 @@ def export(
 ) -> int:
     """Write the corrected extrinsic in the format of another tool, or as a calibration.yaml.
 
-    By default that of the whole drive or, without one, the geometric median of all frames, which is robust against
-    outliers. Every file states its convention.
+    By default, writes that of the whole drive or, without one, the geometric median of all frames, which is robust
+    against outliers. Every file states its convention.
 
     A rejected extrinsic is not written, and the exit code is 1, unless --force is given. A warning on stderr and in the
     file marks one that is rejected or cannot tell.
@@ -77,7 +77,7 @@ def export(
     if choices > 1:
         raise click.UsageError("Give one of --frame, --median and --drive.")
     if folder is not None and choices:
-        raise click.UsageError("--frame, --median and --drive choose from a recording; a folder has one calibration.")
+        raise click.UsageError("--frame, --median and --drive choose from a recording; leave them out with --folder.")
     for name in (camera_frame, lidar_frame):
         if ROS_NAME.fullmatch(name) is None:
             raise click.UsageError(f"{name!r} is not a valid ROS frame name; use letters, digits, _ and /.")
@@ -88,7 +88,9 @@ def export(
     frames = FrameNames(camera_frame, lidar_frame, parent == "lidar")
     if recording is not None and is_rig(recording):
         if choices:
-            raise click.UsageError("--frame, --median and --drive are not for rigs: these have one result a camera.")
+            raise click.UsageError(
+                "--frame, --median and --drive do not apply to rigs, which have one result per camera."
+            )
         return export_rig(recording, camera, form, force, output, frames)
     if camera is not None:
         raise click.UsageError("--camera chooses from the recording of a rig; this has one camera.")
@@ -104,7 +106,7 @@ def put_out(exported: Exported, form: str, force: bool, output: Path | None) -> 
     if output is None:
         click.echo(text, nl=False)
     elif output.is_dir():
-        raise click.UsageError(f"--output {output} is a folder; name a file.")
+        raise click.UsageError(f"--output {output} is a folder; give a file.")
     else:
         write(output, text.encode(), kind_of_export(text))
         say(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
@@ -114,7 +116,7 @@ def put_out(exported: Exported, form: str, force: bool, output: Path | None) -> 
 def export_rig(
     recording: Path, camera: str | None, form: str, force: bool, output: Path | None, frames: FrameNames
 ) -> int:
-    """Write one camera of a rig, or all into a folder; each camera's frame has its name. Returns the exit code."""
+    """Write one camera of a rig, or all into a folder, with frames named after the cameras; returns the exit code."""
     from inspector.export.exported import exported_camera
     from inspector.read.rig import read_rig
 
@@ -126,7 +128,9 @@ def export_rig(
         names = ", ".join(one.name for one in rig.solved.cameras)
         raise click.UsageError(f"Give a folder with --output for all cameras, or one with --camera: {names}.")
     if output.exists() and not output.is_dir():
-        raise click.UsageError(f"--output {output} is not a folder, which several cameras need; or choose --camera.")
+        raise click.UsageError(
+            f"--output {output} is not a folder; give a folder for all cameras, or choose one with --camera."
+        )
     output.mkdir(parents=True, exist_ok=True)
     codes = []
     for solved, said in zip(rig.solved.cameras, ros_names([one.name for one in rig.solved.cameras]), strict=True):
@@ -136,26 +140,26 @@ def export_rig(
 
 
 def ros_names(names: list[str]) -> list[str]:
-    """Names with the characters that ROS allows, all different."""
+    """Distinct names made of the characters that ROS allows."""
     said = [re.sub(r"[^A-Za-z0-9_]", "_", name) for name in names]
     return [one if said.count(one) == 1 else f"{one}_{number}" for number, one in enumerate(said)]
 
 
 def may_be_written(exported: Exported, force: bool) -> bool:
-    """Say on stderr what is wrong with a calibration that is not accepted; false where it must not be written."""
+    """Warn on stderr of a calibration that is not accepted; returns whether it may be written."""
     verdict = exported.verdict
     if verdict is None or verdict.word == "accepted":
         return True
     from inspector.verdicts import explained
 
     written = force or verdict.word != "rejected"
-    what = "Written all the same." if written else "Nothing is written; --force writes it all the same."
+    what = "It was written." if written else "Nothing was written; --force writes it."
     say(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
     return written
 
 
 def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool, median: bool) -> Exported:
-    """The extrinsic that the options name."""
+    """The extrinsic that the options select."""
     from inspector.export.exported import exported_drive, exported_folder, exported_frame, exported_median
 
     if folder is not None:

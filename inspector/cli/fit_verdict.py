@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 MOST_WORKERS = 8
-"""Most worker processes, of a gigabyte of memory each, unless more are asked for."""
+"""Largest default number of worker processes, each of which takes about a gigabyte of memory."""
 
 
 @click.command("fit-verdict")
@@ -37,7 +37,7 @@ MOST_WORKERS = 8
     "--drive-data",
     multiple=True,
     metavar="DATASET:DIR[:SEQ]",
-    help="Further drives, in addition to those of --data, best of eight or more frames. Repeatable.",
+    help="Drives to use in addition to those of --data, preferably of eight frames or more. Repeatable.",
 )
 @click.option(
     "--synthetic-drives",
@@ -45,7 +45,7 @@ MOST_WORKERS = 8
     type=click.IntRange(0),
     default=3,
     show_default=True,
-    help="Synthetic drives to add, each with other sensors.",
+    help="Synthetic drives to add, each with different sensors.",
 )
 @click.option("--runs", type=click.IntRange(1), default=800, show_default=True, help="Number of runs on single frames.")
 @click.option(
@@ -106,7 +106,7 @@ def fit_verdict(
     ranges = [RANGES[number - 1] for number in stages]
     source = Source(preset, weights, stages, data, synthetic, seed)
     of_drive = replace(source, data=data + drive_data, kind="drives")
-    of_drive.sequences()  # what is wrong with them is said before anything is started
+    of_drive.sequences()  # errors in them are reported before anything is started
     marks = fingerprints(preset, weights, ranges)
     path = coefficients_path(preset, weights)
     until = time.monotonic() + 60 * (float("inf") if minutes is None else minutes)
@@ -170,28 +170,28 @@ def fit_verdict(
 
 
 def short(spec: str) -> str:
-    """``DATASET:DIR[:SEQ]`` without what is before the folder's own name, which is different on every machine."""
+    """``DATASET:DIR[:SEQ]`` with the folder's name only, since the path before it differs between machines."""
     dataset, folder, *sequence = spec.split(":")
     return ":".join([dataset, Path(folder).name, *sequence])
 
 
 def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
-    """The figures in sentences."""
+    """The figures of the fit, as lines of text."""
     yield f"{figures.runs} runs of {of} on {figures.sequences} sequences."
-    yield f"{figures.plain} of them have no fault, and {figures.good} of those end right."
-    yield "With each sequence left out of the fit in turn:"
+    yield f"{figures.plain} of them have no fault; {figures.good} of those end with a right result."
+    yield "Cross-validated, leaving out one sequence at a time:"
     yield f"  accepted though wrong: {figures.false_accept_rate:.1%} of all runs"
-    yield f"  accepted: {figures.acceptance_of_good:.0%} of the good runs without a fault"
-    yield f"  rejected: {figures.wrong_rejected:.0%} of the wrong runs"
-    for name, kept in (("acceptance_of_good", ""), ("acceptance_of_clear", ", runs near a limit set aside")):
+    yield f"  accepted: {figures.acceptance_of_good:.0%} of the right results without a fault"
+    yield f"  rejected: {figures.wrong_rejected:.0%} of the wrong results"
+    for name, kept in (("acceptance_of_good", ""), ("acceptance_of_clear", ", without runs close to a limit")):
         points = (f"{point[name]:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
-        yield f"  accepted of the good at other shares of false accepts{kept}: {', '.join(points)}"
-    yield f"  squared error by the stated covariance, a degree of freedom: {figures.nees:.2f}"
+        yield f"  accepted of the right results at other rates of false accepts{kept}: {', '.join(points)}"
+    yield f"  normalised squared error (NEES) per degree of freedom: {figures.nees:.2f}"
 
 
 def told_of_lenses(figures: LensFigures) -> Iterator[str]:
-    """The figures of faults of the lens in sentences."""
+    """The figures of the lens classifier, as lines of text."""
     yield f"{figures.runs} runs on {figures.sequences} sequences, {figures.faulty} of them with a fault of the lens."
-    yield "With each sequence left out of the fit in turn:"
-    yield f"  named rightly: {figures.right:.0%} of them, wrongly: {figures.wrong:.1%}"
-    yield f"  named without a fault: {figures.named_without:.1%} of the others"
+    yield "Cross-validated, leaving out one sequence at a time:"
+    yield f"  named correctly: {figures.right:.0%} of them, wrongly: {figures.wrong:.1%}"
+    yield f"  a fault named where there is none: {figures.named_without:.1%} of the others"

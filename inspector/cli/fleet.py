@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     from inspector.record.contents import Detail
 
 LOOKING = 8
-"""Threads that look which drives are done: they mostly wait for file systems."""
+"""Threads that check which drives are done; they mostly wait for file systems."""
 EVERY_S = 30.0
-"""Seconds between two writings of the table while drives are done; a tenth of the time at most goes there."""
+"""Seconds between updates of the table while the fleet runs, so that at most a tenth of the time goes there."""
 MOST_NEWS = 10
-"""Mounts that are named in the end; the page has all."""
-STOPPING = "Stopping when the drives under way are done; once more gives them up."
+"""Largest number of moved mounts named at the end; the page lists all."""
+STOPPING = "Stopping once the running drives are done; press Ctrl-C again to abandon them."
 
 
 @click.command()
@@ -44,7 +44,8 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
     "--workers",
     type=click.IntRange(0, 1024),
     metavar="N",
-    help="Processes on this machine; 0 does the drives in this one, without Dask.  [default: half of the cores]",
+    help="Worker processes on this machine; 0 runs the drives in this process, without Dask.  [default: half of the "
+    "cores]",
 )
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Use this running Dask cluster.")
 @click.option(
@@ -53,15 +54,13 @@ STOPPING = "Stopping when the drives under way are done; once more gives them up
     metavar="SIZE",
     help="Memory of a worker, for instance 4GB.  [default: its share of the machine]",
 )
-@click.option(
-    "--detail", type=DETAIL, default="overview", show_default=True, help="How much of each frame is recorded."
-)
-@click.option("--frames", type=FRAMES, help="Frames of every drive whose row says nothing else; as `verify` has it.")
+@click.option("--detail", type=DETAIL, default="overview", show_default=True, help="How much of each frame to record.")
+@click.option("--frames", type=FRAMES, help="Frames of every drive whose row gives none, as for `verify`.")
 @click.option(
     "--options",
     default="",
     metavar="TEXT",
-    help="Further options of `verify` for every drive, for instance '--seed 1'.",
+    help="Options of `verify` for every drive, for instance '--seed 1'.",
 )
 @click.option("--force", is_flag=True, help="Repeat finished drives.")
 @overwrite_option
@@ -82,7 +81,7 @@ def fleet(
     options. A FOLDER is a drive of its own, with images/, clouds/ and calibration.yaml.
 
     Each drive gets a folder with its report, recording and verdict, and a row in fleet.parquet. Repeating the command
-    runs only drives that are missing or have changed. Exits with 0 if every drive has a row, whatever its verdict.
+    runs only the drives that are missing or have changed. Exits with 0 if every drive has a row, whatever its verdict.
     """
     from calibnet.runtime.claim import Claim
     from calibnet.runtime.writing import Kind
@@ -113,7 +112,7 @@ def fleet(
 
 
 def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
-    """Do the drives that are not done, and keep the table of all; returns the exit code."""
+    """Run the drives that are not done, and keep the table of all; returns the exit code."""
     from calibnet.runtime.interruption import StopRequest
     from inspector.cli.fleet_console import fleet_progress
     from inspector.cli.fleet_drive import do_drive
@@ -121,12 +120,12 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     from inspector.fleet.ledger import counted
     from inspector.fleet.table import TABLE
 
-    with ThreadPoolExecutor(LOOKING) as pool:  # whatever is wrong with an option is known here, before the work
+    with ThreadPoolExecutor(LOOKING) as pool:  # errors in options are reported here, before the work
         looked = list(pool.map(needs_work_or_checked, tasks))
     rows = {task.drive.folder: row for task, row in zip(tasks, looked, strict=True) if row is not None}
     pieces = [task for task, row in zip(tasks, looked, strict=True) if row is None]
     if rows:
-        say(f"{len(rows)} of {len(tasks)} drives are done already, on the same input, weights and options.", err=True)
+        say(f"{len(rows)} of {len(tasks)} drives are already done, with the same input, weights and options.", err=True)
     interrupted, gone, started = False, "", time.monotonic()
     written, took = started, 0.0
     store = tasks[0].store
@@ -148,23 +147,23 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     in_order = keep_table(tasks, rows)
     seconds = time.monotonic() - started
     new = len(in_order) - (len(tasks) - len(pieces))
-    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {new} of them done now, in {seconds:.0f} s.")
+    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {new} of them ran now, in {seconds:.0f} s.")
     for sentence in news(in_order):
         say(sentence)
     say(f"Table: {store.root}/{TABLE}")
     if interrupted or gone:
         again = shlex.join(["calib-inspect", *(word for word in sys.argv[1:] if word != "--force")])
-        say(f"{gone or 'Interrupted.'} The others are left; to go on: {again}", err=True)
+        say(f"{gone or 'Interrupted.'} To continue with the others: {again}", err=True)
         return ExitCode.INTERRUPTED if interrupted else ExitCode.BAD_INPUT
     if store.local is not None:
-        say(f"A page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
+        say(f"Make a page of it: calib-inspect fleet-report {shlex.quote(store.root)}")
     else:
-        say(f"A page of it: copy {store.root} to this machine, then: calib-inspect fleet-report FOLDER")
+        say(f"To make a page of it, copy {store.root} to this machine, then: calib-inspect fleet-report FOLDER")
     return ExitCode.OK
 
 
 def news(rows: Sequence[Row]) -> Iterator[str]:
-    """What a fleet's people want to know first: what only cars tell, and whose mount moved."""
+    """What the owner of a fleet wants to know first: findings across a car's drives, and whose mount moved."""
     from inspector.fleet.history import histories
     from inspector.fleet.ledger import told_together
 
@@ -177,7 +176,7 @@ def news(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def needs_work_or_checked(task: Task) -> Row | None:
-    """The row of a drive that is done; None where it is not, and its options can be read."""
+    """The row of a drive that is done; None for one that still has to run, whose options have been checked."""
     from inspector.cli.fleet_drive import needs_work, read_options
 
     row = needs_work(task)
@@ -187,7 +186,7 @@ def needs_work_or_checked(task: Task) -> Row | None:
 
 
 def settled(outcome: Outcome[Task, Row]) -> Row:
-    """The row of a drive that a worker has done, or has failed to do."""
+    """The row of a drive that a worker has finished or failed."""
     from inspector.cli.fleet_drive import DriveFailed, note_failure
     from inspector.fleet.ledger import failed_row
 
@@ -205,7 +204,7 @@ def settled(outcome: Outcome[Task, Row]) -> Row:
 
 
 def keep_table(tasks: Sequence[Task], rows: dict[str, Row]) -> list[Row]:
-    """Write the rows that there are, in the order of the list, each judged by its car as well, and hand them back."""
+    """Write the rows so far, in the order of the list and each judged against its car's others, and return them."""
     from inspector.fleet.history import judged_by_cars
     from inspector.fleet.table import TABLE, table_bytes, write_table
 

@@ -1,4 +1,4 @@
-"""How far a fleet is, on the terminal."""
+"""Progress of a fleet on the terminal."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class FleetProgress:
-    """A bar that counts drives and their verdicts; a line for each that failed."""
+    """A bar that counts drives and their verdicts, with a line for each that failed."""
 
     def __init__(self, progress: Progress, task: TaskID) -> None:
         self._progress, self._task = progress, task
         self._counts: Counter[str] = Counter()
 
     def advance(self, row: Row) -> None:
-        """Take in a drive that is done."""
+        """Count a finished drive."""
         self._counts[row.verdict] += 1
         said = ", ".join(f"{count} {word}" for word, count in sorted(self._counts.items()))
         self._progress.update(self._task, advance=1, said=said)
@@ -34,7 +34,7 @@ class FleetProgress:
 
 @contextmanager
 def fleet_progress(total: int) -> Iterator[FleetProgress]:
-    """Show the bar while drives are done; nothing for none."""
+    """Show the bar while drives run; nothing if there are none."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("drives"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}", markup=False))

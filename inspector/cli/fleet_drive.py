@@ -33,15 +33,15 @@ VERDICT, LOG = "verdict.json", "log.txt"
 """Files of a drive beside those of its report."""
 
 _one_at_a_time = Lock()
-"""What a run prints and reads is known for the whole process."""
+"""Output and the list of files read belong to the whole process, so one drive runs at a time."""
 
 
-class DriveFailed(Exception):  # noqa: N818, it is what happened to the drive
+class DriveFailed(Exception):  # noqa: N818 - it says what happened to the drive
     """A drive could not be done.
 
     Attributes:
-        sentence: why.
-        lasting: the input is to blame, so that another try on the same input fails alike.
+        sentence: the reason.
+        lasting: whether the input is to blame, so that another try on the same input would fail too.
     """
 
     def __init__(self, sentence: str, lasting: bool = False) -> None:
@@ -51,14 +51,14 @@ class DriveFailed(Exception):  # noqa: N818, it is what happened to the drive
 
 @dataclass(frozen=True)
 class Task:
-    """What a worker is sent.
+    """Task of a worker.
 
     Attributes:
-        drive: to do.
+        drive: the drive to verify.
         store: the fleet's folder.
-        detail: how much of each frame is recorded.
-        force: do it even where it is done.
-        run: of the command, to tell what it did itself: with a worker goes the result that it had, but not its entry.
+        detail: how much of each frame to record.
+        force: whether to repeat a finished drive.
+        run: identifier of the command's run, which tells its own results from earlier ones.
     """
 
     drive: Drive
@@ -93,7 +93,7 @@ def read_options(task: Task, path: str | None = None) -> Asked:
         path: where its data lies, if that is not its own path.
 
     Raises:
-        ConfigError: there is something wrong with them; the sentence says whose they are.
+        ConfigError: they are not valid; the sentence names the drive's row.
     """
     name, *arguments = task.arguments(path)
     command = _COMMANDS.commands[name]
@@ -103,13 +103,11 @@ def read_options(task: Task, path: str | None = None) -> Asked:
     except click.ClickException as error:
         raise ConfigError(f"{task.drive.origin}: {one_line(error.format_message())}") from None
     except (click.exceptions.Exit, click.Abort):
-        raise ConfigError(
-            f"{task.drive.origin}: its options ask for help; calib-inspect verify --help gives it."
-        ) from None
+        raise ConfigError(f"{task.drive.origin}: --help is not an option of a drive; leave it out.") from None
     for decided in DECIDED:
         if context.get_parameter_source(decided) is ParameterSource.COMMANDLINE:
             option = next(one.opts[0] for one in command.params if one.name == decided)
-            raise ConfigError(f"{task.drive.origin}: {option} is not for a single drive; leave it out.")
+            raise ConfigError(f"{task.drive.origin}: {option} is set by the fleet; leave it out.")
     return asked
 
 
@@ -119,10 +117,10 @@ over_sequences(_COMMANDS, lambda opening, **options: Asked(opening, options), la
 
 
 def key_of(task: Task) -> Key:
-    """What its result will depend on, as far as a look from outside tells.
+    """What a drive's result depends on, as far as file names, sizes and times tell.
 
     Raises:
-        ConfigError: something is wrong with its options.
+        ConfigError: its options are not valid.
         DatasetError: its files cannot be listed.
     """
     options = read_options(task).options
@@ -131,10 +129,10 @@ def key_of(task: Task) -> Key:
 
 
 def weights_digest(preset: str, folder: Path | None) -> str:
-    """What tells one set of weights, and the program that uses it, from another.
+    """Identifies a set of weights and the version of the program that uses it.
 
     Raises:
-        WeightsError: there is none.
+        WeightsError: there are no such weights.
     """
     from calibnet import __version__
     from calibnet.weights.fingerprint import digest_of_set
@@ -144,7 +142,7 @@ def weights_digest(preset: str, folder: Path | None) -> str:
 
 
 def prepare_worker(threads: int = 0) -> None:
-    """Let this process load weights once and, with a number, compute with so many threads."""
+    """Let this process load weights once and, if a number is given, compute with that many threads."""
     from calibnet.cascade.loading import keep_weights
     from calibnet.runtime.threads import limit_threads
 
@@ -154,10 +152,10 @@ def prepare_worker(threads: int = 0) -> None:
 
 
 def do_drive(task: Task) -> Row:
-    """Calibrate a drive as one, verify what it had, keep recording, report and JSON, and note that it is done.
+    """Verify a drive's calibration, save recording, report and JSON, and note in the ledger that it is done.
 
     Raises:
-        DriveFailed: it cannot be done.
+        DriveFailed: it cannot be verified.
     """
     from inspector.record.stream import release_closed
 
@@ -169,7 +167,7 @@ def do_drive(task: Task) -> Row:
                 key = replace(key, content=content(path, task.drive))
                 entry = read_entry(task.store, task.drive)
                 wanted = entry is not None and (not task.force or entry.run == task.run)
-                if entry is not None and wanted and entry.key.is_same(key):  # it only looked different
+                if entry is not None and wanted and entry.key.is_same(key):  # only times of files differ
                     write_entry(task.store, task.drive, replace(entry, key=key))
                     return entry.row
                 row = _verified(task, path, started)
@@ -209,7 +207,7 @@ def _verified(task: Task, path: Path, started: float) -> Row:
 
 @contextmanager
 def _logged(file: Path) -> Iterator[None]:
-    """A context whose output goes to a file, and whose inputs and outputs are kept apart as in a command."""
+    """A context that sends all output to a file and, like a command, keeps track of the files it reads and writes."""
     log = file.open("w", encoding="utf-8", errors="backslashreplace")
     with log, redirect_stdout(log), redirect_stderr(log), protecting_inputs(), keeping_others():
         try:
@@ -238,7 +236,7 @@ def _record_sentence(drive: Drive, folder: Path, word: str, cause: str, sentence
 
 
 def _failed(error: BaseException) -> DriveFailed:
-    """What a user has to know of an error."""
+    """The failure of a drive, for an error that `verify` raised."""
     if isinstance(error, DriveFailed):
         return error
     if isinstance(error, CalibnetError):
@@ -246,14 +244,14 @@ def _failed(error: BaseException) -> DriveFailed:
     if isinstance(error, click.ClickException):
         return DriveFailed(one_line(error.format_message()))
     if isinstance(error, MemoryError):
-        return DriveFailed("There is not enough memory for it.")
+        return DriveFailed("There is not enough memory for this drive; free some, or use fewer workers.")
     sentence = environment_sentence(error) if isinstance(error, OSError | ImportError) else None
     fault = f"Internal error in calib-inspect ({one_line(f'{type(error).__name__}: {error}', 300)}); see {LOG}."
     return DriveFailed(sentence or fault)
 
 
 def needs_work(task: Task) -> Row | None:
-    """The row of a drive that is done on what it is now; None where it has to be looked at by a worker."""
+    """The row of a drive that is done and has not changed; None for one that a worker has to look at."""
     if task.force:
         return None
     entry = read_entry(task.store, task.drive)
@@ -266,7 +264,7 @@ def needs_work(task: Task) -> Row | None:
 
 
 def note_failure(task: Task, error: DriveFailed) -> Row:
-    """The row of a drive that failed; where its input is to blame that is noted, and not tried again on the same."""
+    """The row of a drive that failed; if its input is to blame, the ledger notes not to try it again unchanged."""
     drive = task.drive
     recording = f"{drive.folder}/{RECORDING}"
     row = row_of(drive, verdict=FAILED, reason=error.sentence, recording=recording if task.store.has(recording) else "")

@@ -1,4 +1,4 @@
-"""``calib-inspect fleet-report``, ``fleet-view`` and ``fleet-simulate``: what is made of a fleet, and one to try."""
+"""``calib-inspect fleet-report``, ``fleet-view`` and ``fleet-simulate``: views of a fleet, and one to try."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inspector.cli.output import make_console, overwrite_option, say
 @click.option("--frames", type=click.IntRange(1, 1000), default=4, show_default=True, help="Frames of each drive.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
 def simulate(count: int, out: Path, frames: int, seed: int) -> None:
-    """Write a fleet of N synthetic drives, to try and to measure `fleet` with.
+    """Write a fleet of N synthetic drives, to try `fleet` or to measure it.
 
     A few streets are rendered once and reused. Most calibrations are good; the mount of some cars moves, some have a
     wrong camera matrix, and some scans are cut off. truth.csv says what is wrong with each.
@@ -39,7 +39,7 @@ def simulate(count: int, out: Path, frames: int, seed: int) -> None:
 @click.argument("folder", type=FOLDER, metavar="DIR")
 @overwrite_option
 def report(folder: Path) -> None:
-    """Write a page about a fleet: its cars, moves of their mounts, and every drive, worst first.
+    """Write a page about a fleet: its cars, their moved mounts, and every drive, worst first.
 
     DIR is the folder given to `fleet --output`. Each drive links to its report and recording.
     """
@@ -51,10 +51,10 @@ def report(folder: Path) -> None:
 
 @click.command("fleet-view")
 @click.argument("folder", type=FOLDER, metavar="DIR")
-@click.option("--serve", "in_browser", is_flag=True, help="Offer the viewer as a web page, on this machine only.")
+@click.option("--serve", "in_browser", is_flag=True, help="Show the viewer as a web page, on this machine only.")
 @click.option("--headless", is_flag=True, help="Open no window.")
 def view(folder: Path, in_browser: bool, headless: bool) -> None:
-    """Serve all recordings of a fleet as one table in the Rerun viewer, on this machine, until Ctrl-C.
+    """Serve all recordings of a fleet on this machine as one table in the Rerun viewer, until Ctrl-C.
 
     The table sorts and filters by verdict, cause and how far the calibration was off; a row opens its drive.
     """

@@ -1,8 +1,8 @@
 """``rerun-importer-calib-inspect``: makes ``rerun FOLDER`` open KITTI sequences and own sensors.
 
-The viewer calls every ``rerun-importer-*`` on the PATH with every path it is asked to open. One that does
-not know the path has to say so by an exit code, at once and without a word; the others write a
-recording to stdout. Ours calibrates some frames from all over the sequence as the commands do.
+The viewer calls every ``rerun-importer-*`` on the PATH with every path it is asked to open. An importer that does not
+know the path has to exit at once with a certain code and without output; the others write a recording to stdout. Ours
+calibrates some frames from all over the sequence as the commands do.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from calibnet.datasets import Sequence
 
 INCOMPATIBLE = 66
-"""Rerun's exit code for "not mine", written out because importing Rerun takes longer than finding out."""
+"""Rerun's exit code for "not mine", as a number since importing Rerun takes longer than recognising a path."""
 MOST_FRAMES = 24
-"""So many frames at most: the viewer waits for them, and `calib-inspect seq` records them all."""
+"""Largest number of frames calibrated: the viewer waits for them, and `calib-inspect seq` records them all."""
 RANGE = "5/0.5"
 RAW_DRIVE = re.compile(r"(\d{4}_\d{2}_\d{2})_drive_(\d{4})_(?:sync|extract)")
 
@@ -28,10 +28,10 @@ class Recognised(NamedTuple):
     """A folder that we can read.
 
     Attributes:
-        dataset: as `calibnet.datasets.open_sequence` names it.
+        dataset: its name, as `calibnet.datasets.open_sequence` takes it.
         root: the dataset's folder.
-        options: which part of it.
-        as_is: whether its extrinsic is a guess to be corrected, and no reference.
+        options: keywords of `open_sequence` that select the part of it.
+        as_is: whether its extrinsic is a guess to be corrected rather than a reference.
     """
 
     dataset: str
@@ -41,7 +41,7 @@ class Recognised(NamedTuple):
 
 
 def recognise(path: Path) -> Recognised | None:
-    """What a path holds, told by the names in it alone; None for everything else."""
+    """What a path holds, judged by file names alone; None for everything else."""
     if not path.is_dir():
         return None
     path = path.resolve()
@@ -59,7 +59,7 @@ def import_folder(found: Recognised) -> None:
     """Calibrate and write the recording to stdout.
 
     Raises:
-        CalibnetError: the folder cannot be read or nothing of it calibrated.
+        CalibnetError: the folder cannot be read, or no frame can be calibrated.
     """
     from rich.console import Console
 

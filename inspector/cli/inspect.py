@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 DEMO_LENGTH = 12
 
 length_option = click.option(
-    "--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Frames to drive."
+    "--length", type=click.IntRange(min=1), default=DEMO_LENGTH, show_default=True, help="Number of frames."
 )
 
 
 @click.group()
 def runs() -> None:
-    """Calibrate frames and record every stage; `calib-inspect` has these commands itself."""
+    """Calibrate frames and record every stage; `calib-inspect` offers these subcommands as commands of its own."""
 
 
 def calibrate_opened(opening: Opening, **asked: Any) -> int:
-    """Open what is to be calibrated, and calibrate it; returns the exit code."""
+    """Open a sequence and calibrate it; returns the exit code."""
     return calibrate(opening(), **asked)
 
 
@@ -39,9 +39,9 @@ over_sequences(runs, calibrate_opened, lambda source: run_options(source.given),
 @length_option
 @run_options()
 def demo(length: int, viewing: Viewing, report: Path | None, **asked: Any) -> int:
-    """Calibrate a drive through the synthetic world: needs no data.
+    """Calibrate a drive through the synthetic world, without any data.
 
-    The recording is kept in recordings/demo.rrd, or, where that is there, in demo-2.rrd and so on.
+    The recording is saved as recordings/demo.rrd or, if that exists, as demo-2.rrd and so on.
     """
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 

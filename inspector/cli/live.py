@@ -1,4 +1,4 @@
-"""``calib-inspect live``: a page on which one moves the extrinsic by hand, and the cascade answers."""
+"""``calib-inspect live``: a page on which the extrinsic is moved by hand, and the cascade answers."""
 
 from __future__ import annotations
 
@@ -36,13 +36,14 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
     click.option(
         "--range",
         type=RANGE,
-        help=f"Begin with a miscalibration drawn from ± these, and let the sliders reach so far.  [{DEFAULT_RANGE}]",
+        help="Start from a miscalibration drawn within ± these degrees and metres, which is also how far the sliders "
+        f"reach.  [{DEFAULT_RANGE}]",
     ),
     click.option(
         "--miscalibrate",
         "miscalibration",
         type=MISCALIBRATION,
-        help="Begin with this miscalibration, instead of drawing one.",
+        help="Start from this miscalibration instead of a random one.",
     ),
     click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
@@ -54,8 +55,8 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         "--output",
         type=OUTPUT_FILE,
         metavar="FILE",
-        help="Where an accepted calibration goes; never the file that was read.  [default: calibration.corrected.yaml, "
-        "or with the ending of --format]",
+        help="File for an accepted calibration; must not be the file that was read.  [default: "
+        "calibration.corrected.yaml, or with the ending of --format]",
     ),
     click.option(
         "--format",
@@ -63,20 +64,24 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         type=click.Choice(FORMATS.names()),
         default="yaml",
         show_default=True,
-        help="Format of an accepted calibration, as of `calib-inspect export`.",
+        help="Format of an accepted calibration, as for `calib-inspect export`.",
     ),
     overwrite_option,
-    click.option("--native", is_flag=True, help="Rerun's own window and the keys of this terminal, instead of a page."),
     click.option(
-        "--connect", metavar="URL", help="With --native, a viewer that runs: rerun+http://HOST:PORT/proxy.  [a new one]"
+        "--native", is_flag=True, help="Use Rerun's own window and the keys of this terminal instead of a page."
     ),
-    click.option("--open/--no-open", "open_page", default=True, help="Open a browser, where there is a display."),
+    click.option(
+        "--connect",
+        metavar="URL",
+        help="With --native, use this running viewer: rerun+http://HOST:PORT/proxy.  [default: a new one]",
+    ),
+    click.option("--open/--no-open", "open_page", default=True, help="Open a browser if there is a display."),
 )
 
 
 @dataclass(frozen=True)
 class Keeping:
-    """Where an accepted calibration goes, and where the session is shown."""
+    """Where an accepted calibration is written, and where the session is shown."""
 
     output: Path | None
     form: str
@@ -86,7 +91,7 @@ class Keeping:
 
 
 def live_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of a live session; those of `Keeping` come as one, ``keeping``."""
+    """Give a command the options of a live session; those of `Keeping` are passed as one argument, ``keeping``."""
     names = [field.name for field in fields(Keeping)]
 
     @wraps(command)
@@ -101,11 +106,11 @@ def live_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.group()
 def live() -> None:
-    """Move the extrinsic by hand, see the points follow, let go, and see what the cascade answers, stage by stage.
+    """Move the extrinsic by hand and watch the cascade correct it, stage by stage.
 
-    A page on this machine, which nobody opens who does not have its address. Every try stays and can be gone back to.
-    Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, Ctrl+Z undoes, the arrows change the frame.
-    With --native they are those of this terminal, where z undoes and ? tells all of them.
+    Opens a page that is served on this machine only, to whoever has its address. Every try is kept and can be returned
+    to. Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, Ctrl+Z undoes, the arrows change the frame.
+    With --native, type them into this terminal, where z undoes and ? lists all of them.
     """
 
 
@@ -113,14 +118,14 @@ def live() -> None:
 @length_option
 @live_options
 def demo(length: int, keeping: Keeping, **asked: Any) -> int:
-    """On a drive through the synthetic world: needs no data."""
+    """Explore a drive through the synthetic world, without any data."""
     from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 
     return serve_live(SyntheticSequence(seed=asked["seed"], length=length, rig=KITTI_LIKE), keeping, **asked)
 
 
 def live_opened(opening: Opening, keeping: Keeping, **asked: Any) -> int:
-    """Open what is to be looked at, and serve it; returns the exit code."""
+    """Open a sequence and serve it; returns the exit code."""
     return serve_live(opening(), keeping, **asked)
 
 
@@ -131,8 +136,8 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     """Show the page or the window until Ctrl-C or SIGTERM.
 
     Args:
-        sequence: what to look at.
-        keeping: where an accepted calibration goes, and where the session is shown.
+        sequence: the frames to explore.
+        keeping: where an accepted calibration is written, and where the session is shown.
         **asked: fields of `RunOptions`.
     """
     from calibnet.cascade.cascade import Cascade
@@ -141,7 +146,7 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
     from inspector.live.workspace import Workspace
 
     if keeping.connect is not None and not keeping.native:
-        raise click.UsageError("--connect belongs to --native: a page brings its own viewer.")
+        raise click.UsageError("--connect needs --native; add it, or leave --connect out: the page has its own viewer.")
     if keeping.native:
         check_window(keeping.connect)
     options = checked(sequence, asked)
@@ -186,25 +191,27 @@ def on_a_page(session: LiveSession, open_page: bool) -> None:
 
 
 def check_window(connect: str | None) -> None:
-    """Find out before the work whether there is a viewer, or a screen to open one on.
+    """Check before the work that there is a viewer, or a display to open one on.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: there is neither.
     """
     from inspector.record.outputs import check_viewer, has_display
 
     if connect is not None:
         check_viewer(connect)
     elif not has_display():
-        raise ConfigError("There is no screen for --native; leave it out for the page, or name a viewer by --connect.")
+        raise ConfigError(
+            "There is no display for --native; leave it out for the page, or name a running viewer with --connect."
+        )
 
 
 def in_a_window(make: Callable[..., LiveSession], connect: str | None) -> None:
-    """Act on the keys of the terminal until Esc, Ctrl-C, SIGTERM or their end; the window outlives that.
+    """Act on the terminal's keys until Esc, Ctrl-C, SIGTERM or the end of input; the window stays open.
 
     Args:
-        make: the session, with ``stream`` given.
-        connect: address of a viewer that runs; None to open one.
+        make: makes the session from a ``stream``.
+        connect: address of a running viewer; None to open one.
     """
     import rerun as rr
 
@@ -216,7 +223,7 @@ def in_a_window(make: Callable[..., LiveSession], connect: str | None) -> None:
 
     window = WindowRecording(rr.GrpcSink(connect or open_window()), help_text())
     session = make(stream=window)
-    say("Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, ? tells all, Esc ends.")
+    say("Keys: q a roll, w s pitch, e d yaw, r f x, t g y, y h z; Enter runs, ? lists all keys, Esc ends.")
     try:
         with StopRequest() as stop, keyboard() as read:
             asyncio.run(Terminal(session, window, say).run(read, lambda: stop.requested))

@@ -21,7 +21,7 @@ from inspector.programs import SWITCHED_OFF
 
 @dataclass(frozen=True)
 class LazyCommand:
-    """Where a command lives, ``module:name`` or ``module:group.name``, and what the list of commands says of it."""
+    """Where a command is defined, ``module:name`` or ``module:group.name``, and its line in the list of commands."""
 
     target: str
     help: str
@@ -43,7 +43,7 @@ SECTIONS = {
         "bag": LazyCommand("inspector.cli.inspect:runs.bag", "Calibrate a ROS 1 or ROS 2 bag, or an MCAP file."),
         "rig": LazyCommand("inspector.cli.rig:rig", "Calibrate several cameras with one LiDAR."),
         "live": LazyCommand("inspector.cli.live:live", "Move the extrinsic by hand, and see the cascade's answer."),
-        "demo": LazyCommand("inspector.cli.inspect:runs.demo", "Calibrate a synthetic drive: needs no data."),
+        "demo": LazyCommand("inspector.cli.inspect:runs.demo", "Calibrate a synthetic drive, without any data."),
         "seq": LazyCommand("inspector.cli.inspect:runs.seq", "Calibrate a KITTI odometry sequence."),
         "raw": LazyCommand("inspector.cli.inspect:runs.raw", "Calibrate a KITTI raw drive."),
         "object": LazyCommand("inspector.cli.inspect:runs.object", "Calibrate the KITTI object detection frames."),
@@ -84,10 +84,10 @@ COMMANDS = {name: command for section in SECTIONS.values() for name, command in 
 
 
 class LazyGroup(click.Group):
-    """A group whose help needs no command's module."""
+    """A group whose help imports no command's module."""
 
     def main(self, *arguments: Any, **more: Any) -> Any:
-        """Run it, or tell a shell how a line goes on; click takes what shells say of the line for right."""
+        """Run the group, or complete a line for a shell, whose request click would take on trust."""
         check_completion()
         return super().main(*arguments, **more)
 
@@ -96,7 +96,7 @@ class LazyGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import one command, or None for a name that does not exist."""
+        """Import and return one command; None for a name that does not exist."""
         lazy = COMMANDS.get(cmd_name)
         return lazy.load() if lazy else None
 
@@ -117,24 +117,24 @@ def _print_versions(ctx: click.Context, _: click.Parameter, asked: bool) -> None
 
 
 def check_completion() -> None:
-    """See that what a shell asks for can be answered; what it says stands in the environment.
+    """Check a shell's request for completion, which stands in the environment.
 
     Raises:
-        ConfigError: no shell has said that.
+        ConfigError: it is not a request that a shell makes.
     """
     asked = os.environ.get(COMPLETES)
     if not asked:
         return
     if not re.fullmatch("(bash|zsh|fish)_(source|complete)", asked):
-        raise ConfigError(f"{COMPLETES}={asked[:40]!r} is not a request of a shell; unset it, or see --help.")
+        raise ConfigError(f"{COMPLETES}={asked[:40]!r} is not a valid completion request; unset it, or see --help.")
     if asked.endswith("_complete"):
         word = ".*" if asked.startswith("fish") else r"\d{1,4}"  # fish gives the word itself, the others its place
         if "COMP_WORDS" not in os.environ or not re.fullmatch(word, os.environ.get("COMP_CWORD", "\n")):
-            raise ConfigError("COMP_WORDS and COMP_CWORD are not what a shell sets; press Tab in one, or unset them.")
+            raise ConfigError("COMP_WORDS and COMP_CWORD are not valid; unset them, and press Tab in a shell.")
 
 
 COMPLETES = "_CALIB_INSPECT_COMPLETE"
-"""Variable in which a shell asks how a line goes on."""
+"""Variable in which a shell requests the completion of a line."""
 COMPLETION = (
     "\b\n"  # click keeps the lines of such a paragraph as they are
     "Completion in bash (zsh_source and fish_source for the others):\n"
@@ -151,14 +151,13 @@ COMPLETION = (
     is_eager=True,
     expose_value=False,
     callback=_print_versions,
-    help="Print this version and those of rerun and torch.",
+    help="Print the versions of calib-inspect, rerun and torch.",
 )
 def cli() -> None:
     """Calibrate a camera to a LiDAR with a cascade of networks, and look at every stage of it.
 
-    Start with `calib-inspect demo`: it needs no data. Exit codes: 0 done, 1 rejected or a limit
-    exceeded, 2 wrong usage, 3 bad input or environment, 4 cannot tell, 70 a fault of the
-    program, 130 interrupted.
+    Start with `calib-inspect demo`, which needs no data. Exit codes: 0 done, 1 rejected or a limit exceeded, 2 wrong
+    usage, 3 bad input or environment, 4 cannot tell, 70 internal error, 130 interrupted.
     """
     threads = os.environ.get("OMP_NUM_THREADS", "1")
     if not re.fullmatch(r"\s*0*[1-9]\d{0,3}\s*(,\s*\d+\s*)*", threads):
@@ -166,24 +165,24 @@ def cli() -> None:
 
 
 RERUN_LOG = "warn,re_log_encoding::rrd::file_sink=error"
-"""What Rerun may print: not that a growing recording has no footer, which it gets in the end."""
+"""Log levels of Rerun, without its warning that a recording still being written has no footer."""
 
 SPINS = "20000"
-"""How often a thread of libgomp's looks for work before it sleeps; its own 300,000 make a frame take several times as
-long where other programs use the cores too, and no shorter where none does."""
+"""How often a thread of libgomp looks for work before it sleeps. The default, 300,000, makes a frame take several times
+as long where other programs use the cores, and saves nothing where none does."""
 
 NOT_FOR_US = ("OPENCV_IO_MAX_IMAGE_", "RERUN_FLUSH_", "RERUN_CHUNK_")
-"""Beginnings of variables that change what libraries do, or end the process where one is no number; bounds of pictures
-and sizes of chunks are ours."""
+"""Prefixes of variables that change what libraries do, or end the process if not a number; the limits of image sizes
+and chunks are ours to set."""
 
 
 def settle_environment() -> None:
-    """Take out of the environment what would change results or print lines of libraries, before they are imported."""
+    """Remove from the environment what would change results or make libraries print, before they are imported."""
     for name in [name for name in os.environ if name.startswith(NOT_FOR_US)]:
         del os.environ[name]
     if os.environ.get("RERUN", "").lower() not in SWITCHED_OFF:
         os.environ.pop("RERUN", None)
-    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"  # it would read what every installed package registers
+    os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"  # or it would load what every installed package registers
     os.environ.setdefault("RUST_LOG", RERUN_LOG)
     os.environ.setdefault("GOMP_SPINCOUNT", SPINS)
 
@@ -191,6 +190,6 @@ def settle_environment() -> None:
 def main() -> None:
     """Entry point of the console script."""
     if not sys.warnoptions:
-        warnings.simplefilter("ignore")  # they are for us; what a user has to know is a sentence of ours
+        warnings.simplefilter("ignore")  # warnings are for developers; users get sentences of ours
     settle_environment()
     sys.exit(run(cli))

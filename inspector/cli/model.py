@@ -1,4 +1,4 @@
-"""``calib-inspect info``: what a network costs."""
+"""``calib-inspect info``: parameters and multiply-adds of a network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--preset", default="compact", show_default=True, help="Network: compact, paper or another preset.")
+@click.option(
+    "--preset", default="compact", show_default=True, help="Network to describe: compact, paper or another preset."
+)
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
 @overwrite_option
 def info(preset: str, json_file: str | None) -> None:
@@ -44,7 +46,7 @@ def info(preset: str, json_file: str | None) -> None:
 
 
 def cost_table(content: dict[str, Any]) -> Table:
-    """One row a module and one for the total."""
+    """A table with one row per module and one for the total."""
     from rich.table import Table
 
     table = Table(title=f"{content['preset']}, one stage at {content['input'][0]} x {content['input'][1]}")

@@ -1,4 +1,4 @@
-"""Option types that several commands share: ranges, stages, frames and miscalibrations as text."""
+"""Option types that several commands share, such as ranges, stages, frames and miscalibrations."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ FRAMES_PATTERN = re.compile(r"-?\d+|(-?\d+)?:(-?\d+)?(:-?[1-9]\d*)?")
 
 
 class RangeType(click.ParamType["MiscalibrationRange"]):
-    """``DEGREES/METRES``, for instance ``5/0.5``, to a `MiscalibrationRange`."""
+    """``DEGREES/METRES``, for instance ``5/0.5``, parsed to a `MiscalibrationRange`."""
 
     name = "DEG/M"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> MiscalibrationRange:
-        """Parse the text; a value that is a range already is kept."""
+        """Parse the text; a range is returned as it is."""
         from calibnet.errors import ConfigError
         from calibnet.geometry import MiscalibrationRange
 
@@ -41,46 +41,52 @@ class RangeType(click.ParamType["MiscalibrationRange"]):
 
 
 class StagesType(click.ParamType[tuple[int, ...]]):
-    """Stage numbers as ``3-5``, ``3,5`` or ``4`` to an ascending tuple."""
+    """Stage numbers such as ``3-5``, ``3,5`` or ``4``, parsed to an ascending tuple."""
 
     name = "STAGES"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
-        """Parse the text; a value that is a tuple already is kept."""
+        """Parse the text; a tuple is returned as it is."""
         if isinstance(value, tuple):
             return value
         stages: set[int] = set()
         for part in str(value).split(","):
             match = re.fullmatch(r"\s*(\d+)\s*(?:-\s*(\d+)\s*)?", part)
             if match is None:
-                self.fail(f"{value!r} is not a list of stages, for instance 3-5, 3,5 or 4.", param, ctx)
+                self.fail(f"{value!r} is not a list of stages; write for instance 3-5, 3,5 or 4.", param, ctx)
             first, last = int(match[1]), int(match[2] or match[1])
             if not 1 <= first <= last <= STAGE_COUNT:
-                self.fail(f"{value!r} names stages outside 1..{STAGE_COUNT} or a range that falls.", param, ctx)
+                self.fail(
+                    f"{value!r} is not an ascending list of stages within 1-{STAGE_COUNT}; write for instance 3-5.",
+                    param,
+                    ctx,
+                )
             stages.update(range(first, last + 1))
         return tuple(sorted(stages))
 
 
 class FramesType(click.ParamType[str]):
-    """A frame number or a Python slice, ``START:STOP:STEP``; checked, and kept as text."""
+    """A position or a Python slice, ``START:STOP:STEP``, which is checked and kept as text."""
 
     name = "FRAMES"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Check the form; which frames exist is for the dataset to say."""
+        """Check the form; whether the frames exist depends on the dataset."""
         text = str(value)
         if FRAMES_PATTERN.fullmatch(text) is None:
-            self.fail(f"{text!r} is neither a frame number nor START:STOP:STEP, for instance 0:100:5.", param, ctx)
+            self.fail(
+                f"{text!r} is not a frame number or START:STOP:STEP; write for instance 7 or 0:100:5.", param, ctx
+            )
         return text
 
 
 class MiscalibrationType(click.ParamType["Transform"]):
-    """``roll,pitch,yaw,x,y,z`` in degrees and metres to a 4x4 ``delta`` in the camera frame."""
+    """``roll,pitch,yaw,x,y,z`` in degrees and metres, parsed to a 4x4 ``delta`` in the camera frame."""
 
     name = "ROLL,PITCH,YAW,X,Y,Z"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Transform:
-        """Parse the text; a value that is a matrix already is kept."""
+        """Parse the text; a matrix is returned as it is."""
         import numpy as np
 
         from calibnet.geometry import miscalibration
@@ -92,18 +98,22 @@ class MiscalibrationType(click.ParamType["Transform"]):
         except ValueError:
             numbers = []
         if len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
-            self.fail(f"{value!r} is not six numbers, roll,pitch,yaw,x,y,z in degrees and metres.", param, ctx)
+            self.fail(
+                f"{value!r} is not a miscalibration; write six numbers, roll,pitch,yaw,x,y,z in degrees and metres.",
+                param,
+                ctx,
+            )
         return miscalibration(numbers[:3], numbers[3:])
 
 
 class QuantityType(click.ParamType[Any]):
-    """A text that one of the parsers of `calibnet.geometry.prior` reads."""
+    """A text, parsed by a function of `calibnet.geometry.prior`."""
 
     def __init__(self, name: str, parser: str) -> None:
         self.name, self.parser = name, parser
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse the text; a value that is parsed already is kept."""
+        """Parse the text; a parsed value is returned as it is."""
         from calibnet.errors import ConfigError
         from calibnet.geometry import prior
 
@@ -116,12 +126,12 @@ class QuantityType(click.ParamType[Any]):
 
 
 class PartsType(click.ParamType[frozenset[Part]]):
-    """Names of `Part` with commas between them."""
+    """Names of `Part`, separated by commas."""
 
     name = "PART,PART"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> frozenset[Part]:
-        """Check every name; a value that is a set already is kept."""
+        """Check every name; a set is returned as it is."""
         if isinstance(value, frozenset):
             return value
         parts = [part.strip() for part in str(value).split(",")]
@@ -132,22 +142,22 @@ class PartsType(click.ParamType[frozenset[Part]]):
 
 
 class WordType(click.Choice[str]):
-    """One of the words of an enumeration, to its member."""
+    """One of the words of an enumeration, parsed to its member."""
 
     def __init__(self, words: type[StrEnum]) -> None:
         super().__init__([str(word) for word in words])
         self.words = words
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> StrEnum:
-        """Check the word; a value that is a member already is kept."""
+        """Check the word; a member is returned as it is."""
         return value if isinstance(value, self.words) else self.words(super().convert(value, param, ctx))
 
 
 class NumberRange(click.FloatRange):
-    """A finite number within limits; click's own lets NaN through, as it is below no limit."""
+    """A finite number within limits; click's own type lets NaN through."""
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Parse the text and hold it against the limits."""
+        """Parse the text and check the limits."""
         number = float(super().convert(cast(float, value), param, ctx))
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)
@@ -155,12 +165,12 @@ class NumberRange(click.FloatRange):
 
 
 class SeedType(click.ParamType[int]):
-    """Seed of everything random; recordings keep it as a signed 64-bit number."""
+    """Seed of the random numbers, which recordings keep as a signed 64-bit number."""
 
     name = "N"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Parse the text; a value that is a number already is held against the limits alike."""
+        """Parse the text, or take a number as it is, and check the limits."""
         text = str(value)
         if re.fullmatch(r"\d{1,19}", text, re.ASCII) is None or int(text) >= 2**63:
             self.fail(f"{text!r} is not a whole number from 0 to {2**63 - 1}.", param, ctx)
@@ -171,12 +181,12 @@ UNITS = {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "KB": 10**3, "MB": 10**6, "GB
 
 
 class Size(click.ParamType[int]):
-    """A number of bytes, as ``30MiB``."""
+    """A number of bytes, written as ``30MiB``."""
 
     name = "size"
 
     def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Bytes of the text."""
+        """Parse the text."""
         if isinstance(value, int):
             return value
         match = re.fullmatch(rf"(\d{{1,9}}(?:\.\d{{1,9}})?) ?({'|'.join(UNITS)})", value)
@@ -189,9 +199,9 @@ SIZE = Size()
 SEED = SeedType()
 CORES = cores()
 THREADS = click.IntRange(1, CORES)
-"""Threads of the CPU: torch ends the process at many more than there can be."""
+"""A number of CPU threads; torch ends the process at far too large a number."""
 USUAL_THREADS = min(2, CORES)
-"""Threads that latencies are measured with."""
+"""Number of threads with which latencies are measured by default."""
 RANGE = RangeType()
 STAGES = StagesType()
 FRAMES = FramesType()
@@ -204,20 +214,22 @@ LENGTH = QuantityType("LENGTH", "parse_length")
 ANGLE = QuantityType("ANGLE", "parse_angle")
 TOLERANCE = QuantityType("ANGLE/LENGTH", "parse_tolerance")
 FOLDER = click.Path(file_okay=False, path_type=Path)
-"""A folder; whether it must exist is for the command to say."""
+"""A folder, which the command itself checks for existence."""
 KNOWN_OPTIONS = (
     click.option(
         "--fix",
         type=AXES,
-        help="Axes of the initial extrinsic that are exact, of roll,pitch,yaw,x,y,z as in --miscalibrate; x,y,z fix "
-        "the camera's position relative to the LiDAR.",
+        help="Axes of the initial extrinsic that are exact: some of roll,pitch,yaw,x,y,z as in --miscalibrate, where "
+        "x,y,z fix the camera's position relative to the LiDAR.",
     ),
     click.option(
-        "--prior-translation", type=LENGTH, help="The camera's position is known to this standard deviation per axis."
+        "--prior-translation", type=LENGTH, help="Standard deviation per axis to which the camera's position is known."
     ),
-    click.option("--prior-rotation", type=ANGLE, help="Its rotation is known to this standard deviation per axis."),
+    click.option(
+        "--prior-rotation", type=ANGLE, help="Standard deviation per axis to which the camera's rotation is known."
+    ),
 )
-"""Options of every command that starts from an extrinsic of which something may be known."""
+"""Options that state what is known of the initial extrinsic."""
 METHOD_OPTIONS = (
     click.option(
         "--method",
@@ -235,4 +247,4 @@ METHOD_OPTIONS = (
     ),
     click.option("--intrinsics", is_flag=True, help="Let pcba adjust focal length and principal point as well."),
 )
-"""Options of every command that calibrates with any method."""
+"""Options that choose the method of a calibration."""

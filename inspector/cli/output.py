@@ -1,4 +1,4 @@
-"""Where a command's results go: tables and sentences on the terminal, files, JSON with ``-`` to stdout."""
+"""Output of a command: tables and sentences on the terminal, files, and JSON, with ``-`` to stdout."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ overwrite_option = click.option(
     is_flag=True,
     expose_value=False,
     callback=_let_overwrite,
-    help="Let outputs replace files of any kind; without it, files of their own kind only.",
+    help="Let outputs replace files of any kind; by default they replace only files of their own kind.",
 )
-"""Option of every command that writes what its user names."""
+"""Option of every command that writes files named by its user."""
 JSON_FILE = click.Path(dir_okay=False, writable=True, allow_dash=True)
 """Type of a ``--json FILE|-`` option."""
 
 
 def console_beside(json_file: str | None) -> Console:
-    """The console for tables: stderr when the JSON takes stdout."""
+    """The console for tables: stderr if the JSON goes to stdout."""
     return make_console(stderr=json_file == "-")
 
 
 NARROWEST = 60
-"""Columns of a table; in fewer, numbers are left out, and a line that the terminal breaks is better."""
+"""Smallest width of a table: narrower, rich would leave numbers out, and lines broken by the terminal are better."""
 
 
 def make_console(stderr: bool = True) -> Console:
@@ -49,14 +49,14 @@ def make_console(stderr: bool = True) -> Console:
         def print(self, *objects: Any, **options: Any) -> None:
             super().print(*(lines(one) if isinstance(one, str) else one for one in objects), **options)
 
-    console = Quoting(stderr=stderr, highlight=False, markup=False, emoji=False)  # a name is no markup
+    console = Quoting(stderr=stderr, highlight=False, markup=False, emoji=False)  # names are not markup
     if console.width < NARROWEST:
         console.width = NARROWEST
     return console
 
 
 def say(text: object, err: bool = False) -> None:
-    """Print lines of ours, with all foreign text in them quoted."""
+    """Print text of ours, in which foreign text is quoted."""
     click.echo(lines(text), err=err)
 
 
@@ -64,7 +64,7 @@ def prepare(file: Path | None, kind: Kind) -> None:
     """Create the folder of an output, so that a path that cannot be written fails before the work.
 
     Raises:
-        OutputError: the output may not be written.
+        OutputError: the output must not replace what is there.
         OSError: its folder cannot be made.
     """
     if file is not None:
@@ -73,12 +73,12 @@ def prepare(file: Path | None, kind: Kind) -> None:
 
 
 def prepare_json(json_file: str | None) -> None:
-    """The same for a ``--json`` option."""
+    """Do the same for the file of a ``--json`` option."""
     prepare(None if json_file in (None, "-") else Path(str(json_file)), Kind.JSON)
 
 
 def write(file: Path, content: bytes, kind: Kind) -> None:
-    """Write an output whole or not at all, and say when it replaces another."""
+    """Write an output whole or not at all, and say if it replaces a file."""
     if write_whole(file, content, kind):
         say(f"Replaced {file}.", err=True)
 
@@ -95,7 +95,7 @@ def write_json(json_file: str | None, content: dict[str, Any]) -> None:
 
 
 def keep_json(json_file: str | None, content: dict[str, Any], first: bool) -> None:
-    """Write what there is so far, where a file is asked for; only the first time it says what it replaces."""
+    """Write the results so far, if a file is asked for; says what it replaces only the first time."""
     if json_file in (None, "-"):
         return
     if first:

@@ -1,4 +1,4 @@
-"""``calib-inspect pack-training``: training frames in a few files, to be trained on elsewhere."""
+"""``calib-inspect pack-training``: training frames in a few files, for training elsewhere."""
 
 from __future__ import annotations
 
@@ -23,9 +23,11 @@ from inspector.cli.output import make_console
     help="Share of synthetic frames, as in train.",
 )
 @click.option("--scenes", type=click.IntRange(1), default=500, show_default=True, help="Synthetic scenes to pack.")
-@click.option("--scene-cache", type=FOLDER, help="Where rendered scenes are kept.  [default: the temporary folder]")
-@click.option("--after", type=FOLDER, help="Weights whose residuals are measured, which takes minutes, and packed too.")
-@click.option("--preset", default="compact", show_default=True, help="Network of those weights.")
+@click.option("--scene-cache", type=FOLDER, help="Folder for rendered scenes.  [default: the temporary folder]")
+@click.option(
+    "--after", type=FOLDER, help="Folder of weights whose residuals to measure and pack too, which takes minutes."
+)
+@click.option("--preset", default="compact", show_default=True, help="Network of the weights of --after.")
 @click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
 @click.option("--output", "out", type=FOLDER, required=True, help="Folder of the parts.")
 @click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Largest size of a part.")
@@ -43,7 +45,7 @@ def pack_training(
 ) -> None:
     """Pack training frames into a few files that `train --packed` reads.
 
-    For machines with a GPU but little storage: pictures and scans at the resolution that training needs, including
+    For machines with a GPU but little storage. Writes images and scans at the resolution that training needs, including
     synthetic scenes, in parts of limited size, each of which can be used without the others.
 
     \b

@@ -1,4 +1,4 @@
-"""From the options of a run to the run: weights are loaded, what is about to happen is said, nothing has begun."""
+"""From the options of a run to a session that is ready to run: weights are loaded, and the run is announced."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from inspector.record.recording import RunDescription
     from inspector.run.session import Session
 
-UNJUDGED = "No result will be accepted: what it finds is not judged, which only the cascade's is."
-"""Said of every method but the cascade."""
+UNJUDGED = "No result will be accepted: only results of the cascade are judged."
+"""Notice for every method but the cascade."""
 
 
 def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Session:
-    """Load the cascade, say what is about to run, and hand back the run."""
+    """Load the cascade, announce the run, and return its session."""
     from calibnet.cascade.cascade import Cascade
     from calibnet.geometry.miscalibration import stages_within
     from inspector.record.recording import RunDescription
@@ -38,7 +38,7 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
             raise click.UsageError("Only the cascade's results are judged; leave --method out.")
         return prepare_other(options, outputs)
     numbers = options.stages or options.start.stages
-    if verify and options.stages is None:  # how far off the calibration is, is what is asked
+    if verify and options.stages is None:  # how far off the calibration is, is the question
         numbers = max(numbers, stages_within(DEFAULT_RANGE), key=len)
     cascade = Cascade.load(options.preset, numbers, options.weights, options.stages is None, options.prior)
     stages = [stage.number for stage in cascade.stages]
@@ -51,10 +51,10 @@ def prepare(options: RunOptions, outputs: Outputs, verify: bool = False) -> Sess
 
 
 def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
-    """The same with another method than the cascade.
+    """Do the same with another method than the cascade.
 
     Raises:
-        ConfigError: the method is asked for what it cannot do.
+        ConfigError: the method cannot do what the options ask for.
         WeightsError: its weights are missing.
     """
     from calibnet.calibrator import DriveCalibrator, drives_only
@@ -63,10 +63,11 @@ def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
     method = open_other(options)
     drive = options.solves_drive and isinstance(method, DriveCalibrator)
     if options.drive and not drive:
-        raise ConfigError(f"{options.method} calibrates single frames and solves no drive; leave --drive out.")
+        raise ConfigError(f"{options.method} calibrates single frames only; leave --drive out.")
     if drives_only(method) and not drive:
         raise ConfigError(
-            f"{options.method} needs a drive: several frames on one mount, and neither --no-drive nor --per-frame."
+            f"{options.method} needs a drive; give several frames on one mount, and leave --no-drive and --per-frame "
+            "out."
         )
     console = make_console()
     console.print(f"{options.sequence.name} ({options.sequence.rig}), {options.start}, {options.method}")
@@ -76,7 +77,7 @@ def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
 
 
 def open_other(options: RunOptions) -> Calibrator:
-    """The method that is asked for, with nothing of it accepted."""
+    """Open the method of the options, none of whose results is accepted."""
     from calibnet.geometry.miscalibration import range_of
     from calibnet.methods.registry import open_method
     from calibnet.methods.unjudged import unjudged
@@ -100,7 +101,7 @@ def make_session(
     description: RunDescription,
     console: Console,
 ) -> Session:
-    """A run as its options say."""
+    """The session of a run, from its options."""
     from calibnet.drive.watching import FEWEST, watch_estimate
     from inspector.run.session import Session
 
@@ -124,7 +125,7 @@ def make_session(
 
 
 def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
-    """Say what is about to run, and which stages cannot."""
+    """Print what is about to run, and which stages cannot."""
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
     known = f", {options.prior.words}" if options.prior else ""
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
@@ -140,7 +141,7 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
 
 
 def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:
-    """Versions, and as JSON the training record of every stage's weights by its number."""
+    """Versions, and the training record of every stage's weights as JSON, by the stage's number."""
     import json
     from importlib.metadata import version
 

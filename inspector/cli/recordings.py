@@ -1,4 +1,4 @@
-"""What the commands that read recordings share."""
+"""Reading of recordings, shared by the commands that do."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from inspector.read.run import RecordedRun
 
 RECORDING = click.Path(path_type=Path)
-"""An ``.rrd``; whether it can be read is for `open_run` to say."""
+"""An ``.rrd`` file, which `open_run` checks."""
 OUTPUT_FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 def open_run(path: Path) -> RecordedRun:
-    """Read a recording; say on stderr if it is cut off."""
+    """Read a recording; warns on stderr if it is cut off."""
     from inspector.read.run import read_run
 
     run = read_run(path)

@@ -1,4 +1,4 @@
-"""``calib-inspect report``: a recording as a folder that a browser shows and a ticket takes."""
+"""``calib-inspect report``: a report of a recording, as a folder that a browser shows."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from inspector.cli.output import overwrite_option, say
     "--open",
     "serve",
     is_flag=True,
-    help="Serve it with the embedded viewer on this machine, until Ctrl-C, and open it.",
+    help="Serve the report with the embedded viewer on this machine until Ctrl-C, and open it.",
 )
 @click.option(
     "--with-viewer", is_flag=True, help="Put the embedded viewer (43 MB) into the folder, for any web server to serve."
 )
 @overwrite_option
 def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
-    """Write a report of a run from its recording: index.html, pictures, metrics.json, the recording.
+    """Write a report of a run from its recording: index.html, pictures, metrics.json and the recording.
 
-    The page works from disk and without a network; only its embedded viewer needs a web server, which
-    is what --open starts. Files of other names in the folder stay as they are.
+    The page works from disk and without a network; only its embedded viewer needs a web server, which is what --open
+    starts. Other files in the folder are left alone.
     """
     write_report_of(recording, out)
     if with_viewer:
@@ -42,7 +42,7 @@ def report(recording: Path, out: Path, serve: bool, with_viewer: bool) -> None:
 
 
 def write_report_of(recording: Path, out: Path, on_stderr: bool = False) -> None:
-    """Make the report and say where it is."""
+    """Make the report and print where it is."""
     from inspector.read.rig import is_rig, read_rig
     from inspector.read.run import read_run
     from inspector.report.rig import write_rig_report
@@ -58,7 +58,7 @@ def write_report_of(recording: Path, out: Path, on_stderr: bool = False) -> None
 
 
 def serve_report(folder: Path) -> None:
-    """Serve a report and the viewer until Ctrl-C or SIGTERM; open the browser where there is a display."""
+    """Serve a report and the viewer until Ctrl-C or SIGTERM; opens a browser if there is a display."""
     from calibnet.runtime.interruption import StopRequest
     from inspector.record.outputs import has_display
     from inspector.report.serve import report_app

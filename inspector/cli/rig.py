@@ -1,4 +1,4 @@
-"""``calib-inspect rig``: several cameras and a LiDAR, each camera on its own, or all as one rigid rig."""
+"""``calib-inspect rig``: several cameras and a LiDAR, calibrated one by one or as one rigid rig."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 @click.option(
     "--rigid",
     is_flag=True,
-    help="The cameras are known relative to each other, by rig_from_camera in their calibrations or else by the "
-    "extrinsics given: one pose for all.",
+    help="Solve one pose for all cameras, whose places on the rig are known from rig_from_camera in their calibrations "
+    "or else from the given extrinsics.",
 )
 @click.option(
     "--tolerance",
     type=TOLERANCE,
-    help="As --rigid, but each camera may deviate from its place on the rig by this standard deviation per axis, for "
+    help="Like --rigid, but each camera may deviate from its place on the rig by this standard deviation per axis, for "
     "instance 0.5deg/2cm.",
 )
 @click.option(
@@ -45,9 +45,13 @@ if TYPE_CHECKING:
     help="Apply this miscalibration to the rig, in the axes of the first camera, and use the given extrinsics as the "
     "reference.",
 )
-@click.option("--fix", type=AXES, help="Axes that are exact, of each camera or, with --rigid, of the first camera.")
-@click.option("--prior-translation", type=LENGTH, help="The position is known to this standard deviation per axis.")
-@click.option("--prior-rotation", type=ANGLE, help="The rotation is known to this standard deviation per axis.")
+@click.option(
+    "--fix",
+    type=AXES,
+    help="Axes of the initial extrinsic that are exact, of each camera or, with --rigid, of the first camera.",
+)
+@click.option("--prior-translation", type=LENGTH, help="Standard deviation per axis to which the position is known.")
+@click.option("--prior-rotation", type=ANGLE, help="Standard deviation per axis to which the rotation is known.")
 @click.option("--stages", type=STAGES, default="3-5", show_default=True, help="Stages to run.")
 @click.option("--preset", default="compact", show_default=True, help="Network to use.")
 @click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]")
@@ -56,7 +60,7 @@ if TYPE_CHECKING:
     "--output",
     type=FOLDER,
     metavar="DIR",
-    help="Write a calibration file NAME.yaml for each camera that is not rejected to this folder.",
+    help="Write a calibration file NAME.yaml to this folder for each camera that is not rejected.",
 )
 @viewing_options
 def rig(
@@ -76,10 +80,10 @@ def rig(
 ) -> int:
     """Calibrate several cameras against one LiDAR.
 
-    FOLDER holds cameras/NAME/ for each camera, with images/ and calibration.yaml, and clouds/ for those that have none
-    themselves. Or give a plain folder for each camera. Without --rigid each camera is solved on its own, from all its
-    frames; with it one pose of the rig is solved from all frames of all cameras, and with --tolerance also the pose of
-    each camera on the rig.
+    FOLDER holds cameras/NAME/ for each camera, with images/ and calibration.yaml, and a clouds/ for those cameras that
+    have none of their own. Alternatively, give a plain folder for each camera. Without --rigid, each camera is solved
+    on its own from all its frames; with it, one pose of the rig is solved from all frames of all cameras, and with
+    --tolerance also the pose of each camera on the rig.
 
     The recording shows all cameras side by side; `report` makes a page of it, and `export` files for other tools.
 
@@ -97,7 +101,7 @@ def rig(
     from inspector.run.session import STOPPING
 
     if rigid and tolerance is not None:
-        raise click.UsageError("Give --rigid or --tolerance: a rigid rig has none.")
+        raise click.UsageError("Give either --rigid or --tolerance, not both.")
     cameras = open_rig(folders)
     prepare_json(json_file)
     files = {camera: output / f"{file_name(camera)}.yaml" for camera in cameras} if output is not None else {}

@@ -1,4 +1,4 @@
-"""A calibration run from its options to its end: what all commands share that calibrate something."""
+"""A calibration run from its options to its end, shared by all commands that calibrate."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
 
     Args:
         sequence: what to calibrate.
-        viewing: where the recording is shown and kept.
+        viewing: where the recording is shown and saved.
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
@@ -41,7 +41,7 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
 
 
 def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
-    """The options of a run, which do not contradict each other and select some frames."""
+    """Make the options of a run, checked not to contradict each other and to select some frames."""
     try:
         options = RunOptions(sequence=sequence, **asked)
     except OptionsError as error:
@@ -52,7 +52,7 @@ def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
 
 @contextmanager
 def recording_to(outputs: Outputs) -> Iterator[None]:
-    """Close the outputs in the end, whatever happens."""
+    """Close the outputs at the end, whatever happens."""
     from inspector.record.flushing import RecordingLostError
 
     try:
@@ -65,7 +65,7 @@ def recording_to(outputs: Outputs) -> Iterator[None]:
 
 
 def choose_outputs(options: RunOptions, viewing: Viewing, report: Path | None) -> Outputs:
-    """Where the recording goes, found out to work; a report keeps it, if nothing else does."""
+    """Choose and check where the recording goes; with a report, it is saved in any case."""
     if report is not None:
         from inspector.report.files import RECORDING
         from inspector.report.write import check_folder
@@ -78,9 +78,9 @@ def choose_outputs(options: RunOptions, viewing: Viewing, report: Path | None) -
 
 
 def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: bool = False) -> int:
-    """Print the result and where it is, make the report, and serve until Ctrl-C where that was asked for.
+    """Print the result and where it was saved, make the report, and with --serve, serve until Ctrl-C.
 
-    The last line is the verdict. With ``on_stderr``, stdout is for something else.
+    The last line is the verdict. With ``on_stderr``, stdout is left to something else.
     """
     tell = partial(say, err=on_stderr)
     for line in summary.lines():
@@ -103,7 +103,7 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
     if summary.verdict:
         tell(summary.verdict)
     if summary.interrupted:
-        say("Interrupted: the frames above are all that was recorded.", err=True)
+        say("Interrupted; only the frames above were recorded.", err=True)
         return ExitCode.INTERRUPTED
     if outputs.page is not None:
         outputs.wait_while_serving()
@@ -111,8 +111,8 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
 
 
 def size_lines(file: Path, frames: int) -> list[str]:
-    """The line that says what a frame's bytes go to; none for a recording without an index."""
+    """A line on the size of a frame's parts; none for a recording without an index."""
     from inspector.read.sizes import sizes_by_group
 
     parts = [f"{group} {size / frames / 1e3:.0f}" for group, size in sizes_by_group(file).items()]
-    return [f"Kilobytes a frame: {', '.join(parts)}."] if parts else []
+    return [f"Kilobytes per frame: {', '.join(parts)}."] if parts else []

@@ -1,4 +1,4 @@
-"""The options of a calibration run, which all commands have that calibrate something."""
+"""Options of a calibration run, shared by all commands that calibrate."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def start_options(given: bool, every: str) -> tuple[Decorator, ...]:
-    """Which frames are run, and from which extrinsic.
+    """Options for the frames to run and the extrinsics to start from.
 
     Args:
-        given: without a miscalibration the run starts from the dataset's extrinsic as it is.
-        every: the frames that are run by default, in words.
+        given: whether a run without a miscalibration starts from the dataset's extrinsic as it is.
+        every: the default frames, in words.
     """
-    undisturbed = "none: the calibration as it is" if given else str(DEFAULT_RANGE)
+    undisturbed = "none, start from the calibration as it is" if given else str(DEFAULT_RANGE)
     return (
         click.option(
             "--frames",
@@ -62,20 +62,20 @@ NETWORK_OPTIONS: tuple[Decorator, ...] = (
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     click.option("--weights", type=FOLDER, help="Folder with the network's weights.  [default: those of the package]"),
 )
-"""Which networks run."""
+"""Options for the networks to run."""
 BAD_FRAME_OPTION: Decorator = click.option(
     "--on-bad-frame",
     type=click.Choice(["skip", "stop"]),
     default="skip",
     show_default=True,
-    help="What to do with a frame that cannot be read or calibrated. The run always ends if half of the frames fail.",
+    help="What to do with a frame that cannot be read or calibrated. A run always stops if half of its frames fail.",
 )
 RECORDING_OPTIONS: tuple[Decorator, ...] = (
     click.option(
         "--detail",
         type=DETAIL,
-        help="full: some 6 MB a frame; overview: fewer points, the finest scale and no raw volumes, 1 MB at most; "
-        "custom: what --log names.  [default: full, from 200 frames on overview]",
+        help="full: about 6 MB per frame; overview: fewer points, only the finest scale and no raw volumes, at most 1 "
+        "MB; custom: what --log names.  [default: full, from 200 frames on overview]",
     ),
     click.option(
         "--log",
@@ -83,14 +83,14 @@ RECORDING_OPTIONS: tuple[Decorator, ...] = (
         type=PARTS,
         help="With --detail custom, parts of a frame to record: curves (errors), overlays (after every stage), volumes "
         "(maps of the cost volumes), hourglass (activations), scene (3D), tensors (raw volumes, all slices). Image, "
-        "first and last overlay, extrinsics and table are always there.",
+        "first and last overlay, extrinsics and table are always recorded.",
     ),
     click.option(
         "--color",
         type=COLORING,
         default="depth",
         show_default=True,
-        help="Colour of the points on the image; edge highlights depth edges, error is the distance from the "
+        help="Colour of the points on the image: edge highlights depth edges, error shows the distance from the "
         "reference in pixels.",
     ),
     click.option(
@@ -100,9 +100,9 @@ RECORDING_OPTIONS: tuple[Decorator, ...] = (
         help="Write a report of the run to this folder, as `calib-inspect report` does.",
     ),
 )
-"""What is recorded of each frame, and the report."""
+"""Options for what is recorded of each frame, and for the report."""
 PER_FRAME_OPTION: Decorator = click.option(
-    "--per-frame", is_flag=True, help="Draw another miscalibration for every frame, not one for the run."
+    "--per-frame", is_flag=True, help="Draw a new miscalibration for every frame instead of one for the run."
 )
 DRIVE_OPTION: Decorator = click.option(
     "--drive/--no-drive",
@@ -117,7 +117,7 @@ FEW = f"all; of more than {MANY_FRAMES}, {MANY_FRAMES} of them"
 
 
 def run_options(given: bool = False) -> Decorator:
-    """Give a command all options of a calibration run; it passes them on to `calibrate`, under the same names.
+    """Give a command all options of a calibration run, which it passes on to `calibrate` under the same names.
 
     Args:
         given: see `start_options`.
@@ -135,7 +135,7 @@ def run_options(given: bool = False) -> Decorator:
 
 
 def verify_options() -> Decorator:
-    """Give a command the options that `verify` has for every kind of data."""
+    """Give a command the options that `verify` has for all kinds of data."""
     return _all(
         *start_options(True, FEW),
         BAD_FRAME_OPTION,
@@ -147,12 +147,12 @@ def verify_options() -> Decorator:
 
 
 def watch_options() -> Decorator:
-    """Give a command the options that `watch` has for every kind of data."""
+    """Give a command the options that `watch` has for all kinds of data."""
     return _all(*start_options(True, "all"), *NETWORK_OPTIONS, JSON_OPTION, windowless_options)
 
 
 def _all(*options: Decorator) -> Decorator:
-    """Some options in this order."""
+    """One decorator for several options, which appear in this order."""
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         for option in reversed(options):

@@ -1,4 +1,4 @@
-"""A group with a subcommand for each kind of data: what `calib-inspect`, `verify`, `watch` and `live` offer."""
+"""Subcommands for each kind of data, of `calib-inspect`, `verify`, `watch` and `live`."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ def over_sequences(
     """Give a group a subcommand for every kind of data.
 
     Args:
-        group: that they belong to.
+        group: the group to add them to.
         act: called with what opens the sequence, and with the options; returns what the command does, an exit code.
-        options: for a kind of data, gives a command the options that do not say what is opened.
-        verb: how the help of each begins, before the data's name.
-        sources: the kinds of data.
+        options: for a kind of data, the decorator with all options but those that say what to open.
+        verb: first words of each one's help, before the data's name.
+        sources: kinds of data to offer.
     """
     for source in sources:
         group.add_command(_command(source, act, options(source), verb))

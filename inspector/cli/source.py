@@ -1,4 +1,4 @@
-"""One kind of data at the command line: what names it, and how it is opened."""
+"""One kind of data at the command line: its options, and how it is opened."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ class Source:
     """A kind of data.
 
     Attributes:
-        name: of its command.
-        of: what it is, as it stands in a sentence.
-        note: what else its help says.
-        parameters: that say what is opened; ``open`` takes them by their names.
-        open: opens it; what it raises is a `CalibnetError`.
-        given: its extrinsic is what is to be corrected, and no reference, unless a miscalibration is asked for.
-        one_mount: all its frames are of one extrinsic.
+        name: name of its command.
+        of: description for the middle of a sentence.
+        note: further text of its help.
+        parameters: options and arguments that say what to open; passed to ``open`` by name.
+        open: opens the sequence; raises `CalibnetError`.
+        given: whether its extrinsic is the one to correct rather than a reference, unless a miscalibration is asked
+            for.
+        one_mount: whether all its frames share one extrinsic.
     """
 
     name: str
@@ -48,15 +49,15 @@ def published(
     variable: str = "KITTI_ROOT",
     **more: Any,
 ) -> Source:
-    """A published data set, which lies below ``--root``.
+    """Define a published dataset, which lies below ``--root``.
 
     Args:
         dataset: a name of `calibnet.datasets.published.PUBLISHED`; `open_sequence` gets all options.
-        where: what it is called, and where it comes from, for the sentence that asks for ``--root``.
-        options: besides ``--root``. An argument called ``number`` is the dataset's ``drive``, since ``--drive`` is
-            an option of the run.
-        variable: of the environment, that stands in for ``--root``.
-        **more: fields of the `Source`.
+        where: its name and origin, for the message that asks for ``--root``.
+        options: parameters besides ``--root``. An argument called ``number`` is the dataset's ``drive``, since
+            ``--drive`` is an option of the run.
+        variable: environment variable that replaces ``--root``.
+        **more: other fields of the `Source`.
     """
     root_option = click.Option(
         ["--root"], type=FOLDER, envvar=variable, help=f"The dataset's folder.  [env: {variable}]"
@@ -67,8 +68,8 @@ def published(
 
         if root is None:
             raise ConfigError(
-                f"No {where.partition(' ')[0]} folder: give --root DIR or set {variable} to where {where}; "
-                "`calib-inspect demo` needs none."
+                f"No {where.partition(' ')[0]} folder is given: add --root DIR or set {variable} to where {where}; "
+                "`calib-inspect demo` needs no data."
             )
         return open_sequence(dataset, root, **{"drive" if key == "number" else key: asked[key] for key in asked})
 
@@ -85,7 +86,7 @@ def published(
 def open_folder(
     directory: Path, dataset: str, camera_frame: str | None, lidar_frame: str | None, **asked: Any
 ) -> Sequence:
-    """A plain folder, or a folder of a dataset of another package, which knows none of these options."""
+    """Open a plain folder, or the folder of another package's dataset, which takes none of these options."""
     from calibnet.datasets import open_sequence
     from calibnet.datasets.calibration_files import FrameChoice
 
@@ -95,7 +96,7 @@ def open_folder(
 
 
 def open_bag(files: tuple[Path, ...], camera_frame: str | None, lidar_frame: str | None, **asked: Any) -> Sequence:
-    """A bag."""
+    """Open a bag."""
     from calibnet.datasets.bag import Bag, BagOptions
     from calibnet.datasets.calibration_files import FrameChoice
 

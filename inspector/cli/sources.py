@@ -1,4 +1,4 @@
-"""What can be calibrated: every kind of data once, as it is named at the command line and as it is opened.
+"""Every kind of data that can be calibrated: its name at the command line, its options, and how it is opened.
 
 `calib-inspect NAME`, `verify NAME`, `watch NAME`, `live NAME` and `evaluate --dataset` all read this list.
 """
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 KITTI = "{} is unpacked (from cvlibs.net/datasets/kitti)"
 AS_GIVEN = (
-    "Without --range and --miscalibrate the data's calibration is the one to correct, and there is no reference; with "
-    "one of them it is the reference."
+    "With --range or --miscalibrate the data's calibration is the reference; without them it is the one to correct, "
+    "and "
+    "there is no reference."
 )
 CAMERA = click.Option(
     ["--camera"], type=click.IntRange(min=0), default=2, show_default=True, help="Camera to calibrate."
@@ -32,7 +33,7 @@ GUESS = click.Option(
     ["--guess"],
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Start from the extrinsic in this calibration file; required if the data contain none.",
+    help="Start from the extrinsic in this calibration file; required if the data contain no extrinsic.",
 )
 CAMERA_OF_FILE = click.Option(
     ["--camera"], metavar="NAME", help="Camera to use from a calibration file with several, for instance cam0."
@@ -69,7 +70,7 @@ SOURCES = (
             CAMERA,
         ),
         of="the frames of the KITTI object detection benchmark",
-        note="--root is the folder that holds `training`. Its frames are of several mounts, so they are no drive.",
+        note="--root is the folder that holds `training`. Its frames come from several mounts and do not form a drive.",
     ),
     published(
         "kitti-tracking",
@@ -88,7 +89,7 @@ SOURCES = (
                 type=click.IntRange(0, 3),
                 default=0,
                 show_default=True,
-                help="Camera to calibrate: 0 and 1 look ahead, 2 and 3 are fisheyes to the sides.",
+                help="Camera to calibrate: 0 and 1 face forward, 2 and 3 are fisheye cameras facing sideways.",
             ),
         ),
         variable="KITTI360_DATASET",
@@ -110,7 +111,7 @@ SOURCES = (
                 ["--compensate/--as-taken"],
                 default=True,
                 show_default=True,
-                help="Move each scan to the time of its image by the car's poses, or leave it as taken.",
+                help="Move each scan to the time of its image using the car's poses, or leave it as recorded.",
             ),
         ),
         variable="NUSCENES",
@@ -138,8 +139,8 @@ SOURCES = (
                 ["--max-time-difference"],
                 type=NumberRange(min=0),
                 metavar="MS",
-                help="Pair each image with the nearest scan within so many milliseconds, by timestamps.txt in both "
-                "folders or by names that are times.  [default: by name; by time within 50 where names differ]",
+                help="Pair each image with the nearest scan within this many milliseconds, by timestamps.txt in both "
+                "folders or by names that are times.  [default: by name; by time within 50 ms where names differ]",
             ),
         ),
         open=open_folder,
@@ -149,14 +150,15 @@ SOURCES = (
         name="bag",
         of="a ROS 1 or ROS 2 bag, or an MCAP file",
         note="FILES is a .bag, .db3 or .mcap file, the folder of a ROS 2 bag, or several .bag files of one drive. "
-        "Topics are found where there is one of a kind; the lens comes from CameraInfo, and the first guess from "
+        "Topics are found automatically if there is one of each kind; the lens comes from CameraInfo, and the first "
+        "guess from "
         f"/tf_static or --guess. {AS_GIVEN}",
         parameters=(
             click.Argument(["files"], type=click.Path(path_type=Path), nargs=-1, required=True),
             click.Option(["--image"], metavar="TOPIC", help="Topic of the images.  [default: the only one]"),
             click.Option(["--points"], metavar="TOPIC", help="Topic of the point clouds.  [default: the only one]"),
             click.Option(
-                ["--info"], metavar="TOPIC", help="Topic of the CameraInfo.  [default: the one beside the images]"
+                ["--info"], metavar="TOPIC", help="Topic of the CameraInfo.  [default: the one next to the images]"
             ),
             GUESS,
             CAMERA_OF_FILE,
@@ -166,8 +168,7 @@ SOURCES = (
                 ["--every"],
                 type=NumberRange(min=0, min_open=True),
                 metavar="S",
-                help="Take one frame per this many seconds, at a standstill if there is one.  [default: about 40 "
-                "frames]",
+                help="Take one frame per this many seconds, preferably at a standstill.  [default: about 40 frames]",
             ),
             click.Option(
                 ["--accumulate"],
@@ -196,8 +197,8 @@ def open_parts(dataset: str, root: Path, names: list[str], camera: str | None) -
     Args:
         dataset: one of `dataset_names`.
         root: its folder.
-        names: of the sequences; of a dataset without a command of its own, folders below ``root``.
-        camera: which one, as text; None for the dataset's own choice.
+        names: names of the sequences or, for a dataset without a command of its own, of folders below ``root``.
+        camera: name or number of the camera; None for the dataset's own choice.
     """
     from calibnet.datasets import open_sequence
 

@@ -1,4 +1,4 @@
-"""``calib-inspect train``: one stage of the cascade, within a budget of time or samples."""
+"""``calib-inspect train``: trains one stage of the cascade, or all, within a budget of time or samples."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--preset", default="compact", show_default=True, help="Network to train.")
-@click.option("--method", type=click.Choice(NETWORKS.names()), help="Network of another paper to train instead.")
+@click.option("--method", type=click.Choice(NETWORKS.names()), help="Train this network of another paper instead.")
 @click.option(
     "--ablation",
     type=click.Choice(list(ABLATIONS)),
-    help="Row of the paper's ablation: the preset without one of its modules; written to a subfolder of --output.",
+    help="Train this row of the paper's ablation, the preset without one of its modules, into a subfolder of --output.",
 )
 @click.option(
     "--image-encoder",
     type=click.Choice(["own", "efficientnet-lite0"]),
-    help="Image encoder instead of the preset's: own starts from random weights, the other from ImageNet.",
+    help="Image encoder instead of the preset's: own starts from random weights, the other one from ImageNet weights.",
 )
 @click.option("--head", type=click.Choice(HEADS.names()), help="Pose head to train instead of the preset's.")
 @click.option("--range", "range_", type=RANGE, help="Stage to train: 20/1.5, 10/1, 5/0.5, 2/0.2 or 1/0.1.")
@@ -53,11 +53,11 @@ if TYPE_CHECKING:
     metavar="DATASET:DIR[:SEQ]",
     help="Real frames, for instance kitti-raw:DIR or folder:DIR. Repeatable.",
 )
-@click.option("--packed", type=FOLDER, help="Frames of pack-training, instead of --data and --synthetic.")
+@click.option("--packed", type=FOLDER, help="Folder written by pack-training, instead of --data and --synthetic.")
 @click.option(
     "--on-device",
     is_flag=True,
-    help="Make the samples on the GPU, in whose memory all frames must fit; --workers then only draw.",
+    help="Make the samples on the GPU, whose memory must hold all frames; --workers then only draw random numbers.",
 )
 @click.option(
     "--validate",
@@ -77,11 +77,15 @@ if TYPE_CHECKING:
     type=click.IntRange(1),
     default=TrainingOptions.scenes,
     show_default=True,
-    help="Synthetic scenes, each rendered once.",
+    help="Number of synthetic scenes, each rendered once.",
 )
 @click.option("--scene-cache", type=FOLDER, help="Folder for rendered scenes.  [default: the temporary folder]")
 @click.option("--minutes", type=NumberRange(0, min_open=True), help="Budget of training time, over all resumed runs.")
-@click.option("--samples", type=click.IntRange(1), help="Budget in samples instead: exactly repeatable.")
+@click.option(
+    "--samples",
+    type=click.IntRange(1),
+    help="Budget of samples instead of time, which makes the run exactly repeatable.",
+)
 @click.option(
     "--batch", type=click.IntRange(1), default=TrainingOptions.batch, show_default=True, help="Samples per step."
 )
@@ -93,7 +97,7 @@ if TYPE_CHECKING:
 @click.option(
     "--warm-up",
     type=click.IntRange(0),
-    help="Samples that first train the features alone; a third of --samples at most.  "
+    help="Samples at the start that train the features alone, at most a third of --samples.  "
     f"[default: {RECIPE.features.warm_up}, none with --initialize]",
 )
 @click.option(
@@ -101,12 +105,12 @@ if TYPE_CHECKING:
     type=click.IntRange(0),
     default=TrainingOptions.workers,
     show_default=True,
-    help="Processes that prepare samples.",
+    help="Number of processes that prepare samples.",
 )
 @click.option(
     "--uniform",
     is_flag=True,
-    help="Draw miscalibrations from the range only, for comparisons. Always so with --method.",
+    help="Draw miscalibrations from the range only, for comparisons; always the case with --method.",
 )
 @click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Seed of everything random.")
 @click.option(
@@ -127,7 +131,7 @@ if TYPE_CHECKING:
     " from those of the first look of --initialize if that is this stage.",
 )
 @click.option(
-    "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder of checkpoint and weights."
+    "--output", type=FOLDER, default=Path("runs"), show_default=True, help="Folder for the checkpoint and the weights."
 )
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint in --output.")
 @click.option(
@@ -185,13 +189,16 @@ def train(
 
     if method and (every_stage or ablation or image_encoder or head):
         raise click.UsageError(
-            "--method trains one network as its paper has it: leave out --all, --ablation, --image-encoder and --head."
+            "--method trains one network as its paper describes; leave out --all, --ablation, --image-encoder and "
+            "--head."
         )
     if ablation and every_stage:
-        raise click.UsageError("--ablation trains one stage: give --range instead of --all.")
+        raise click.UsageError("--ablation trains one stage; give --range instead of --all.")
 
     if (method or ablation) and range_ not in RANGES:
-        raise click.UsageError(f"--range {range_} is not one that networks run at: {', '.join(map(str, RANGES))}.")
+        raise click.UsageError(
+            f"--range {range_} is not the range of a stage; choose from {', '.join(map(str, RANGES))}."
+        )
 
     from calibnet.training.schedule import all_stages
 
@@ -242,12 +249,12 @@ def train(
 
 
 def usual_rate(method: str | None) -> float:
-    """The learning rate where none is given."""
+    """The default learning rate."""
     return float(NETWORKS.load(method).LEARNING_RATE) if method else TrainingOptions.learning_rate
 
 
 def train_stage(options: TrainingOptions, console: Console, save: Path | None, resume: bool) -> None:
-    """One stage to its weights, watched on the console and, if asked for, in a recording."""
+    """Train one stage, with progress on the console and, if asked for, in a recording."""
     from calibnet.training.build import build
     from calibnet.training.trainer import Trainer
 
@@ -262,6 +269,6 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
 
 
 def step_file(save: Path, step: TrainingOptions, output: Path) -> Path:
-    """The recording of one step of --all, named after the range and the folder within the output's."""
+    """File of the recording of one step of --all, named after the step's range and folder."""
     parts = [save.stem, *Path(step.output).relative_to(output).parts, step.range.replace("/", "-")]
     return save.with_stem("-".join(parts))

@@ -1,4 +1,4 @@
-"""A training run on the console; several observers as one."""
+"""Progress of a training run on the console, and several observers as one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Observers:
-    """Several observers as one."""
+    """An observer that passes everything on to several others."""
 
     def __init__(self, observers: list[Observer]) -> None:
         self.observers = observers
@@ -30,7 +30,7 @@ class Observers:
 
 
 class ConsoleObserver:
-    """One line of losses every few seconds, one of figures after each validation."""
+    """Prints a line of losses every few seconds and a line of errors after each validation."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
@@ -49,7 +49,7 @@ class ConsoleObserver:
         )
 
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
-        """Print the figures beside the initial ones."""
+        """Print the errors beside the initial ones."""
         self.console.print(
             f"validation after {progress.samples:,d} samples, {figures.samples} single looks, medians: "
             f"rotation {figures.initial_rotation_deg:.2f}° -> {figures.rotation_deg:.2f}° "

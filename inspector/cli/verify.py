@@ -28,13 +28,14 @@ if TYPE_CHECKING:
 def verify() -> None:
     """Judge whether an existing calibration is good.
 
-    It starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), solves all
-    frames as one drive if there are several, and compares the result with the calibration. The tolerance of a drive is
-    0.3° and 8 cm, or 0.5° and 15 cm if the result is less certain; of a single frame 1° and 25 cm, or 1.5° and 40 cm.
+    Starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), solves all
+    frames as one drive if there are several, and compares the result with the calibration. The tolerance is 0.3° and 8
+    cm for a drive, or 0.5° and 15 cm if the result is less certain; for a single frame, 1° and 25 cm, or 1.5° and 40
+    cm.
 
     Prints one sentence, and exits with 0 for accepted, 1 for rejected, 4 for cannot tell. Input that can be read but
-    does not fit gets a verdict as well. Nothing is recorded or shown without --save, --report, --serve or --connect,
-    and nothing is ever exported.
+    does not fit together gets a verdict as well. Nothing is recorded or shown without --save, --report, --serve or
+    --connect, and nothing is ever exported.
     """
 
 
@@ -45,8 +46,8 @@ def verify_sequence(
 
     Args:
         opening: opens the sequence.
-        json_file: where the verdict goes as JSON.
-        viewing: where the recording is shown and kept, if anywhere.
+        json_file: file for the verdict as JSON.
+        viewing: where the recording is shown and saved, if anywhere.
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
@@ -61,7 +62,7 @@ def verify_sequence(
         if not (causes := named_cause(error)):
             raise
         return told(Verified(unfit(UNKNOWN, str(error), causes), UNKNOWN), json_file)
-    prepare_json(json_file)  # once more, since it is known now what is read
+    prepare_json(json_file)  # again, now that the input files are known
     options = options_to_verify(sequence, asked)
     record = bool(viewing.save or report or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, viewing, report) if record else Outputs()
@@ -78,7 +79,7 @@ def options_to_verify(sequence: Sequence, asked: Mapping[str, Any]) -> RunOption
     several = len(options.positions) > 1
     if several and options.drive is False:
         raise click.UsageError(
-            f"The frames of {sequence.name} are of several mounts, and verify judges one calibration; "
+            f"The frames of {sequence.name} come from several mounts, and verify judges one calibration; "
             "choose one frame, for instance with --frames 0."
         )
     return replace(options, drive=several)

@@ -1,4 +1,4 @@
-"""Where a recording is shown and kept: options that the commands which write one share."""
+"""Options for where a recording is shown and saved, shared by the commands that write one."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ _OPTIONS: Mapping[str, Callable[..., Any]] = {
         "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording to this file."
     ),
     "headless": click.option("--headless", is_flag=True, help="Open no window."),
-    "serve": click.option("--serve", is_flag=True, help="Offer the viewer as a web page, on this machine only."),
-    "bind": click.option("--bind", metavar="ADDRESS", help="Address that --serve listens on.  [default: 127.0.0.1]"),
+    "serve": click.option("--serve", is_flag=True, help="Show the viewer as a web page, on this machine only."),
+    "bind": click.option("--bind", metavar="ADDRESS", help="Address on which --serve listens.  [default: 127.0.0.1]"),
     "connect": click.option(
-        "--connect", metavar="URL", help="Send to a viewer that runs: rerun+http://HOST:PORT/proxy."
+        "--connect", metavar="URL", help="Send to this running viewer: rerun+http://HOST:PORT/proxy."
     ),
 }
 
 
 @dataclass(frozen=True)
 class Viewing:
-    """Where a recording is shown and kept, as it was asked for.
+    """Where a recording is to be shown and saved.
 
     Attributes:
         save: file to write.
-        headless: open no window.
-        serve: offer the viewer as a web page.
-        bind: address that it listens on.
-        connect: gRPC address of a viewer that runs already.
-        keep: without ``save``, write a file of this name wherever else the recording goes.
+        headless: whether to open no window.
+        serve: whether to show the viewer as a web page.
+        bind: address on which that page is served.
+        connect: gRPC address of a running viewer.
+        keep: name of the file to write if ``save`` names none, wherever else the recording goes.
     """
 
     save: Path | None
@@ -53,16 +53,16 @@ class Viewing:
     keep: str = ""
 
     def outputs(self, name: str) -> Outputs:
-        """A viewer where one can open; the file that was asked for, or one in `RECORDINGS` if nothing else shows.
+        """Outputs as asked for: a viewer where one can open, and a file, in `RECORDINGS` if nothing else is asked for.
 
         Args:
-            name: of what is recorded, for that file's name.
+            name: name of what is recorded, for the file's name.
         """
         from inspector.programs import LOCALHOST
         from inspector.record.outputs import Outputs, has_display
 
         if self.bind is not None and not self.serve:
-            raise click.UsageError("--bind belongs to --serve; add --serve or leave --bind out.")
+            raise click.UsageError("--bind needs --serve; add --serve or leave --bind out.")
         save, viewer = self.save, has_display() and not (self.headless or self.serve or self.connect)
         if save is None and (self.keep or not (viewer or self.serve or self.connect)):
             save = RECORDINGS / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', self.keep or name).strip('-.')[:100] or 'run'}.rrd"
@@ -70,12 +70,12 @@ class Viewing:
 
 
 def viewing_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the options of `Viewing`, which it gets as one, ``viewing``."""
+    """Give a command the options of `Viewing`, passed as one argument, ``viewing``."""
     return _as_one(command, _OPTIONS)
 
 
 def windowless_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The same without ``--headless``, for a command that opens no window of its own accord."""
+    """Do the same without ``--headless``, for a command that opens no window by itself."""
     return _as_one(command, {name: _OPTIONS[name] for name in _OPTIONS if name != "headless"}, headless=True)
 
 
@@ -91,28 +91,28 @@ def _as_one(command: Callable[..., Any], options: Mapping[str, Callable[..., Any
 
 
 def next_lines(file: Path, rig: bool = False) -> list[str]:
-    """What can be done with a recording, or with that of a rig."""
+    """Commands that can follow on a recording, or on that of a rig."""
     from inspector.export.registry import FORMATS
 
     quoted = shlex.quote(str(file))
     others = ", ".join(name for name in FORMATS.names() if name != "ros")
     what, where = (
-        ("The result for other tools, a file a camera", " --output found/")
+        ("Export the result for other tools, one file per camera", " --output found/")
         if rig
-        else ("The result for other tools", "")
+        else ("Export the result for other tools", "")
     )
     return [
-        f"A page of it: calib-inspect report {quoted} --output report/ --open",
+        f"Make a page of it: calib-inspect report {quoted} --output report/ --open",
         f"{what}: calib-inspect export {quoted} --format ros{where}  (or {others})",
     ]
 
 
 def saved_lines(outputs: Outputs, frames: int = 0) -> list[str]:
-    """What to say about a recording that was written, if one was, and about an earlier one of its name.
+    """Lines on the recording that was written, if any, and on an earlier one of the same name.
 
     Args:
-        outputs: where it went.
-        frames: that it has, where each has a size of its own.
+        outputs: outputs that it was written to.
+        frames: number of frames, if their mean size is to be given.
     """
     from inspector.programs import open_command
 
@@ -120,11 +120,11 @@ def saved_lines(outputs: Outputs, frames: int = 0) -> list[str]:
         return []
     file, size = outputs.file, outputs.file.stat().st_size / 1e6
     replacing = " in place of an earlier recording" if outputs.replaced else ""
-    each = f", {size / frames:.2f} MB a frame" if frames else ""
+    each = f", {size / frames:.2f} MB per frame" if frames else ""
     lines = [f"Saved {file}{replacing} ({size:.1f} MB{each}).", f"Open it with: {open_command(file)}"]
     return lines if outputs.earlier is None else [*lines, earlier_line(outputs)]
 
 
 def earlier_line(outputs: Outputs) -> str:
-    """Where the recording is that had the name before."""
-    return f"This run did not end, so the earlier {outputs.file} is kept as {outputs.earlier}."
+    """A line on where the earlier recording of the same name is."""
+    return f"This run did not finish; the earlier {outputs.file} is kept as {outputs.earlier}."

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 def watch() -> None:
     """Detect whether the mount moved during a drive.
 
-    Starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), lets every
-    frame say where the extrinsic is, and finds steps and slow drift. It needs 16 frames at least, in the order in
-    which they were taken.
+    Starts from the calibration as it is (or disturbed by --miscalibrate or --range, to try this command), estimates the
+    extrinsic from every frame, and detects steps and slow drift. Needs at least 16 frames, in the order in which they
+    were taken.
 
     Prints one sentence per change, with its frame, size and confidence, and exits with 0 for no change, 1 for changed,
     4 for cannot tell. With --save, --serve or --connect a recording shows the estimate over the drive, with its band.
@@ -40,8 +40,8 @@ def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing,
 
     Args:
         opening: opens the sequence.
-        json_file: where the result goes as JSON.
-        viewing: where the recording is shown and kept, if anywhere.
+        json_file: file for the result as JSON.
+        viewing: where the recording is shown and saved, if anywhere.
         **asked: fields of `RunOptions`.
     """
     prepare_json(json_file)
@@ -51,7 +51,7 @@ def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing,
     options = checked(
         opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}
     )
-    prepare_json(json_file)  # once more, since it is known now what is read
+    prepare_json(json_file)  # again, now that the input files are known
     record = bool(viewing.save or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, viewing, None) if record else Outputs()
     with recording_to(outputs):

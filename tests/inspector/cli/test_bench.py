@@ -103,8 +103,8 @@ def test_an_earlier_table_is_shown_without_measuring(
     ("arguments", "sentence"),
     [
         ((), "--data is needed"),
-        (("--method", "nosuch", "--data", "folder:."), "There is no method 'nosuch'"),
-        (("--ours", "mine", "--data", "folder:."), "is not NAME=DIR"),
+        (("--method", "nosuch", "--data", "folder:."), "'nosuch' is not a method"),
+        (("--ours", "mine", "--data", "folder:."), "is not of the form NAME=DIR"),
         (("--data", "nothing"), "is not of the form DATASET:FOLDER"),
     ],
 )

@@ -214,7 +214,7 @@ def test_help_names_what_a_drive_is_told_by(invoke: Invoke) -> None:
 def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke, own_folder: Path) -> None:
     code, out, _ = invoke("folder", str(own_folder), "--frames", "0", "--save", "own.rrd", "--log", "overlays,scene")
     assert code == 0
-    assert "Kilobytes a frame: " in out
+    assert "Kilobytes per frame: " in out
     assert "3D scene" in out
     assert "hourglass" not in out
 
@@ -222,7 +222,7 @@ def test_log_alone_means_custom_and_the_end_says_what_bytes_go_to(invoke: Invoke
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--bind", "0.0.0.0"), 2, "--bind belongs to --serve"),
+        (("--bind", "0.0.0.0"), 2, "--bind needs --serve"),
         (("--serve", "--bind", "999.1.1.1"), 3, "is not an address of this machine"),
     ],
 )
@@ -249,7 +249,7 @@ def test_a_run_without_room_for_an_index_ends_with_its_result_and_report(
     code, out, err = invoke("folder", str(own_folder), "--save", "own.rrd", "--report", "page")
     assert code == 0, err
     assert "own.rrd has no index, for which the disk lacks 3 MB" in err.replace("\n", " ")
-    assert "Saved own.rrd" in out and "Kilobytes a frame" not in out
+    assert "Saved own.rrd" in out and "Kilobytes per frame" not in out
     assert out.splitlines()[-1].startswith("Verdict: ")
     assert Path("page/index.html").is_file()
 

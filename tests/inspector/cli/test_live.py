@@ -41,7 +41,7 @@ def test_it_serves_until_it_is_ended(tmp_path: Path) -> None:
     [
         (["demo", "--output", "{mine}"], 3, "is not a file that calib-inspect exported"),
         (["demo", "--range", "5/0.5", "--miscalibrate", "1,1,1,0,0,0"], 2, "not both"),
-        (["demo", "--connect", "rerun+http://127.0.0.1:1/proxy"], 2, "--connect belongs to --native"),
+        (["demo", "--connect", "rerun+http://127.0.0.1:1/proxy"], 2, "--connect needs --native"),
         (["demo", "--native", "--connect", "rerun+http://127.0.0.1:1/proxy"], 3, "No viewer listens"),
         (["demo", "--native", "--connect", "nonsense"], 3, "is not a valid address"),
         (["demo", "--fix", "up"], 2, "'up'"),

@@ -203,7 +203,7 @@ def test_what_no_shell_says_of_a_line_is_a_sentence(
     assert errors.run(cli, []) == 3
     seen = capsys.readouterr()
     assert seen.out == ""
-    assert re.fullmatch(r"calib-inspect: .*(not a request of a shell|not what a shell sets); .*\n", seen.err)
+    assert re.fullmatch(r"calib-inspect: .*(not a valid completion request|COMP_CWORD are not valid); .*\n", seen.err)
 
 
 @pytest.mark.parametrize("threads", ["abc", "-1", "0", "", "2;3", "9" * 50])

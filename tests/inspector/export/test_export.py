@@ -147,7 +147,7 @@ def test_what_is_rejected_is_exported_by_force_alone(
         content["camera_from_lidar"], median_pose([frames[0].corrected, frames[2].corrected]), atol=1e-12
     )
     assert "median of 2 frames" in json.dumps(content)
-    refusal = f"calib-inspect: Rejected. {REASON} Nothing is written; --force writes it all the same.\n"
+    refusal = f"calib-inspect: Rejected. {REASON} Nothing was written; --force writes it.\n"
     assert export(some, "--format", "json", "--frame", 1, "--output", tmp_path / "out.json", code=1) == refusal
     assert not (tmp_path / "out.json").exists()
     forced = json.loads(export(some, "--format", "json", "--frame", 1, "--force"))
@@ -164,7 +164,7 @@ def test_what_cannot_be_told_is_exported_with_a_warning_in_the_file(
     file, out = tmp_path / "unsure.rrd", tmp_path / "out"
     record(file, length=1, detail="overview", strides=(32,), unsure=(0,))
     assert run(cli, ["export", str(file), "--format", form, "--frame", "0", "--output", str(out)]) == 0
-    assert capsys.readouterr().err.startswith(f"calib-inspect: Cannot tell. {UNSURE} Written all the same.\n")
+    assert capsys.readouterr().err.startswith(f"calib-inspect: Cannot tell. {UNSURE} It was written.\n")
     (line,) = [line for line in out.read_text().splitlines() if UNSURE in line]
     assert "frame 0; cannot tell: " in line and (form == "json" or line.startswith("#"))
 
@@ -223,7 +223,7 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
         ((), 2, "Give a recording or --folder"),
         (("RUN", "--folder", "x"), 2, "Give a recording or --folder"),
         (("RUN", "--frame", 1, "--median"), 2, "one of --frame, --median and --drive"),
-        (("--folder", "x", "--median"), 2, "has one calibration"),
+        (("--folder", "x", "--median"), 2, "leave them out with --folder"),
         (("RUN", "--lidar-frame", "two words"), 2, "not a valid ROS frame name"),
         (("RUN", "--drive"), 3, "record it with --drive"),
         (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),

@@ -77,7 +77,7 @@ def test_the_same_call_again_does_nothing(invoke: Invoke, cars: Path, cascade: J
     code, _, err = invoke(*call)
     assert code == 0
     assert cascade.solved == 2
-    assert "2 of 2 drives are done already" in err
+    assert "2 of 2 drives are already done" in err
     assert rows_of(Path("all")) == first
     invoke(*call, "--force")
     assert cascade.solved == 4
@@ -130,7 +130,7 @@ def test_a_drive_that_cannot_be_read_is_a_row_with_its_sentence(
     assert row.reason in err.replace("\n", "")
     assert row.report == ""
     assert (Path("all") / row.recording).is_file(), "the catalogue has a row of it as well"
-    assert invoke(*call)[2].startswith("2 of 2 drives are done already"), "the same input would fail alike"
+    assert invoke(*call)[2].startswith("2 of 2 drives are already done"), "the same input would fail alike"
 
 
 def test_a_fault_of_the_machine_is_tried_again_at_the_next_call(
