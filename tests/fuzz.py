@@ -158,6 +158,7 @@ def _seeds_of_scans(suffix: str) -> tuple[bytes, ...]:
         ".bin": [kept.tobytes(), np.tile(clouds.POINTS, (1, 1))[:200].tobytes()],
         ".feather": [clouds.FEATHER],
         ".parquet": [clouds.PARQUET],
+        ".csv": [clouds.CSV[:500], clouds.CSV[16:500].replace(b",", b" "), b"//X;Y;Z\n1,5;2,5;3,5\n"],
     }
     return tuple(contents[suffix])
 
@@ -227,7 +228,7 @@ def _small_floats() -> bytes:
 TARGETS: dict[str, Target] = {
     **{
         f"scan{suffix}": Target(partial(_scan, suffix), _seeds_of_scans(suffix), WORDS)
-        for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".feather", ".parquet")
+        for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".feather", ".parquet", ".csv")
     },
     **{f"bag{kind}": Target(partial(_bag, kind), (_small_bag(kind),)) for kind in (".bag", ".db3", ".mcap")},
     "foxglove.mcap": Target(partial(_bag, ".mcap"), _small_foxglove()),

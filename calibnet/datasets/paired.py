@@ -20,6 +20,7 @@ from calibnet.datasets.clouds.scans import ending, full_scale_of, read_raw, read
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import read_image
 from calibnet.datasets.images.lens import Picture
+from calibnet.datasets.pairing import TIMES
 from calibnet.datasets.plausibility import bit_depth, mosaic, of_camera, of_extrinsic, of_scan, refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
@@ -169,7 +170,7 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
     files: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
         suffix = ending(path, suffixes)
-        if not suffix or path.name.startswith("."):
+        if not suffix or path.name.startswith(".") or path.name == TIMES:
             continue
         stem = unicodedata.normalize("NFC", path.name[: -len(suffix)])  # macOS takes letters and accents apart
         if stem in files:

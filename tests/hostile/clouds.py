@@ -50,6 +50,7 @@ def las() -> bytes:
 
 
 LAS = las()
+CSV = b"x,y,z,intensity\n" + b"\n".join(b",".join(str(value).encode() for value in row) for row in POINTS) + b"\n"
 FEATHER, PARQUET = table(feather.write_feather), table(parquet.write_table)
 OF_TABLES = {".feather": FEATHER, ".parquet": PARQUET}
 FOREIGN = {
@@ -148,6 +149,7 @@ GOOD = {
     },
     ".ply": {"text": TEXT_PLY, "binary": BINARY_PLY, "big-endian": ply(POINTS, "binary_big_endian")},
     ".npy": {"float64": npy(POINTS.astype(np.float64)), "by column": npy(np.asfortranarray(POINTS))},
+    ".csv": {"comma": CSV},
 }
 
 

@@ -5,11 +5,13 @@ Read here and by no native library: of a header that promises what the bytes do 
 
 from __future__ import annotations
 
+import math
 import struct
 
 import numpy as np
 
 from calibnet.datasets.clouds.columns import (
+    LONGEST_WORD,
     MOST_BYTES,
     CloudError,
     Column,
@@ -29,6 +31,9 @@ DTYPES = {
 }
 PADDING = "_"
 """Name of what only fills a row; compressed data leaves it out."""
+STANDING = "0 0 0 1 0 0 0"
+STANDS = 1e-3
+"""Metres, and radians over two, that are no pose."""
 COMPRESSED_SIZES = struct.Struct("<II")
 """Bytes of the compressed data that follow, and of what they hold."""
 
@@ -40,6 +45,7 @@ def read_pcd(data: bytes) -> Columns:
         CloudError: the header cannot be read, or the data is not what it promises.
     """
     header, start = _header(data)
+    _check_viewpoint(header.get("VIEWPOINT", []))
     columns, points = _layout(header)
     form = " ".join(header.get("DATA", [])).lower()
     if form == "ascii":
@@ -64,6 +70,30 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
         if words and not words[0].startswith("#"):
             header[words[0].upper()] = words[1:]
     return header, start
+
+
+def _check_viewpoint(words: list[str]) -> None:
+    """See that no pose stands between the points and the LiDAR's frame.
+
+    PCL's viewer takes the points to be in the frame of that pose, others store them in the world and the LiDAR's place
+    there in it: which of them wrote a file, it does not say.
+
+    Raises:
+        CloudError: its position is not 0, 0, 0, or its quaternion (w first) turns.
+    """
+    if words in ([], ["0"] * 7):
+        return
+    try:
+        *position, w, x, y, z = (float(word[:LONGEST_WORD]) for word in words)
+        stands = len(position) == 3 and math.hypot(*position) < STANDS and abs(w) > 0
+        if stands and math.hypot(x, y, z) < STANDS * abs(w):
+            return
+    except ValueError:
+        pass
+    raise CloudError(
+        f"its header says VIEWPOINT {' '.join(words)[:80]}, and tools do not agree on whether its points are to be "
+        f"moved by that; give them as the LiDAR sees them, with VIEWPOINT {STANDING}"
+    )
 
 
 def _layout(header: dict[str, list[str]]) -> tuple[list[Column], int]:

@@ -14,6 +14,7 @@ from calibnet.datasets.clouds.npy import read_npy, read_npz
 from calibnet.datasets.clouds.pcd import read_pcd
 from calibnet.datasets.clouds.ply import read_ply
 from calibnet.datasets.clouds.tables import read_feather, read_las, read_parquet
+from calibnet.datasets.clouds.text import TEXT_SUFFIXES, read_text
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import read_file
 
@@ -33,7 +34,7 @@ def read_scan(
 
     Args:
         path: the file.
-        columns: of a ``.bin``, see `calibnet.datasets.clouds.bin.read_bin`; None to recognise them.
+        columns: of a ``.bin`` or of text, see `calibnet.datasets.clouds.bin.read_bin`; None to recognise them.
         full_scale: intensity that counts as 1, see `full_scale_of`; None to judge by this scan alone.
 
     Returns:
@@ -52,9 +53,10 @@ def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.f
     if not data:
         raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame or copy the scan again.")
     try:
-        if ending(path, SCAN_SUFFIXES) in BIN_SUFFIXES:
-            return points_of(read_bin(data, columns))
-        return _READERS[path.suffix.lower()](data)
+        suffix = ending(path, SCAN_SUFFIXES)
+        if suffix in _BY_COLUMNS:
+            return points_of(_BY_COLUMNS[suffix](data, columns))
+        return _READERS[suffix](data)
     except CloudError as error:
         raise DatasetError(f"Scan {path} cannot be read: {error}; copy it again or write it anew.") from None
 
@@ -119,7 +121,10 @@ _READERS: dict[str, Callable[[bytes], NDArray[np.float32]]] = {
     ".parquet": _table(read_parquet),
 }
 
-BIN_SUFFIXES = (".bin", ".pcd.bin")
-"""KITTI's and nuScenes's."""
-SCAN_SUFFIXES = (*BIN_SUFFIXES, *_READERS)
+_BY_COLUMNS: dict[str, Callable[[bytes, tuple[str, ...] | None], Columns]] = {
+    **dict.fromkeys((".bin", ".pcd.bin"), read_bin),  # KITTI's and nuScenes's
+    **dict.fromkeys(TEXT_SUFFIXES, read_text),
+}
+"""Those whose columns may have to be declared."""
+SCAN_SUFFIXES = (*_BY_COLUMNS, *_READERS)
 """The file endings that `read_scan` reads."""

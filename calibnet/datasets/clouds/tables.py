@@ -1,16 +1,18 @@
-"""Clouds in files made for tables and surveys: Feather, Parquet, LAS and LAZ."""
+"""Clouds in files made for tables and surveys: Feather, Parquet, LAS and LAZ; what pyarrow reads of others."""
 
 from __future__ import annotations
 
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from calibnet.datasets.clouds.columns import LONGEST_ROW, MOST_POINTS, CloudError, Columns
 from calibnet.runtime.reading import MEGABYTE
+from calibnet.runtime.text import one_line
 
 LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
 """Bytes of the header of LAS 1.2 and of 1.4, and of a point's position and intensity."""
@@ -37,14 +39,14 @@ def read_feather(data: bytes) -> Columns:
     """
     from pyarrow import feather
 
-    return _columns(feather.read_table, data)
+    return read_table(feather.read_table, data)
 
 
 def read_parquet(data: bytes) -> Columns:
     """Columns of a Parquet file; errors as of `read_feather`."""
     from pyarrow import parquet
 
-    return _columns(parquet.read_table, data)
+    return read_table(parquet.read_table, data)
 
 
 def read_las(data: bytes) -> Columns:
@@ -98,15 +100,23 @@ def unpacked(data: bytes, most: int) -> bytes:
     return done.stdout
 
 
-def _columns(read: Any, data: bytes) -> Columns:
-    """The columns of numbers of a table."""
+def read_table(read: Callable[[Any], Any], data: bytes) -> Columns:
+    """The columns of numbers of a table.
+
+    Args:
+        read: makes a table of pyarrow's of an open file.
+        data: of the file.
+
+    Raises:
+        CloudError: it is damaged, or holds too many points.
+    """
     import pyarrow as pa
 
     try:
         table = read(pa.BufferReader(data))
         table.validate(full=True)
-    except (pa.ArrowException, OSError, ValueError):
-        raise CloudError("it is truncated, damaged or no such file") from None
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise CloudError(f"it is truncated, damaged or no such file ({one_line(error, 160).rstrip('.')})") from None
     if table.num_rows > MOST_POINTS:
         raise CloudError(f"it holds {table.num_rows:,} points, and {MOST_POINTS:,} are the most that are read")
     columns: Columns = {}

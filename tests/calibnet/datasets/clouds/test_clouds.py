@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,10 +16,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 
 from calibnet.datasets.clouds.bin import KITTI, LAYOUTS, read_bin, recognised
-from calibnet.datasets.clouds.columns import CloudError
+from calibnet.datasets.clouds.columns import CloudError, points_of
+from calibnet.datasets.clouds.pcd import read_pcd
 from calibnet.datasets.clouds.scans import clean_points
+from calibnet.datasets.clouds.text import read_text
 from calibnet.errors import DatasetError
-from tests.support.clouds import with_fields
+from tests.support.clouds import pcd, with_fields
 
 
 def scan(count: int = 4000, seed: int = 0) -> np.ndarray:
@@ -239,8 +242,8 @@ def test_python_objects_are_not_opened(write_layout):
 def test_other_files_are_named(write_layout):
     layout = write_layout("folder")
     for path in layout.scans:
-        path.rename(path.with_suffix(".csv"))
-    with pytest.raises(DatasetError, match=r"holds no scans \(.*\.npz.*\), only \.csv; put them there"):
+        path.rename(path.with_suffix(".e57"))
+    with pytest.raises(DatasetError, match=r"holds no scans \(.*\.npz.*\), only \.e57; put them there"):
         layout.open()
 
 
@@ -279,3 +282,66 @@ def test_points_without_a_return_are_dropped():
 def test_points_of_a_map_are_no_scan():
     with pytest.raises(DatasetError, match="its points are more than 100 km away, as those of a map are"):
         clean_points(scan(300)[:, :4] + [5e5, 5e6, 100.0, 0.0], Path("a.bin"))
+
+
+NAMED = {
+    "comma": "x,y,z,intensity\n{,}",
+    "CloudCompare's comment": "//X Y Z Intensity\n{ }",
+    "another comment": "# made today\n\n# x  y  z  i\n{ }",
+    "units, semicolons, a mark of order, Windows's ends": "\ufeffX (m);Y [m];z_m;Reflectivity\r\n{;}",
+    "VeloView's": '"Points_m_XYZ:0","Points_m_XYZ:1","Points_m_XYZ:2","intensity"\n{,}',
+    "none, blanks": "{ }",
+    "none, tabs": "{\t}",
+    "none, a comma and a blank": "{, }",
+    "none, after their number": "4000\n{ }",
+}
+
+
+@pytest.mark.parametrize("way", NAMED)
+@pytest.mark.parametrize("suffix", [".csv", ".xyz", ".txt"])
+def test_clouds_of_text(write_layout, way, suffix):
+    def write(path: Path, rows: np.ndarray) -> None:
+        head, separator = re.fullmatch(r"(.*)\{(.+)\}", NAMED[way], re.DOTALL).groups()
+        lines = [separator.join(map(repr, row)) for row in rows.astype(np.float64).tolist()]
+        path.write_bytes((head + ("\r\n" if "\r" in head else "\n").join(lines) + "\n").encode())
+
+    assert_array_equal(in_folder(write_layout("folder"), f"0001{suffix}", write), scan()[:, :4])
+
+
+def test_columns_of_text_are_found_by_name_among_words_and_dropouts():
+    rows = b"time,label,intensity,z,y,x\n12:00:01,car,1,3.5,2.5,1.5\n12:00:02,,2,,,\n"
+    columns = read_text(rows)
+    assert_array_equal(points_of(columns), [[1.5, 2.5, 3.5, 1], [np.nan, np.nan, np.nan, 2]])
+    assert_array_equal(points_of(read_text(b"x;y;z\n1,5;2,5;-3,5\n")), [[1.5, 2.5, -3.5, 0]])
+    assert_array_equal(points_of(read_text(b"7 1.5 2.5 3.5\n", ("ring", "x", "y", "z"))), [[1.5, 2.5, 3.5, 0]])
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("1.5 2.5 3.5 4.5 5.5\n", r"its 5 columns have no names; name them in its first line, or say them in cal"),
+        ("0 1.5 2.5 3.5\n1 2.5 3.5 4.5\n", "no names, and number 1 holds whole numbers alone"),
+        ("a,b,c\n1,2,3\n", r"its first line \(a,b,c\) names no columns x, y and z"),
+        ("x,y,z\n1,2,far\n", "invalid value 'far'"),
+        ("1.5 2.5 3.5\n1.5 2.5\n", r"Row #2: Expected 3 columns, got 2"),
+        ("x,y,z\n", "it holds no point"),
+    ],
+)
+def test_text_that_is_no_cloud_is_one_sentence(text, sentence):
+    with pytest.raises(CloudError, match=sentence):
+        read_text(text.encode())
+
+
+def test_times_beside_the_scans_are_none(write_layout):
+    layout = write_layout("folder")
+    (layout.scans[0].parent / "timestamps.txt").write_text("0.0\n0.1\n0.2\n")
+    assert len(layout.open()) == 3
+
+
+def test_a_viewpoint_of_a_pcd_is_refused_unless_it_is_none():
+    rows = scan(30)[:, :4]
+    for none in ("0 0 0 1 0 0 0", "0 0 0 0 0 0 0", "0.0 -0.0 1e-9 -1 0 0 0", None):
+        assert_array_equal(points_of(read_pcd(pcd(rows, VIEWPOINT=none))), rows)
+    for pose in ("1.5 0 0 1 0 0 0", "0 0 0 0.7071 0 0 0.7071", "0 0 0 0 0 0 1", "a b c", "0 0 0 1"):
+        with pytest.raises(CloudError, match=f"VIEWPOINT {pose}, and tools do not agree"):
+            read_pcd(pcd(rows, VIEWPOINT=pose))

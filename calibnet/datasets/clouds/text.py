@@ -1,0 +1,149 @@
+"""Clouds as text: ``.csv``, ``.xyz`` and the like, a point a line, its columns named by a line before them."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from calibnet.datasets.clouds.bin import DECLARE as SAY
+from calibnet.datasets.clouds.columns import INTENSITY_NAMES, LONGEST_LINE, LONGEST_WORD, CloudError, Columns
+from calibnet.datasets.clouds.tables import read_table
+from calibnet.runtime.text import one_line
+
+TEXT_SUFFIXES = (".csv", ".txt", ".xyz", ".asc", ".pts")
+SEPARATORS = (";", "\t", ",")
+"""Between columns, where they are not blanks; a comma may be in the numbers where there is another one."""
+COMMENTS = ("#", "//", "%")
+MOST_LINES_BEFORE = 1000
+"""Lines that may stand before the first point."""
+UNIT = re.compile(r"\s*[\[(].*[\])]$")
+AXIS = re.compile(r"points?(?:_m_xyz)?:([012])|(?:pos_?|coord_?|points?_?)?([xyz])(?:_?m)?")
+"""How an axis is called, in lower case and without a unit in brackets; VeloView writes ``Points_m_XYZ:0``."""
+UNNAMED = {3: ("x", "y", "z"), 4: ("x", "y", "z", "intensity")}
+"""What numbers without names are, by how many there are in a line."""
+DECLARE = f"name them in its first line, or {SAY}"
+
+
+class _Head(NamedTuple):
+    """What stands before the points.
+
+    Attributes:
+        names: of the columns; None where nothing names them.
+        start: where the first point begins.
+        separator: between its columns; None for blanks.
+        width: how many columns it has.
+    """
+
+    names: tuple[str, ...] | None
+    start: int
+    separator: str | None
+    width: int
+
+
+def read_text(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
+    """Positions and intensity of a text file.
+
+    The columns are named in a line before the points (also as a comment, as CloudCompare does), or by ``layout``; three
+    or four without names are x, y, z and intensity.
+
+    Args:
+        data: of the file.
+        layout: names of the columns, of a file that does not name them.
+
+    Raises:
+        CloudError: nothing names the columns, or a point lacks some, or holds a word.
+    """
+    from pyarrow import csv
+
+    head = _head(data)
+    names = head.names or layout or UNNAMED.get(head.width)
+    if names is None:
+        raise CloudError(f"its {head.width} columns have no names; {DECLARE}")
+    places = {name.lower(): place for place, name in reversed(list(enumerate(names)))}
+    intensity = next((name for name in INTENSITY_NAMES if name in places), None)
+    wanted = {name: str(places[name]) for name in (*"xyz", intensity) if name in places}
+    body = data[head.start :]
+    if head.separator is None:
+        body = b"\n".join(b",".join(line.split()) for line in body.splitlines())
+    read = partial(
+        csv.read_csv,
+        read_options=csv.ReadOptions(use_threads=False, column_names=list(map(str, range(len(names))))),
+        parse_options=csv.ParseOptions(delimiter=head.separator or ","),
+        convert_options=csv.ConvertOptions(
+            decimal_point="," if head.separator not in (None, ",") and b"," in body else ".",
+            column_types=dict.fromkeys(wanted.values(), "float64"),
+            include_columns=list(wanted.values()),
+        ),
+    )
+    table = read_table(read, body)
+    columns = {name: table[place] for name, place in wanted.items()}
+    if head.names is None and layout is None:
+        _check_positions(columns)
+    return columns
+
+
+def _head(data: bytes) -> _Head:
+    """Read on to the first point.
+
+    Raises:
+        CloudError: there is none, or what stands before it names no columns.
+    """
+    names: tuple[str, ...] | None = None
+    file = io.BytesIO(data)
+    for _ in range(MOST_LINES_BEFORE):
+        start = file.tell()
+        raw = file.readline(LONGEST_LINE)
+        if not raw:
+            break
+        line = raw.decode("utf-8-sig", "replace").strip()
+        text = line.lstrip("".join(COMMENTS)).strip()
+        separator = next((one for one in SEPARATORS if one in text), None)
+        words = [word.strip().strip('"') for word in text.split(separator)]
+        is_comment = line.startswith(COMMENTS)
+        if not text or (not is_comment and names is None and len(words) == 1 and words[0].isdecimal()):
+            continue  # a .pts file begins with the number of its points
+        if not is_comment and (names is not None or all(_is_number(word, separator) for word in words)):
+            return _Head(names, start, separator, len(words))
+        called = tuple(map(_called, words))
+        if set("xyz") <= set(called):
+            names = called
+        elif not is_comment:
+            raise CloudError(f"its first line ({one_line(text, 80)}) names no columns x, y and z; {DECLARE}")
+    raise CloudError("it holds no point")
+
+
+def _called(word: str) -> str:
+    """What a column is called here."""
+    name = UNIT.sub("", word.lower())
+    match = AXIS.fullmatch(name)
+    return name if match is None else match[2] or "xyz"[int(match[1])]
+
+
+def _is_number(word: str, separator: str | None) -> bool:
+    try:
+        float(word[:LONGEST_WORD].replace(",", "." if separator else ",") or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _check_positions(columns: Columns) -> None:
+    """See that none of three columns without names counts something, as a number of points or of rings does.
+
+    Raises:
+        CloudError: one holds whole numbers alone, and the others do not.
+    """
+    whole = [axis for axis in "xyz" if _is_whole(columns[axis])]
+    if whole and len(whole) < 3:
+        place = "xyz".index(whole[0]) + 1
+        raise CloudError(f"its columns have no names, and number {place} holds whole numbers alone; {DECLARE}")
+
+
+def _is_whole(values: Sequence[float] | np.ndarray) -> bool:
+    known = np.asarray(values)[np.isfinite(values)]
+    return bool(len(known) and (known == np.round(known)).all())
