@@ -22,10 +22,11 @@ from calibnet.errors import CalibrationError, ConfigError, WeightsError
 from calibnet.geometry import RANGES, invert
 from calibnet.geometry.prior import PosePrior, Prior
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.judging.causes import Measure, Search, match_error_of, reach_of
+from calibnet.judging.causes import Measure, Search, match_error_of
 from calibnet.judging.coefficients import Coefficients, load_coefficients
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.judge import judge
+from calibnet.judging.lag import reach_of
 from calibnet.network.config import load_preset
 from calibnet.runtime.clock import Clock
 from calibnet.runtime.precision import autocast
@@ -170,7 +171,7 @@ class Cascade:
             trace = None
         verdict = None if trace is None else trace.verdict
         if verdict is None or verdict.word != ACCEPTED:
-            lag = None if lags is None else (lags, reach_of(calibrated))
+            lag = None if lags is None else (lags, reach_of(calibrated, self.coefficients.lens))
             verdict = self._judged(frame, start, trace, pose_prior, match_error_of(self.stages[0]), lag)
         return upright.real(verdict)
 

@@ -19,8 +19,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
 from calibnet.geometry import transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
-from calibnet.judging.predictors import reach
-from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.trace import StageTrace
 from calibnet.verdict import Cause
 
 Measure = Callable[[Frame, Extrinsic], float]
@@ -59,7 +58,9 @@ class Search:
     unit: str
 
 
-def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> tuple[Cause, ...]:
+def cause(
+    search: Search, frame: Frame, guess: Extrinsic, measure: Measure, given: float | None = None
+) -> tuple[Cause, ...]:
     """Undo one fault at a time, and name the one without which picture and scan fit best, if they fit clearly better.
 
     Args:
@@ -67,6 +68,7 @@ def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> t
         frame: the original frame.
         guess: ``camera_from_lidar`` that the run started from.
         measure: how badly picture and scan fit.
+        given: the measure of the original frame, if it is known already.
     """
 
     def measured(altered: Frame) -> float:
@@ -76,12 +78,12 @@ def cause(search: Search, frame: Frame, guess: Extrinsic, measure: Measure) -> t
             return np.inf
         return np.inf if np.isnan(value) else value
 
-    given = measured(frame)
+    given = measured(frame) if given is None else given
     tried = [(measured(frame.changed(attempt.undo)), attempt) for attempt in search.attempts]
     least, best = min(tried, key=lambda pair: pair[0])
     if not least < search.share * given or not least < search.most:
         return ()
-    before = "no match at all" if np.isinf(given) else f"{given:.3g} {search.unit}"
+    before = "no plausible result" if np.isinf(given) else f"{given:.3g} {search.unit}"
     evidence = f"{least:.3g} {search.unit} without this fault, {before} with it"
     return tuple(Cause(name, best.text, evidence) for name in best.names)
 
@@ -106,17 +108,6 @@ def match_error_of(stage: Looking) -> Measure:
         first = stage.look(frame, view, guess)
         second = stage.look(frame, view, first.after)
         return float(np.sqrt(first.match_error_px * second.match_error_px))
-
-    return measure
-
-
-def reach_of(calibrate: Callable[[Frame, Extrinsic], CascadeTrace]) -> Measure:
-    """How far a run moves from the guess, relative to the range searched; infinite if picture and scan do not fit."""
-
-    def measure(frame: Frame, guess: Extrinsic) -> float:
-        trace = calibrate(frame, guess)
-        first = trace.stages[0].range
-        return reach(trace.initial, trace.stages[-1].after, first).share if trace.fits else np.inf
 
     return measure
 

@@ -42,7 +42,7 @@ def judge(
         match_error: if given, causes are searched for a result that is not accepted: if picture and scan do not fit,
             with this measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by fitting the lens to the matches.
         lag: attempts of `calibnet.judging.lag.lags` and their measure, used if picture and scan fit outside the range
-            searched and no fault of the lens explains it.
+            searched, or hardly; a fault of the lens is looked for only if no lag explains it.
         prior: what the user knows of the extrinsic beforehand, in words. The classifier was fitted to runs in which all
             six axes are free. Such runs err mostly along axes that a prior may fix, so with a prior it can accept a
             result, but never reject it.
@@ -57,6 +57,9 @@ def judge(
 
     def why(search: Search, measure: Measure | None) -> tuple[Cause, ...]:
         return suspects or (() if measure is None else cause(search, frame, guess, measure))
+
+    def why_lag(share: float) -> tuple[Cause, ...]:
+        return suspects or (cause(lag[0], frame, guess, lag[1], share) if lag else ())
 
     def why_lens() -> tuple[Cause, ...]:
         return suspects or (() if match_error is None or trace is None else lens_causes(trace, coefficients.lens))
@@ -95,12 +98,12 @@ def judge(
                     ),
                 )
             else:
-                causes = why_lens()
+                causes = why_lag(math.inf) or why_lens()
         return verdict(REJECTED, reason, causes)
     gone = reach(trace.initial, last.after, trace.stages[0].range)
     if gone.share > MARGIN:
         word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
-        return verdict(word, f"The LiDAR {gone}.", why_lens() or (why(*lag) if lag else ()))
+        return verdict(word, f"The LiDAR {gone}.", why_lag(gone.share) or why_lens())
 
     classifier = coefficients.for_frame(last.range)
     if isinstance(classifier, str):

@@ -10,12 +10,13 @@ import pytest
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 from calibnet.geometry import invert, pose_error, transform_points
+from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Transform
-from calibnet.judging.causes import cause, reach_of
-from calibnet.judging.lag import lags, registered
+from calibnet.judging.causes import cause
+from calibnet.judging.lag import lags, reach_of, registered
 from calibnet.trace import CascadeTrace
 from tests.support.drive import Drive
-from tests.support.matches import run
+from tests.support.matches import LENS_ODDS, matches, run
 
 DRIVE = SyntheticSequence(seed=4, length=4, rig=KITTI_LIKE)
 
@@ -76,6 +77,17 @@ def test_a_lag_is_the_cause_where_undoing_it_ends_near_the_guess(frames: list[Fr
 
     found = cause(search, drive[1], drive[1].camera_from_lidar, reach_of(calibrate))
     assert [one.name for one in found] == ["time-offset"] and "0.1 s later" in found[0].text
+
+
+@pytest.mark.parametrize(("focal", "measured"), [(1.0, 0.2), (0.96, np.inf)])
+def test_no_lag_explains_matches_that_still_indicate_another_lens(
+    frames: list[Frame], focal: float, measured: float
+) -> None:
+    initial = frames[0].camera_from_lidar
+    after = pose_from_vector(np.array([0.1, 0, 0, 0, 0, 0])) @ initial  # a fifth of the range of stage 3, 0.5 m
+    found = matches(np.eye(4), lambda places: focal * places, noise=0.5)
+    measure = reach_of(lambda *_: run(initial, after, found), LENS_ODDS)
+    assert measure(frames[0], initial) == pytest.approx(measured)
 
 
 def test_without_neighbours_or_motion_there_is_nothing_to_try(frames: list[Frame]) -> None:
