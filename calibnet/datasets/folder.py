@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
-from calibnet.datasets.calibration_files import BY_NAME, CalibrationFile, FrameChoice, Wanted, read_calibration
+from calibnet.datasets.calibration_files import (
+    BY_NAME,
+    CalibrationFile,
+    FrameChoice,
+    Wanted,
+    names_cameras,
+    read_calibration,
+)
 from calibnet.datasets.clouds.scans import SCAN_SUFFIXES
 from calibnet.datasets.images.development import Development, Levels
 from calibnet.datasets.images.files import BY_ITSELF, read_image, read_levels
@@ -122,11 +129,15 @@ def calibration_path(root: Path) -> Path:
     ours = root / "calibration.yaml"
     if ours.exists() or not root.is_dir():
         return ours
-    found = sorted(path for path in root.iterdir() if path.suffix.lower() in CALIBRATION_SUFFIXES and path.is_file())
+    found = sorted(path for path in root.iterdir() if _may_be_calibration(path) and path.is_file())
     if len(found) > 1:
         names = ", ".join(path.name for path in found)
         raise DatasetError(f"{root} holds several files that may be its calibration ({names}); leave one there.")
     return found[0] if found else ours
+
+
+def _may_be_calibration(path: Path) -> bool:
+    return path.suffix.lower() in CALIBRATION_SUFFIXES or path.name == "calib.txt"  # KITTI's
 
 
 def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> CalibrationFile:
@@ -136,6 +147,12 @@ def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> Calibr
         DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
     """
     path = calibration_path(root)
+    of_guess = wanted
+    if guess is not None and wanted.camera is not None:  # the name is of whichever file holds several
+        if not names_cameras(guess):
+            of_guess = replace(wanted, camera=None)
+        elif not names_cameras(path):
+            wanted = replace(wanted, camera=None)
     found = read_calibration(path, wanted)
     if found.camera is None:
         raise DatasetError(
@@ -143,7 +160,7 @@ def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> Calibr
             "with --guess."
         )
     if guess is not None:
-        extrinsic = read_calibration(guess, replace(wanted, camera=None)).camera_from_lidar
+        extrinsic = read_calibration(guess, of_guess).camera_from_lidar
         if extrinsic is None:
             raise DatasetError(f"Calibration {guess} has no extrinsic of a LiDAR; give one that has with --guess.")
         found = replace(found, camera_from_lidar=extrinsic)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from calibnet.datasets.folder import read_calibration_of
 from calibnet.geometry import CameraModel
-from calibnet.geometry.types import Extrinsic
+from calibnet.geometry.types import Extrinsic, Matrix6
 from calibnet.verdict import ACCEPTED, Verdict
 from inspector.read.run import RecordedRun
 from inspector.read.understood import RecordingError
@@ -41,6 +41,11 @@ class Exported:
     origin: str
     frames: FrameNames = field(default_factory=FrameNames)
     verdict: Verdict | None = field(default=None, repr=False)
+
+    @property
+    def covariance(self) -> Matrix6 | None:
+        """Of ``(translation m, rotation rad)`` in the camera's frame, 6x6; None where nothing states it."""
+        return None if self.verdict is None else self.verdict.covariance
 
 
 def exported_frame(run: RecordedRun, index: int) -> Exported:

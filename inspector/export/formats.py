@@ -13,6 +13,7 @@ from calibnet.runtime.text import one_line
 from inspector.export.exported import Exported
 
 AXES = "LiDAR x forward, y left, z up; camera x right, y down, z forward (optical frame); metres"
+OF_COVARIANCE = "(translation m, rotation rad) in the camera's frame"
 CONVENTION = f"camera_from_lidar maps LiDAR points into the camera, x_camera = R x_lidar + t; {AXES}"
 
 
@@ -30,6 +31,7 @@ def as_kitti(exported: Exported) -> str:
     if not exported.camera.is_pinhole:
         named = ", ".join(f"{name} {value!r}" for name, value in lens(exported.camera).items())
         lines.append(f"# lens: this format has no lens; rectify the pictures with the same matrix first, of {named}")
+    lines += [f"# {line}" for line in covariance_lines(exported)]
     lines.append(f"# source: calib-inspect, {exported.origin}")
     return "\n".join([*lines, ""])
 
@@ -48,6 +50,7 @@ def as_ros(exported: Exported) -> str:
             f"# Static transform {parent} -> {child}: the pose of {child} in {parent}, that is {parent}_from_{child};",
             f"# {AXES}; quaternion x y z w.",
             f"# Source: calib-inspect, {exported.origin}",
+            *(f"# {line}" for line in covariance_lines(exported)),
             "# On the command line:",
             f"#   ros2 run tf2_ros static_transform_publisher {arguments}",
             "launch:",
@@ -75,6 +78,9 @@ def as_opencv(exported: Exported) -> str:
     storage.write("camera_from_lidar", exported.camera_from_lidar)
     storage.write("rvec", cv2.Rodrigues(exported.camera_from_lidar[:3, :3])[0])
     storage.write("tvec", exported.camera_from_lidar[:3, 3:])
+    if exported.covariance is not None:
+        storage.writeComment(f"Covariance of {OF_COVARIANCE}")
+        storage.write("covariance", exported.covariance)
     return str(storage.releaseAndGetString())
 
 
@@ -92,6 +98,8 @@ def as_json(exported: Exported) -> str:
         "image_height": exported.camera.height,
         "camera_matrix": exported.camera.matrix.tolist(),
         **lens(exported.camera),
+        "covariance": None if exported.covariance is None else exported.covariance.tolist(),
+        "covariance_of": OF_COVARIANCE,
     }
     return f"{json.dumps(content, indent=2)}\n"
 
@@ -106,6 +114,7 @@ def as_calibration(exported: Exported) -> str:
         [
             f"# Source: calib-inspect, {one_line(exported.origin)}",
             f"# {CONVENTION}",
+            *(f"# {line}" for line in covariance_lines(exported)),
             *rows,
             "camera_from_lidar:",
             *(f"  - {json.dumps(row)}" for row in matrix.tolist()),
@@ -118,6 +127,14 @@ def lens(camera: CameraModel) -> dict[str, str | float | list[float]]:
     """A lens as files name it: its model, coefficients with names of their own, and the rest in OpenCV's order."""
     of_model: dict[str, str | float | list[float]] = {"distortion_model": camera.model, **camera.named}
     return of_model | {"distortion_coefficients": camera.distortion.tolist()}
+
+
+def covariance_lines(exported: Exported) -> list[str]:
+    """What is known of the uncertainty, as lines of a comment: one, or none."""
+    if exported.covariance is None:
+        return []
+    rows = "; ".join(" ".join(f"{value:.9g}" for value in row) for row in exported.covariance.tolist())
+    return [f"Covariance of {OF_COVARIANCE}: {rows}"]
 
 
 def quaternion_xyzw(rotation: Rotation) -> Floats:

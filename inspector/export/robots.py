@@ -13,7 +13,7 @@ from calibnet.geometry import invert
 from calibnet.geometry.types import Transform
 from calibnet.runtime.text import one_line
 from inspector.export.exported import Exported
-from inspector.export.formats import AXES, quaternion_xyzw
+from inspector.export.formats import AXES, OF_COVARIANCE, covariance_lines, quaternion_xyzw
 
 KOIDE_MODELS = {"plumb_bob": "plumb_bob", "equidistant": "fisheye", "omnidirectional": "omnidir"}
 """Lenses that koide3's tool knows, by its names."""
@@ -28,7 +28,7 @@ def as_urdf(exported: Exported) -> str:
     said = [
         f"Source: calib-inspect, {one_line(exported.origin)}",
         f"{AXES}; rpy in radians about fixed x, y, z; origin is the pose of {child} in {parent}",
-        *_covariance(exported),
+        *covariance_lines(exported),
     ]
     return "\n".join(
         [
@@ -58,7 +58,7 @@ def as_autoware(exported: Exported) -> str:
         f"Source: calib-inspect, {one_line(exported.origin)}",
         "Metres and radians, roll, pitch, yaw about fixed x, y, z: the pose of the camera's link (x forward, y left, z "
         "up) in the LiDAR's frame",
-        *_covariance(exported),
+        *covariance_lines(exported),
     ]
     return "\n".join(
         [
@@ -91,8 +91,8 @@ def as_koide3(exported: Exported) -> str:
         "meta": {
             "source": f"calib-inspect, {exported.origin}",
             "convention": f"T_lidar_camera: x y z, quaternion x y z w, of the camera in the LiDAR's frame; {AXES}",
-            "covariance": None if exported.verdict is None or exported.verdict.covariance is None
-            else exported.verdict.covariance.tolist(),
+            "covariance": None if exported.covariance is None else exported.covariance.tolist(),
+            "covariance_of": OF_COVARIANCE,
         },
         "results": {"T_lidar_camera": [*pose[:3, 3].tolist(), *quaternion_xyzw(pose[:3, :3]).tolist()]},
     }  # fmt: skip
@@ -103,12 +103,3 @@ def _pose(parent_from_child: Transform) -> tuple[list[float], list[float]]:
     """x, y, z in metres, and roll, pitch, yaw in radians about the fixed axes x, y, z."""
     angles = ScipyRotation.from_matrix(parent_from_child[:3, :3]).as_euler("xyz")
     return parent_from_child[:3, 3].tolist(), np.asarray(angles, np.float64).tolist()
-
-
-def _covariance(exported: Exported) -> list[str]:
-    """What is known of the uncertainty, as a line of a comment."""
-    verdict = exported.verdict
-    if verdict is None or verdict.covariance is None:
-        return []
-    rows = "; ".join(" ".join(f"{value:.6g}" for value in row) for row in verdict.covariance.tolist())
-    return [f"Covariance of (translation m, rotation rad) in the camera's frame: {rows}"]

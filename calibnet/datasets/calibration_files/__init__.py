@@ -1,6 +1,6 @@
 """Calibration files: our ``calibration.yaml`` and those of other tools, told apart by what they hold."""
 
 from calibnet.datasets.calibration_files.calibration_file import BY_NAME, CalibrationFile, FrameChoice, Wanted
-from calibnet.datasets.calibration_files.recognise import read_calibration
+from calibnet.datasets.calibration_files.recognise import names_cameras, read_calibration
 
-__all__ = ["BY_NAME", "CalibrationFile", "FrameChoice", "Wanted", "read_calibration"]
+__all__ = ["BY_NAME", "CalibrationFile", "FrameChoice", "Wanted", "names_cameras", "read_calibration"]

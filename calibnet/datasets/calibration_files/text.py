@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from calibnet.datasets.calibration_files import urdf
+from calibnet.datasets.calibration_files import launch, urdf
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import parse_json, parse_yaml, read_text
 
@@ -43,6 +43,8 @@ def parse(path: Path) -> Parsed:
             root = ElementTree.fromstring(text)
             if root.tag in urdf.ROOTS:
                 return Parsed(urdf.transforms_of(root, path), False)
+            if root.tag == "launch":
+                return Parsed(launch.of_xml(root), False)
             return Parsed({child.tag: _xml_value(child) for child in root}, True)
         except (ElementTree.ParseError, RecursionError) as error:
             line = error.position[0] if isinstance(error, ElementTree.ParseError) else 1

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from calibnet.datasets.folder import Folder
 from calibnet.errors import DatasetError
 
 XYZ = np.random.default_rng(1).uniform(-20, 20, (50, 3)).astype(np.float32)
@@ -297,3 +298,16 @@ def test_pictures_in_pgm(bits, write_layout):
         cv2.imwrite(str(path.with_suffix(".pgm")), picture if bits == 8 else picture.astype(np.uint16) * 257)
     for frame, picture in zip(layout.open(), grey, strict=True):
         assert_array_equal(frame.image, np.repeat(picture[..., None], 3, axis=2))
+
+
+def test_a_camera_is_named_in_whichever_file_holds_several(write_layout, tmp_path):
+    layout = write_layout("folder")
+    guess = tmp_path / "calib.txt"
+    row = "0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.2"
+    guess.write_text(f"P0: 50 0 32 0 0 50 24 0 0 0 1 0\nP2: 50 0 32 10 0 50 24 0 0 0 1 0\nTr: {row}\n")
+    found = Folder(layout.root, guess=guess, camera="2").calibration
+    assert_allclose(found.camera_from_lidar[:3, 3], [0.2, -0.1, -0.2])
+    with pytest.raises(DatasetError, match=r"calib\.txt holds cameras 0, 2; say which one with --camera"):
+        Folder(layout.root, guess=guess)
+    with pytest.raises(DatasetError, match=r"calibration\.yaml holds one camera, and none by the name 2"):
+        Folder(layout.root, camera="2")

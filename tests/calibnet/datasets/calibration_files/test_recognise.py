@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from calibnet.datasets.calibration_files import FrameChoice, Wanted, read_calibration
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert, transform
+from calibnet.geometry.camera_model import CameraModel
 
 MATRIX = np.array([[900.0, 0.0, 639.5], [0.0, 905.0, 359.5], [0.0, 0.0, 1.0]])
 AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
@@ -338,3 +339,58 @@ def test_garbage_is_one_sentence(text, write):
     with pytest.raises(DatasetError) as caught:
         read_calibration(path)
     assert str(path) in str(caught.value)
+
+
+LAUNCHED = {
+    "ROS 2, YAML": "launch:\n- group:\n  - node: {pkg: tf2_ros, exec: static_transform_publisher, args: "
+    "'--x 0.2 --z -0.1 --roll -1.5707963267948966 --yaw -1.5707963267948966 --frame-id velodyne "
+    "--child-frame-id cam_optical'}\n- node: {pkg: a, exec: b}\n",
+    "ROS 2, XML": "<launch><group><node pkg='tf2_ros' exec='static_transform_publisher' args='0.2 0 -0.1 -0.5 0.5 "
+    "-0.5 0.5 velodyne cam_optical'/></group></launch>",
+    "ROS 1": "<launch><node pkg='tf' type='static_transform_publisher' name='x' args='0.2 0 -0.1 -1.5707963267948966 0 "
+    "-1.5707963267948966 /velodyne /cam_optical 100'/></launch>",
+}
+
+
+@pytest.mark.parametrize("way", LAUNCHED)
+def test_transforms_that_a_launch_file_publishes(way, write):
+    found = read_calibration(write(LAUNCHED[way]))
+    assert found.camera is None
+    assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ("$(arg x) 0 0 0 0 0 a b", "filled in at the launch"),
+        ("1 2 3 4 5 velodyne cam_optical", "are neither --x"),
+        ("--x 1 --frame-id velodyne", "are neither --x"),
+        ("", "are neither --x"),
+        ("0 0 0 7 0 0 0 velodyne cam_optical", "quaternion .* has length 7"),
+    ],
+)
+def test_a_launch_file_that_leaves_something_open_is_refused(arguments, sentence, write):
+    with pytest.raises(DatasetError, match=sentence):
+        read_calibration(write(f"<launch><node type='static_transform_publisher' args='{arguments}'/></launch>"))
+    with pytest.raises(DatasetError, match="launch file without a static_transform_publisher"):
+        read_calibration(write("launch:\n- arg: {name: x}\n"))
+
+
+ODOMETRY = (
+    "P0: 700 0 640 0 0 700 360 0 0 0 1 0\nP2: 700 0 640 35 0 700 360 -7 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 -0.1 1 0 0 -0.2\n"
+)
+
+
+def test_calibration_of_kitti(write):
+    wanted = Wanted("2", picture=(1280, 720))
+    found = read_calibration(write(ODOMETRY), wanted)
+    matrix = np.array([[700.0, 0, 640], [0, 700, 360], [0, 0, 1]])
+    assert found.camera is not None and found.camera.same(CameraModel(1280, 720, matrix))
+    assert_allclose(invert(found.camera_from_lidar)[:3, 3], [0.2, 0.05, -0.11], atol=1e-12)
+    assert_allclose(read_calibration(write(ODOMETRY), Wanted("0")).camera_from_lidar, EXTRINSIC)
+    with pytest.raises(DatasetError, match="holds cameras 0, 2; say which one with --camera"):
+        read_calibration(write(ODOMETRY))
+    of_object = ODOMETRY.replace("Tr:", "R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam:")
+    assert_allclose(read_calibration(write(of_object), Wanted("P0")).camera_from_lidar, EXTRINSIC)
+    with pytest.raises(DatasetError, match="row 'Tr' has 11 numbers instead of 12"):
+        read_calibration(write(ODOMETRY.replace(" -0.2", "")), Wanted("0"))
