@@ -1,7 +1,7 @@
 """Look into a running calibration: recordings, views and the command line.
 
-What a Python user needs is here by name and loaded when it is first used, so that the command line starts quickly.
-Two lines put a calibrated frame into a recording of one's own, with the layout that shows it::
+The names of the Python interface are imported when first used, so that the command line starts quickly. Two lines put a
+calibrated frame into a recording of one's own, with the layout that shows it::
 
     inspector.log_trace(recording, frame, trace, frame.camera_from_lidar)
     recording.send_blueprint(inspector.blueprint(frame, trace, frame.camera_from_lidar))

@@ -1,7 +1,6 @@
-"""What a recorded run has to stand: its verdict, and limits; as text and as JUnit XML.
+"""Checks of a recorded run: its verdict and limits on its figures, reported as text and as JUnit XML.
 
-Limits on errors need a reference. Those on what a run says of itself do not: how sure it is, how far its frames lie
-apart, how many it could not use, and how well picture and scan fit.
+Limits on errors need a reference. Those on uncertainty, scatter between frames, unused frames and match error do not.
 """
 
 from __future__ import annotations
@@ -37,18 +36,18 @@ KINDS = {
 }
 """Names of the limits, with their units."""
 ERRORS, OF_THE_RUN = ("rotation", "translation"), ("sigma_rotation", "sigma_translation", "unused")
-"""Those that need a reference, and those that are one figure of a run and no statistic over its frames."""
+"""Kinds that need a reference, and kinds that are a single figure of a run rather than a statistic over frames."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The largest value allowed of something.
+    """Largest value allowed of a figure.
 
     Attributes:
         kind: one of `KINDS`.
-        largest: in its unit.
-        statistic: one of `STATISTICS`, that must not exceed it: over the frames or, of an error, of the drive's one
-            extrinsic; what is no error takes the median then.
+        largest: the value, in the kind's unit.
+        statistic: the one of `STATISTICS` that is limited, over the frames; ``"drive"`` means the error of the drive's
+            extrinsic and, for kinds that are not errors, the median.
     """
 
     kind: str
@@ -57,14 +56,14 @@ class Limit:
 
     @property
     def name(self) -> str:
-        """What is limited."""
+        """The limited figure, in words."""
         if self.kind in OF_THE_RUN:
             return KINDS[self.kind][0]
         return f"{STATISTICS[self.statistic if self.kind in ERRORS else self.over_frames]} {KINDS[self.kind][0]}"
 
     @property
     def over_frames(self) -> str:
-        """The statistic of what is no error."""
+        """The statistic for kinds that are not errors."""
         return "median" if self.statistic == "drive" else self.statistic
 
     def say(self, value: float) -> str:
@@ -74,25 +73,25 @@ class Limit:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A limit and what was found, in its unit."""
+    """A limit and the value found, in its unit."""
 
     limit: Limit
     value: float
 
     @property
     def passed(self) -> bool:
-        """Whether the limit is kept; a value that is no number keeps none."""
+        """Whether the value is within the limit; NaN never is."""
         return self.value <= self.limit.largest
 
     def as_dict(self) -> dict[str, object]:
-        """The form that JSON files hold; values are in the unit of the name."""
+        """The JSON object; values are in the unit of the name."""
         limit = self.limit
         value = self.value if math.isfinite(self.value) else None
         return {"name": limit.name, "value": value, "largest": limit.largest, "passed": self.passed}
 
     @property
     def sentence(self) -> str:
-        """What was found, and by how much it is too much."""
+        """The value found, and by how much it exceeds the limit."""
         limit = self.limit
         found = f"{limit.name} {limit.say(self.value)}"
         if self.passed:
@@ -101,29 +100,29 @@ class Outcome:
 
 
 def check_run(run: RecordedRun, limits: Sequence[Limit]) -> list[Outcome]:
-    """Hold a run against limits.
+    """Check a run against limits.
 
     Raises:
-        RecordingError: the recording has nothing to hold against one of them, such as a reference.
+        RecordingError: the recording lacks what one of them needs, such as a reference.
     """
     if not run.has_reference and any(limit.kind in ERRORS for limit in limits):
         raise RecordingError(
-            f"{run.path} has no reference extrinsic, so its errors are unknown; limit --max-sigma-rotation, "
-            "--max-scatter-rotation, --max-unused or --max-fit instead, check a run on calibrated data, or give the "
-            "folder command --range to take its calibration for the reference."
+            f"{run.path} has no reference extrinsic, so its errors are unknown; use --max-sigma-rotation, "
+            "--max-scatter-rotation, --max-unused or --max-fit instead, or record with --range, which takes the "
+            "calibration of the data as the reference."
         )
     return [Outcome(limit, _value(run, limit)) for limit in limits]
 
 
 def _value(run: RecordedRun, limit: Limit) -> float:
-    """What is held against a limit."""
+    """The value that a limit applies to."""
     if limit.kind in ERRORS:
         return _error(run, limit)
     if limit.kind.startswith("sigma"):
         verdict = run.verdict
         sigma = verdict.sigma_rotation_deg if limit.kind == "sigma_rotation" else verdict.sigma_translation_cm
         if sigma is None:
-            raise RecordingError(f"{run.path} states no uncertainty of its result; record a drive, or a single frame.")
+            raise RecordingError(f"{run.path} states no uncertainty; record a drive or a single frame.")
         return sigma
     if limit.kind == "unused":
         unused = sum(frame.rejected for frame in run.frames) + len(run.skipped)
@@ -134,19 +133,21 @@ def _value(run: RecordedRun, limit: Limit) -> float:
 
 
 def _scatter(run: RecordedRun, kind: str) -> list[float]:
-    """How far every frame that is not rejected lies from the median of all of them."""
+    """Distance of every frame's result from the median of all, of frames that are not rejected."""
     if len(run.results) < 2:
-        raise RecordingError(f"{run.path} has one frame that is not rejected, which cannot scatter; record several.")
+        raise RecordingError(
+            f"{run.path} has only one frame that is not rejected, so there is no scatter; record several frames."
+        )
     middle = median_pose(run.results)
     apart = [pose_error(result, middle) for result in run.results]
     return [one.rotation_deg if kind == "scatter_rotation" else one.translation_cm for one in apart]
 
 
 def _fits(run: RecordedRun) -> list[float]:
-    """What error the last stage expects of the matches of every frame, in pixels of its image."""
+    """Match error that the last stage expects of every frame, in pixels of its image."""
     values = run.scalars(fit_stage(run.stages[-1].number))
     if not values:
-        raise RecordingError(f"{run.path} has no curves of how well frames fit; record them (--log curves).")
+        raise RecordingError(f"{run.path} has no curves of the match error; record them with --log curves.")
     return values
 
 
@@ -165,7 +166,7 @@ def _error(run: RecordedRun, limit: Limit) -> float:
 
 
 def summary(run: RecordedRun, outcomes: Sequence[Outcome]) -> str:
-    """The limits in one line; of a failure only what failed."""
+    """All limits in one line; after a failure, only those that failed."""
     frames = "1 frame" if len(run.frames) == 1 else f"{len(run.frames)} frames"
     failed = [outcome.sentence for outcome in outcomes if not outcome.passed]
     if failed:
@@ -174,7 +175,7 @@ def summary(run: RecordedRun, outcomes: Sequence[Outcome]) -> str:
 
 
 def junit(run: RecordedRun, outcomes: Sequence[Outcome]) -> bytes:
-    """JUnit XML: a test case for the verdict, which is skipped where it cannot be told, and one a limit."""
+    """JUnit XML: a test case for the verdict, skipped where it is "cannot tell", and one per limit."""
     word = run.verdict.word
     counts = {
         "name": SUITE,

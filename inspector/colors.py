@@ -15,16 +15,16 @@ FAR_M: Final = 80.0
 EMPTY: Final[Rgb] = (62, 63, 72)
 """Cells that hold no LiDAR point."""
 EDGE: Final[Rgb] = (255, 60, 220)
-"""Points at depth discontinuities: a colour that streets and cars do not have."""
+"""Points at depth discontinuities, in a colour that streets and cars do not have."""
 REST: Final[Rgb] = (120, 170, 190)
-"""The other points, beside `EDGE`."""
+"""Points that are not at depth discontinuities, beside `EDGE`."""
 WORST_PX: Final = 20.0
-"""Displacement against the reference that is fully red."""
+"""Displacement from the reference at which points are fully red."""
 INITIAL: Final[Rgb] = (255, 75, 75)
 REFERENCE: Final[Rgb] = (255, 255, 255)
 LIMIT: Final[Rgb] = (150, 150, 150)
 GROUND: Final[Rgb] = (24, 26, 30)
-"""Behind pictures and words, in a light viewer too: dimmed pictures would wash out on white."""
+"""Background of images and text, also in the light theme, where dimmed images would wash out on white."""
 LETTERS: Final[Rgb] = (235, 236, 240)
 VERDICTS: Final[dict[str, Rgb]] = {
     "accepted": (110, 240, 140),
@@ -61,7 +61,7 @@ def depth_colors(depth: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def error_colors(displacement: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Turbo from blue, in place, to red, `WORST_PX` pixels off or more; ``[...]`` to ``[..., 3]`` uint8 RGB."""
+    """Turbo from blue (no error) to red (`WORST_PX` pixels or more); ``[...]`` to ``[..., 3]`` uint8 RGB."""
     level = np.clip(displacement / WORST_PX, 0.0, 1.0)
     colors: NDArray[np.uint8] = TURBO[(25 + 215 * level).astype(np.intp)]
     return colors
@@ -72,7 +72,7 @@ def flow_colors(displacement: NDArray[np.floating] | NDArray[np.integer], reach:
 
     Args:
         displacement: ``[..., 2]`` as ``(dx, dy)``.
-        reach: length, in the same unit, that is fully saturated.
+        reach: length, in the same unit, at which colours are fully saturated.
 
     Returns:
         ``[..., 3]`` uint8 RGB; red right, green down, cyan left, violet up.
@@ -101,7 +101,7 @@ def map_colors(values: NDArray[np.floating], low: float, high: float) -> NDArray
 
 
 def robust_limits(values: NDArray[np.floating]) -> tuple[float, float]:
-    """Second and 98th percentile: the contrast of a map that a few outliers must not decide."""
+    """Second and 98th percentile, as contrast limits of a map that outliers do not affect."""
     if values.size == 0:
         return 0.0, 1.0
     low, high = np.percentile(values.astype(np.float32), [2.0, 98.0])

@@ -8,12 +8,12 @@ from collections.abc import Container, Iterable, Sequence
 def markdown_table(
     heads: Sequence[str], rows: Iterable[Sequence[str]], aligned_right: Container[str] = ()
 ) -> list[str]:
-    """The lines of a table.
+    """The lines of a Markdown table.
 
     Args:
-        heads: of the columns.
-        rows: a cell for each column.
-        aligned_right: heads of the columns that are aligned to the right, as figures are; all others to the left.
+        heads: headings of the columns.
+        rows: rows of the table, with a cell for each column.
+        aligned_right: headings of the columns that are aligned to the right, such as figures.
     """
     ruler = "|".join("---:" if head in aligned_right else "---" for head in heads)
     return [_line(heads), f"|{ruler}|", *map(_line, rows)]

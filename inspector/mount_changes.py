@@ -1,4 +1,4 @@
-"""What watching a drive told, in words and as JSON."""
+"""The result of watching a drive, in words and as JSON."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ AXES = ("x", "y", "z", "pitch", "yaw", "roll")
 
 
 def word(watched: Watched) -> str:
-    """No change, changed or cannot tell."""
+    """The result in a word: no change, changed or cannot tell."""
     if watched.watch is None or watched.reason:
         return CANNOT_TELL
     return CHANGED if watched.watch.changes else NO_CHANGE
 
 
 def sentences(watched: Watched) -> Iterator[str]:
-    """One for each change; the last one says what came of it."""
+    """One sentence per change, and a last one with the result."""
     found = watched.watch
     for change in () if found is None else found.changes:
         yield said(change)
@@ -36,30 +36,30 @@ def sentences(watched: Watched) -> Iterator[str]:
         yield f"Changed: the mount moved {'once' if count == 1 else f'{count} times'} ({frames})."
     else:
         turn, shift = told_apart(found)
-        seen = f"A step of {turn:.2g}° or {shift:.0f} cm that lasts {WINDOW} frames would have been seen."
+        seen = f"A step of {turn:.2g}° or {shift:.0f} cm that lasts {WINDOW} frames would have been detected."
         yield f"No change ({frames}). {seen}"
 
 
 def said(change: Change) -> str:
-    """A change in a sentence."""
+    """A sentence on a change."""
     size = f"{change.rotation_deg:.2f}° / {change.translation_cm:.0f} cm"
     turn, shift = most(change)
     shifted = f" and {shift}" if change.translation_cm >= SMALLEST_CM else ""
     axes = f"most of it {turn}{shifted}" if change.rotation_deg >= SMALLEST_DEG else f"most of it {shift}"
-    sure = "more than 99.99 % sure" if change.confidence > 0.9999 else f"{100 * change.confidence:.4g} % sure"
+    sure = "confidence > 99.99 %" if change.confidence > 0.9999 else f"confidence {100 * change.confidence:.4g} %"
     if change.until is not None:
         return f"Frames {change.frame} to {change.until}: the mount drifts by {size} ({axes}; {sure})."
-    return f"Frame {change.frame}: the mount has moved by {size} ({axes}; {sure})."
+    return f"Frame {change.frame}: the mount moved by {size} ({axes}; {sure})."
 
 
 def most(change: Change) -> tuple[str, str]:
-    """The axes about and along which a change is largest."""
+    """The rotation and the translation of the axes in which a change is largest."""
     turn, shift = int(np.argmax(np.abs(change.offset[3:]))), int(np.argmax(np.abs(change.offset[:3])))
     return AXES[3 + turn], AXES[shift]
 
 
 def told_apart(found: Watch) -> tuple[float, float]:
-    """Degrees and centimetres, on the worst axis, by which two windows of frames differ surely: four deviations."""
+    """Smallest step, in degrees and centimetres on the worst axis, that two windows of frames show at 4σ."""
     return float(np.degrees(4 * found.smallest[3:].max())), float(100 * 4 * found.smallest[:3].max())
 
 

@@ -1,4 +1,4 @@
-"""Programs that are started here: Rerun's own binary, its viewer and its servers, and the ports that they listen on."""
+"""Starts other programs (Rerun's binary, viewer and servers), and finds the ports that they listen on."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from calibnet.errors import ConfigError
 
 LOCALHOST = "127.0.0.1"
 SWITCHED_OFF = ("0", "off", "false", "no")
-"""Values of the variable RERUN with which Rerun records nothing, without a word."""
+"""Values of the variable RERUN with which Rerun silently records nothing."""
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
 PR_SET_PDEATHSIG = 1
@@ -28,7 +28,7 @@ PR_SET_PDEATHSIG = 1
 
 
 def rerun_binary() -> str:
-    """The viewer's own binary: the `rerun` on PATH is a script that would outlive its signals."""
+    """Path of the viewer's own binary; the `rerun` on PATH is a script that does not pass signals on."""
     package = importlib.util.find_spec("rerun_cli")
     binary = Path(package.origin if package and package.origin else "").with_name(
         "rerun.exe" if os.name == "nt" else "rerun"
@@ -39,7 +39,7 @@ def rerun_binary() -> str:
 
 
 def open_command(file: Path) -> str:
-    """What to type to look at a recording."""
+    """The command that opens a recording."""
     program = "rerun"
     if shutil.which(program) is None:
         beside = Path(sys.executable).with_name(program)
@@ -48,10 +48,11 @@ def open_command(file: Path) -> str:
 
 
 def own_address() -> str:
-    """An address for servers of Rerun's, which only this machine reaches and no page from elsewhere can know.
+    """An address for Rerun's servers that only this machine reaches and that no web page can guess.
 
-    They answer requests that name any host, so that a page whose name leads to 127.0.0.1 could read what they show. On
-    Linux all of 127.0.0.0/8 is this machine, and the address is one of 16 million; other systems have but the one.
+    Rerun's servers answer requests that name any host, so a web page whose name resolves to 127.0.0.1 could read what
+    they show. On Linux all of 127.0.0.0/8 is this machine, so the address is one of 16 million; other systems have only
+    one.
     """
     if sys.platform != "linux":
         return LOCALHOST
@@ -62,7 +63,7 @@ def open_window(*shown: str) -> str:
     """Open Rerun's viewer in a window that outlives this process; returns the address to send it data.
 
     Args:
-        shown: what it opens with, files or addresses.
+        shown: files or addresses that it opens.
 
     Raises:
         ConfigError: it does not start.
@@ -80,9 +81,10 @@ def start_program(
 
     Args:
         command: the program.
-        port: that it opens.
-        host: address that it opens it at.
-        outlives_us: it goes on when this process ends, as a window does; else Linux ends it even if this one is killed.
+        port: port that it opens.
+        host: address on which it opens the port.
+        outlives_us: whether it goes on when this process ends, as a window does; otherwise Linux ends it even if this
+            process is killed.
     """
     process = subprocess.Popen(
         command,
@@ -93,11 +95,11 @@ def start_program(
     )
     deadline = time.monotonic() + START_TIMEOUT_S
     listening_since = None
-    # A viewer that finds no screen or graphics driver opens its port first and ends a moment later.
+    # A viewer that finds no display or graphics driver opens its port first and exits a moment later.
     while listening_since is None or time.monotonic() < listening_since + SETTLE_S:
         if process.poll() is not None or time.monotonic() > deadline:
             process.kill()
-            raise ConfigError("The Rerun viewer did not start; use --headless and look at the file later.")
+            raise ConfigError("The Rerun viewer did not start; use --headless, and open the file later.")
         if listening_since is None and listening(host, port):
             listening_since = time.monotonic()
         time.sleep(0.05)
@@ -105,7 +107,7 @@ def start_program(
 
 
 def end_with_parent() -> Callable[[], None] | None:
-    """What a child does before it becomes its program, so that it ends when we do; nothing where only Linux can."""
+    """A function for a child process to run before its program, so that it ends with this process; None off Linux."""
     if sys.platform != "linux":
         return None
     import ctypes
@@ -114,7 +116,7 @@ def end_with_parent() -> Callable[[], None] | None:
 
     def bind() -> None:
         libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != parent:  # it ended before the call
+        if os.getppid() != parent:  # the parent ended before the call
             os._exit(1)
 
     return bind

@@ -1,4 +1,4 @@
-"""What was found of all cameras of a rig: for the terminal, the viewer, JSON, recordings and other tools."""
+"""The result of a rig, camera by camera: for the terminal, the viewer, JSON, recordings and other tools."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
 COLUMNS = ("camera", "verdict", "off the reference", "uncertainty (1σ)", "camera alone", "corrected by", "match error")
-"""Columns of the table with a row per camera, what matters most first: a narrow window cuts off the rest."""
+"""Columns of the table with a row per camera, the most important first: a narrow window cuts off the last."""
 
 
 class Residual(NamedTuple):
-    """What a camera leaves unexplained.
+    """Residuals of a camera.
 
     Attributes:
-        match_error_px: median error that its last look expects of its matches; not a number where nothing says.
-        rotation_deg: from what was found to where its frames alone say that it is; None where it was solved alone.
-        translation_cm: likewise.
+        match_error_px: median error that its last look expects of its matches, in pixels; NaN where unknown.
+        rotation_deg: angle between the rig's result and that of this camera's own frames; None if solved alone.
+        translation_cm: distance between the two, likewise.
     """
 
     match_error_px: float = math.nan
@@ -31,21 +31,21 @@ class Residual(NamedTuple):
     translation_cm: float | None = None
 
     def as_dict(self) -> dict[str, float | None]:
-        """The form that JSON files hold."""
+        """The JSON object."""
         return self._asdict() | {"match_error_px": None if math.isnan(self.match_error_px) else self.match_error_px}
 
 
 @dataclass(frozen=True, eq=False)
 class CameraResult:
-    """What was found of one camera.
+    """The result of one camera.
 
     Attributes:
-        name: of the camera.
-        camera: as it is, lens included.
-        verdict: on what was found, with the extrinsic.
-        initial: ``camera_from_lidar`` that it started from.
-        residual: what it leaves unexplained.
-        reference: the true ``camera_from_lidar``, or None where nobody knows it.
+        name: the camera's name.
+        camera: the camera itself, lens included.
+        verdict: verdict on the result, with the extrinsic.
+        initial: initial ``camera_from_lidar``.
+        residual: its residuals.
+        reference: the true ``camera_from_lidar``; None where unknown.
     """
 
     name: str
@@ -57,24 +57,24 @@ class CameraResult:
 
     @property
     def error(self) -> PoseError | None:
-        """Of what was found; None where no reference is known."""
+        """Error of the result; None without a reference."""
         return None if self.reference is None else pose_error(self.verdict.camera_from_lidar, self.reference)
 
     def line(self) -> str:
-        """A sentence for the terminal."""
+        """The result in a sentence, for the terminal."""
         turned, shifted = self.verdict.moved
         said = f"{self.name}: {self.verdict.word}, corrected by {turned:.2f}° / {shifted:.1f} cm"
         if self.verdict.covariance is not None:
-            said += f", sure to {self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm"
+            said += f", ±{self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm (1σ)"
         if self.residual.rotation_deg is not None:
             alone = f"{self.residual.rotation_deg:.2f}° / {self.residual.translation_cm:.1f} cm"
-            said += f", {alone} from what its own frames say"
+            said += f", {alone} from the result of its own frames"
         if self.error is not None:
             said += f", off the reference by {self.error.rotation_deg:.2f}° / {self.error.translation_cm:.1f} cm"
         return f"{said}." if self.verdict.word == ACCEPTED else f"{said}. {explained(self.verdict)}"
 
     def row(self) -> list[str]:
-        """What a table says of it, by `COLUMNS`; empty where there is nothing to say."""
+        """The cells of its row, by `COLUMNS`; empty where a value is missing."""
         turned, shifted = self.verdict.moved
         residual, sure, off = self.residual, "", ""
         if self.verdict.covariance is not None:
@@ -88,7 +88,7 @@ class CameraResult:
         return [self.name, self.verdict.word, off, sure, alone, f"{turned:.2f}° / {shifted:.1f} cm", px]
 
     def recorded(self) -> dict[str, Any]:
-        """What a recording keeps of it, besides its pictures."""
+        """The JSON object that a recording keeps."""
         camera = self.camera
         return {
             "verdict": self.verdict.as_dict(),
@@ -107,12 +107,12 @@ class CameraResult:
 
 @dataclass(frozen=True)
 class RigResult:
-    """What was found of all cameras of a rig.
+    """The result of all cameras of a rig.
 
     Attributes:
-        cameras: in their order.
-        rigid: as one rigid rig.
-        tolerance: that each was allowed on the rig, as it was said; empty for none.
+        cameras: results of the cameras, in order.
+        rigid: whether they were solved as one rigid rig.
+        tolerance: standard deviation allowed for each camera's place on the rig, as given; empty for none.
     """
 
     cameras: tuple[CameraResult, ...]
@@ -121,30 +121,30 @@ class RigResult:
 
     @property
     def how(self) -> str:
-        """How the cameras were solved, for people."""
+        """How the cameras were solved, in words."""
         if self.tolerance:
             return f"as one rig, each within {self.tolerance} of its place on it"
-        return "as one rigid rig" if self.rigid else "each on its own"
+        return "as one rigid rig" if self.rigid else "one by one"
 
     @property
     def not_rejected(self) -> Iterator[CameraResult]:
-        """The cameras whose results may be used."""
+        """The cameras whose results are not rejected."""
         return (camera for camera in self.cameras if camera.verdict.word != REJECTED)
 
     @property
     def word(self) -> Word:
-        """Accepted if all cameras are, rejected if one is."""
+        """Accepted if all cameras are, rejected if one is, else cannot tell."""
         words = {camera.verdict.word for camera in self.cameras}
         return REJECTED if REJECTED in words else CANNOT_TELL if CANNOT_TELL in words else ACCEPTED
 
     def lines(self) -> Iterator[str]:
-        """Sentences for the terminal; the last one is the verdict on all."""
+        """Sentences for the terminal, of which the last is the verdict on the rig."""
         yield from (camera.line() for camera in self.cameras)
-        yield f"Verdict: {self.word}, of {len(self.cameras)} cameras {self.how}."
+        yield f"Verdict: {self.word} ({len(self.cameras)} cameras, solved {self.how})."
 
     @property
     def headline(self) -> str:
-        """How the cameras were solved, and how far from the truth they are at most or, unknown, from the start."""
+        """How the cameras were solved, and their largest error or, without a reference, their largest correction."""
         said = f"{len(self.cameras)} cameras, solved {self.how}"
         errors = [camera.error for camera in self.cameras if camera.error is not None]
         if len(errors) == len(self.cameras):
@@ -158,7 +158,7 @@ class RigResult:
         return "" if self.rigid and not self.tolerance else " at most"
 
     def table(self) -> tuple[list[str], list[list[str]]]:
-        """Columns that say something, and a row per camera, whose name is without the words that all begin with."""
+        """Headings of the columns that are not empty, and a row per camera, named without the prefix that all share."""
         rows = [camera.row() for camera in self.cameras]
         kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
         names = [camera.name for camera in self.cameras]
@@ -177,13 +177,13 @@ class RigResult:
             yield from (reason, "")
 
     def as_dict(self) -> dict[str, object]:
-        """The JSON object: ``cameras`` by name, each with what `Verdict.as_dict` says, and its residual."""
+        """The JSON object: ``cameras`` by name, each with its `Verdict.as_dict` and residuals."""
         cameras = {
             camera.name: camera.verdict.as_dict() | {"residual": camera.residual.as_dict()} for camera in self.cameras
         }
         return {"verdict": self.word, "rigid": self.rigid, "tolerance": self.tolerance or None, "cameras": cameras}
 
     def recorded(self) -> dict[str, Any]:
-        """What a recording keeps, besides pictures; `inspector.read.rig` reads it."""
+        """The JSON object that a recording keeps; `inspector.read.rig` reads it."""
         cameras = {camera.name: camera.recorded() for camera in self.cameras}
         return {"rigid": self.rigid, "tolerance": self.tolerance, "cameras": cameras}

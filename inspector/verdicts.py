@@ -1,4 +1,4 @@
-"""A verdict in words, for the terminal and the viewer, and that on several frames together."""
+"""Verdicts in words, for the terminal and the viewer, and one verdict on several frames."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
 
 OF_GIVEN = "Calibration as given"
-"""What `verify` judges, in a heading."""
-OF_RESULT = "What was found"
-"""What it is held against."""
+"""Heading of the verdict on the calibration that `verify` judges."""
+OF_RESULT = "Calibration found"
+"""Heading of the verdict on the result that it is compared with."""
 
 
 def line(verdict: Verdict) -> str:
@@ -22,29 +22,29 @@ def line(verdict: Verdict) -> str:
 
 
 def explained(verdict: Verdict) -> str:
-    """The reason, and what is likely to be wrong with the input."""
+    """The reason, and the likely causes in the input."""
     return " ".join([verdict.reason, *further_causes(verdict)])
 
 
 def further_causes(verdict: Verdict) -> list[str]:
-    """The causes' sentences that the reason does not say already."""
+    """Sentences on the causes that the reason does not contain already."""
     texts = dict.fromkeys(cause.text for cause in verdict.causes)  # two names may have the same sentence
     return [text for text in texts if text not in verdict.reason]
 
 
 def certainty(verdict: Verdict) -> str:
-    """How sure the result is, in degrees and centimetres; empty where nothing states it."""
+    """Uncertainty of the result in degrees and centimetres; empty where none is stated."""
     if verdict.covariance is None:
         return ""
     return f"±{verdict.sigma_rotation_deg:.2f}° / {verdict.sigma_translation_cm:.1f} cm (1σ)."
 
 
 def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
-    """The word as a heading, the reason, the causes with their evidence, and how sure the result is.
+    """The verdict as a heading, the reason, the causes with their evidence, and the uncertainty.
 
     Args:
-        verdict: what to say.
-        of: what it is on, where that is not the result of the run.
+        verdict: the verdict.
+        of: what it is a verdict on, where that is not the result of the run.
     """
     heading = f"{of}: {verdict.word}" if of else verdict.word.capitalize()
     lines = [f"# {heading}", "", verdict.reason, ""]
@@ -54,12 +54,12 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
 
 
 def _once(cause: Cause, verdict: Verdict) -> str:
-    """A cause's sentence and a space, unless the reason says it already."""
+    """A cause's sentence and a space, unless the reason contains it already."""
     return "" if cause.text in verdict.reason else f"{cause.text} "
 
 
 def counted(verdicts: Mapping[int, Verdict]) -> str:
-    """How many frames have each verdict, which do not pass, and why the first of them does not."""
+    """The number of frames with each verdict, with the numbers of those not accepted and the first one's reason."""
     parts = []
     for word in WORDS:
         frames = [frame for frame, verdict in verdicts.items() if verdict.word == word]
@@ -78,13 +78,13 @@ def of_frames(verdicts: Mapping[int, Verdict], initial: Extrinsic, skipped: Iter
     frame's is its own.
 
     Args:
-        verdicts: of the frames by their number, at least one.
-        initial: ``camera_from_lidar`` that the first of them started from, 4x4.
+        verdicts: verdicts by frame number, at least one.
+        initial: initial ``camera_from_lidar`` of the first frame, 4x4.
         skipped: frames that could not be used.
 
     Returns:
-        The verdict on the median of the frames that are not rejected, or of all if all are; it states no covariance,
-        for what frames get wrong alike only a drive's estimate knows.
+        The verdict on the median of the frames that are not rejected, or of all if all are. It has no covariance, since
+        only a drive's estimate accounts for errors that frames share.
     """
     single, *others = verdicts.values()
     if not others:
@@ -113,7 +113,7 @@ def majority(verdicts: Iterable[Verdict]) -> Word:
 
 
 def causes_of(verdicts: Iterable[Verdict]) -> tuple[Cause, ...]:
-    """One cause of each name, that of most frames first."""
+    """One cause of each name, the most frequent first."""
     found: dict[str, list[Cause]] = {}
     for verdict in verdicts:
         for cause in verdict.causes:

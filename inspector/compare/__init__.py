@@ -1,1 +1,1 @@
-"""Several recorded runs of one sequence side by side."""
+"""Compares several recorded runs of one sequence side by side."""

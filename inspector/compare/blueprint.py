@@ -1,6 +1,6 @@
 """The layout of a comparison: overlays side by side, curves of all runs in one plot, the table.
 
-The overlays are those of whole drives, of runs that solved theirs; each frame's own stand on the second tab.
+The overlays show the drive's result of runs that solved one; those of single frames are on the second tab.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from inspector.record.tabs.views import (
 
 COMPARISON_TABLE = "comparison/table"
 LEGEND_RUNS = "legend/runs"
-"""The names of the runs in the colours of their curves."""
+"""Legend with the names of the runs in the colours of their curves."""
 LARGEST_OVERLAY = 390.0
-"""Height in pixels beyond which curves and table would have too little room."""
+"""Largest height of overlays in pixels, which leaves room for curves and table."""
 TITLE_BAR = 64.0
 MOST_COLUMNS = 3
 HEADROOM = 1.1
-"""Over the largest error: curves start at zero, so that twice as high is twice as bad."""
+"""Upper limit of an error axis relative to the largest error; the axis starts at zero."""
 
 
 def make_comparison_blueprint(comparison: Comparison) -> rrb.Blueprint:
@@ -44,7 +44,7 @@ def make_comparison_blueprint(comparison: Comparison) -> rrb.Blueprint:
 
 
 def results_tab(comparison: Comparison) -> View:
-    """What each run arrived at: overlays, curves, table."""
+    """The tab of results: overlays, curves and table."""
     table = rrb.TextDocumentView(origin=f"/{COMPARISON_TABLE}", name="The runs in figures")
     below: View = table
     if any(run.run.has_reference for run in comparison.runs):
@@ -58,7 +58,7 @@ def results_tab(comparison: Comparison) -> View:
 
 
 def overlays_tab(comparison: Comparison) -> View:
-    """Start and truth above, what each run made of it below, of each frame alone as well where drives were solved."""
+    """The tab with start and reference above each run's results, which include single frames if drives were solved."""
     start = entities.OVERLAY_MISCALIBRATED
     if comparison.one_start:
         before = [_overlay(comparison, "Start of all runs", comparison.first.path(start))]
@@ -90,14 +90,14 @@ def _alone(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
 
 
 def _overlay(comparison: Comparison, name: str, points: str) -> rrb.Spatial2DView:
-    """Points over the frame's image; all views show the same part, whatever lies beside the image."""
+    """Points over the frame's image; all views show the same part, whatever lies outside the image."""
     cameras = [frame.camera for frame in comparison.first.frames]
     size = (max(camera.width for camera in cameras), max(camera.height for camera in cameras))
     return overlay_view(name, points, size)
 
 
 def _point_legends(comparison: Comparison) -> View:
-    """What the points' colours stand for: once, or for each run where they were recorded in different ones."""
+    """Legends of the points' colours: one, or one per run if the runs were recorded with different colours."""
     runs = comparison.runs[:1] if comparison.one_coloring else comparison.runs
     return rrb.Horizontal(*(legend("Colours of the points", run.path(entities.LEGEND_POINTS)) for run in runs))
 
@@ -111,7 +111,7 @@ def _curves(comparison: Comparison, kind: str, unit: str) -> rrb.TimeSeriesView:
 
 
 def _overlay_height(comparison: Comparison) -> float:
-    """Height of the overlays together, so that they fill the width of a screen of 1920 x 1080."""
+    """Height of all overlays together in pixels, so that they fill the width of a 1920 x 1080 screen."""
     camera = comparison.first.frames[0].camera
     columns = min(len(comparison.runs), MOST_COLUMNS)
     rows = -(-len(comparison.runs) // columns)

@@ -1,4 +1,4 @@
-"""Several recorded runs on the same frames: whether they may be compared, and their figures."""
+"""Several recorded runs on the same frames: whether they can be compared, and their figures."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.read.understood import RecordingError
 
 SAME_SETTINGS = ("sequence", "rig", "camera")
-"""What runs on the same data have in common."""
+"""Settings that runs on the same data have in common."""
 RESERVED = (entities.IMAGE, "overlay", "legend", "comparison")
-"""Paths of what all runs share."""
+"""Entity paths that all runs share, which cannot be names of runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +27,9 @@ class ComparedRun:
     """A run under the name it has in the comparison, with the frames that are compared.
 
     Attributes:
-        name: given by the user.
+        name: name given by the user.
         run: the recording.
-        frames: those that all runs have, in order.
+        frames: frames that all runs have, in order.
     """
 
     name: str
@@ -37,7 +37,7 @@ class ComparedRun:
     frames: tuple[RecordedFrame, ...] = field(repr=False)
 
     def path(self, entity: str) -> str:
-        """Where an entity of the run is in the comparison."""
+        """Path of one of the run's entities in the comparison."""
         return f"{rr.escape_entity_path_part(self.name)}/{entity}"
 
     @property
@@ -52,11 +52,11 @@ class ComparedRun:
 
     @cached_property
     def shows_drive(self) -> bool:
-        """Whether it has overlays of its drive; recordings of version 0.1.0 have only the drive's extrinsic."""
+        """Whether it has overlays of its drive; recordings of early versions have only the drive's extrinsic."""
         return next(self.run.chunks(entities.OVERLAY_DRIVE), None) is not None
 
     def distance(self, other: ComparedRun) -> Metrics:
-        """How far the result lies from another run's, frame by frame."""
+        """Distances of the results from another run's, frame by frame."""
         pairs = zip(self.frames, other.frames, strict=True)
         return Metrics.of([pose_error(mine.corrected, theirs.corrected) for mine, theirs in pairs])
 
@@ -79,7 +79,7 @@ class Comparison:
 
     @property
     def first(self) -> ComparedRun:
-        """What the others are compared with."""
+        """The run with which the others are compared."""
         return self.runs[0]
 
     @property
@@ -89,7 +89,7 @@ class Comparison:
 
     @property
     def title(self) -> str:
-        """For the viewer's list of recordings."""
+        """Title in the viewer's list of recordings."""
         names = " / ".join(run.name for run in self.runs)
         return f"{self.first.run.settings.get('sequence', 'frames')}: {names}"
 
@@ -105,7 +105,7 @@ class Comparison:
 
     @property
     def one_coloring(self) -> bool:
-        """Whether the points of all overlays are coloured by the same thing."""
+        """Whether the points of all overlays have the same colouring."""
         return len({run.run.settings.get("color") for run in self.runs}) == 1
 
     @classmethod
@@ -113,13 +113,13 @@ class Comparison:
         """Put runs side by side.
 
         Args:
-            runs: two or more.
-            names: as many, all different.
-            common_frames: compare the frames that all have, instead of insisting on the same ones.
+            runs: two or more runs.
+            names: names of the runs, all different.
+            common_frames: whether to compare the frames that all runs have, instead of requiring the same frames.
 
         Raises:
             ConfigError: a name cannot be used.
-            RecordingError: the runs are of different data or, without ``common_frames``, of different frames.
+            RecordingError: the runs have different data or, without ``common_frames``, different frames.
         """
         check_names(names)
         for run in runs[1:]:
@@ -150,7 +150,7 @@ def check_names(names: Sequence[str]) -> None:
     """Raise `ConfigError` where runs cannot be told apart by their names."""
     for position, name in enumerate(names):
         if not name or name in RESERVED:
-            raise ConfigError(f"A run cannot be called {name!r} in a comparison; give it another with --names.")
+            raise ConfigError(f"{name!r} is not a valid name for a run; give another one with --names.")
         if name in names[:position]:
             raise ConfigError(f"Two runs are called {name!r}; tell them apart with --names.")
 
@@ -164,8 +164,7 @@ def _check_same_data(one: RecordedRun, other: RecordedRun) -> None:
         mine, theirs = one.settings.get(setting), other.settings.get(setting)
         if mine != theirs:
             raise RecordingError(
-                f"{one.path} is of {setting} {mine!r} and {other.path} of {setting} {theirs!r}; "
-                "compare runs on the same data."
+                f"{one.path} has the {setting} {mine!r} and {other.path} has {theirs!r}; compare runs on the same data."
             )
 
 
@@ -175,6 +174,6 @@ def _check_same_frames(
     for a, b in zip(mine, theirs, strict=True):
         if a.source != b.source or not a.camera.same(b.camera):
             raise RecordingError(
-                f"Frame {a.index} is another picture or has another camera in {other.path} than in {one.path}; "
+                f"Frame {a.index} has a different image or camera in {other.path} than in {one.path}; "
                 "compare runs on the same data."
             )

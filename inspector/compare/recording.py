@@ -1,6 +1,6 @@
-"""Writing a comparison: the runs' overlays and error curves on one timeline, each run under its own name.
+"""Writes a comparison: the runs' overlays and error curves on one timeline, each run under its own name.
 
-Only what a view shows is copied; raw volumes and activations stay in the runs' own recordings.
+Only what a view shows is copied, without raw volumes and activations.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pyarrow import RecordBatch
 
 SHARED = (f"{entities.IMAGE}/**", f"{entities.OVERLAY_REFERENCE}/**")
-"""The same in all runs, and taken from one."""
+"""Entities that are the same in all runs, and are copied from the first."""
 OWN = tuple(
     f"{entity}/**"
     for entity in (
@@ -36,10 +36,10 @@ OWN = tuple(
         entities.LEGEND_POINTS,
     )
 )
-"""Entities of every run that are compared."""
+"""Entities that are copied from every run."""
 RUN_COLORS: tuple[Rgb, ...] = ((80, 170, 255), (255, 140, 40), (80, 220, 110), (190, 130, 255), (255, 205, 60))
 DRIVES_ARE_LEVEL = "flat line: whole drive as one"
-"""What the legend says of lines that are the same at all frames."""
+"""Text of the legend on lines that are the same at all frames."""
 CHUNKS_A_FLUSH = 16
 
 
@@ -51,11 +51,11 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> str:
         sinks: files and Rerun sinks, see `inspector.record.outputs`.
 
     Returns:
-        What a user has to know about how it was closed; empty for nothing.
+        A note for the user on how the recording was closed; empty for none.
 
     Raises:
         RecordingError: a run's recording is damaged.
-        RecordingLostError: nothing can be written any more.
+        RecordingLostError: the recording cannot be written any more.
     """
     blueprint = make_comparison_blueprint(comparison)
     stream = Stream(entities.COMPARISON_APPLICATION_ID, _recording_id(comparison), comparison.title, sinks, blueprint)
@@ -77,7 +77,7 @@ def record_comparison(comparison: Comparison, sinks: Sequence[Any]) -> str:
 
 
 def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
-    """Errors after the last stage, from the extrinsics: a recording need not have curves."""
+    """Log the errors of the result, computed from the extrinsics since a recording need not have curves."""
     errors = [error for frame in run.frames if (error := frame.error(frame.corrected)) is not None]
     if len(errors) < len(run.frames):
         return
@@ -98,7 +98,7 @@ def _log_curves(rec: rr.RecordingStream, run: ComparedRun, color: Rgb) -> None:
 
 
 def _copied(comparison: Comparison) -> Iterator[Chunk]:
-    """All chunks under their new paths, cut down to the frames that are compared."""
+    """All chunks under their new paths, reduced to the frames that are compared."""
     wanted = np.array(comparison.indices)
     referenced = [run for run in comparison.runs if run.run.has_reference]
     for chunk in (referenced or comparison.runs)[0].run.chunks(*SHARED):
@@ -110,7 +110,7 @@ def _copied(comparison: Comparison) -> Iterator[Chunk]:
 
 
 def _only(chunk: Chunk, frames: np.ndarray[Any, np.dtype[np.int64]]) -> list[Chunk]:
-    """The chunk's rows of some frames; what is said once stays as it is."""
+    """The chunk's rows of some frames; static data is kept as it is."""
     if chunk.is_static:
         return [chunk]
     batch: RecordBatch = chunk.to_record_batch()
@@ -121,7 +121,7 @@ def _only(chunk: Chunk, frames: np.ndarray[Any, np.dtype[np.int64]]) -> list[Chu
 
 
 def _recording_id(comparison: Comparison) -> str:
-    """The same for the same runs, frames and names."""
+    """A recording id that is the same for the same runs, frames and names."""
     runs = [(run.name, run.run.title, sorted(run.run.settings.items())) for run in comparison.runs]
     text = repr((runs, comparison.indices))
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""The text panel of a comparison: figures of every run, differences to the first, and what was set differently."""
+"""The text panel of a comparison: figures of every run, differences from the first, and differing settings."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from inspector.markdown import markdown_table
 from inspector.record.tabs.table import NOTHING
 
 RECORD_KEYS = ("samples", "minutes", "commit", "interim")
-"""What tells weights apart, of their training record."""
+"""Keys of a training record that tell weights apart."""
 UNCOMPARED = ("detail", "parts", "color")
-"""Settings that change what is shown and not what is computed."""
+"""Settings that affect what is shown but not what is computed."""
 
 Column = tuple[str, Callable[[Metrics], float], Callable[[float], str]]
 
@@ -43,22 +43,27 @@ COLUMNS: tuple[Column, ...] = (
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Markdown: errors, how far the results lie apart, and the settings that differ."""
+    """Markdown of errors, distances between results, and the settings that differ."""
     known = [run.corrected is not None for run in comparison.runs]
     lines = [*_drives(comparison), ""] if comparison.drives else []
     lines += [*_errors(comparison), ""] if any(known) else []
     if not all(known):
-        lines += ["*A run without a reference has no errors.*", ""]
-    lines += [f"### How far each frame's result lies from {comparison.first.name}'s", "", *_distances(comparison), ""]
-    return "\n".join([*lines, "### What was set differently", "", *_settings(comparison), ""])
+        lines += ["*Runs without a reference have no errors.*", ""]
+    lines += [
+        f"### Distance of each frame's result from that of {comparison.first.name}",
+        "",
+        *_distances(comparison),
+        "",
+    ]
+    return "\n".join([*lines, "### Settings that differ", "", *_settings(comparison), ""])
 
 
 def _drives(comparison: Comparison) -> list[str]:
-    """What each run made of the whole drive: its verdict, how far off it is and how sure of itself."""
+    """Each run's result for the whole drive: verdict, error and uncertainty."""
     first, with_errors = comparison.first, any(run.run.drive_error for run in comparison.runs)
-    off = ["off the reference by"] if with_errors else []
+    off = ["error"] if with_errors else []
     of_first = first.run.drive
-    away = [] if of_first is None else [f"from {first.name}'s"]
+    away = [] if of_first is None else [f"distance from {first.name}"]
     rows = []
     for run in comparison.runs:
         drive, verdict = run.run.drive, run.run.drive_verdict
@@ -69,7 +74,7 @@ def _drives(comparison: Comparison) -> list[str]:
         sure = None if verdict is None or verdict.covariance is None else verdict
         row.append(NOTHING if sure is None else f"{sure.sigma_rotation_deg:.2f}° / {sure.sigma_translation_cm:.1f} cm")
         rows.append(row)
-    return ["### Whole drive as one", "", *markdown_table(["", "verdict", *off, *away, "sure to (1σ)"], rows)]
+    return ["### Whole drive as one", "", *markdown_table(["", "verdict", *off, *away, "uncertainty (1σ)"], rows)]
 
 
 def _word(run: ComparedRun) -> str:
@@ -97,12 +102,12 @@ def _errors(comparison: Comparison) -> list[str]:
         "",
         *markdown_table(["", *(name for name, _, _ in COLUMNS)], rows),
         "",
-        f"Medians; p95: 95 % of the frames are below. In brackets the difference to **{first.name}**.",
+        f"Medians and 95th percentiles (p95); in brackets, the difference from **{first.name}**.",
     ]
 
 
 def _figures(metrics: Metrics | None, other: Metrics | None) -> list[str]:
-    """One cell a column, with the difference to ``other`` where there is one."""
+    """One cell per column, with the difference from ``other`` where there is one."""
     if metrics is None:
         return [NOTHING] * len(COLUMNS)
     cells = []
@@ -132,7 +137,7 @@ def _settings(comparison: Comparison) -> list[str]:
 
 
 def _described(run: ComparedRun) -> dict[str, Any]:
-    """Settings, versions and weights of a run by a name for people."""
+    """Settings, versions and weights of a run, by names for people."""
     settings = {"method": CASCADE} | {k: value for k, value in run.run.settings.items() if k not in UNCOMPARED}
     versions = {f"version of {name}": value for name, value in run.run.provenance.items()}
     weights = {

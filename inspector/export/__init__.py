@@ -1,1 +1,1 @@
-"""A recorded extrinsic in the formats of other tools."""
+"""Exports a recorded extrinsic in the formats of other tools."""

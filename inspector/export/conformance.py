@@ -1,4 +1,4 @@
-"""What an export format promises: `check_export_format`."""
+"""Checks that an export format keeps its contract: `check_export_format`."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from calibnet.geometry import CameraModel, miscalibration, transform
 from inspector.export.exported import Exported
 
 SMALLEST = 1e-6
-"""Metres and degrees that a file must still tell apart: a micrometre."""
+"""Smallest change, in metres or degrees, that a file must show."""
 
 
 def check_export_format(write: Callable[[Exported], str]) -> None:
-    """Hold a format to its promises: whole lines of text that say their source and have every figure in full.
+    """Check that a format writes whole lines of text that name their source and have every figure in full.
 
     Args:
-        write: the format, as it is registered.
+        write: the format's function, as registered.
 
     Raises:
-        AssertionError: a promise is not kept; the sentence says which.
+        AssertionError: a check fails; the sentence says which.
     """
     exported = example()
     text = write(exported)
-    require(isinstance(text, str), f"The format returns {type(text).__name__} and not text.")
+    require(isinstance(text, str), f"The format returns {type(text).__name__} instead of text.")
     require(text.endswith("\n"), "The file does not end with a line break.")
-    require(write(example()) == text, "The same calibration gives another file.")
+    require(write(example()) == text, "The same calibration gives different files.")
     require(exported.origin in text, "The file does not say where the calibration comes from (`Exported.origin`).")
     for axis, name in enumerate(("roll", "pitch", "yaw", "x", "y", "z")):
         change = SMALLEST * np.eye(6)[axis]
         moved = miscalibration(change[:3], change[3:]) @ exported.camera_from_lidar
         other = write(replace(exported, camera_from_lidar=moved))
-        require(other != text, f"The file does not tell a change of {SMALLEST:g} (degrees or metres) of {name}.")
+        require(other != text, f"The file does not show a change of {SMALLEST:g} (degrees or metres) in {name}.")
     require(np.array_equal(exported.camera_from_lidar, example().camera_from_lidar), "The format changes its input.")
 
 

@@ -1,4 +1,4 @@
-"""What an export says: one extrinsic, its camera and where both come from."""
+"""The content of an export: one extrinsic, its camera and their origin."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from inspector.verdicts import explained
 
 
 class FrameNames(NamedTuple):
-    """What a robot calls the two coordinate frames, and whether the LiDAR's is the parent; for formats that say it."""
+    """Names of the two coordinate frames, and whether the LiDAR's is the parent, for formats that use them."""
 
     camera: str = "camera_optical_frame"
     lidar: str = "lidar"
@@ -26,14 +26,14 @@ class FrameNames(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """A calibration on its way to another tool.
+    """A calibration to be exported.
 
     Attributes:
         camera_from_lidar: 4x4, metres.
-        camera: as it is, lens included.
-        origin: where it comes from, for the file's comment; says so where that is not accepted.
+        camera: the camera itself, lens included.
+        origin: origin of the calibration for the file's comment, with the verdict where it is not accepted.
         frames: names of the two coordinate frames.
-        verdict: whether it is good, of a recording; None where nothing says.
+        verdict: verdict on the calibration; None where there is none.
     """
 
     camera_from_lidar: Extrinsic = field(repr=False)
@@ -49,7 +49,7 @@ class Exported:
 
 
 def exported_frame(run: RecordedRun, index: int) -> Exported:
-    """The extrinsic that was found in one frame, exactly, whether or not it is accepted.
+    """The exact result of one frame, accepted or not.
 
     Raises:
         RecordingError: the recording has no such frame.
@@ -59,18 +59,20 @@ def exported_frame(run: RecordedRun, index: int) -> Exported:
             found = frame.verdict.camera_from_lidar
             return _judged(found, frame.camera, f"{run.title}, frame {index}", frame.verdict)
     first, last = run.frames[0].index, run.frames[-1].index
-    raise RecordingError(f"{run.path} has no complete frame {index}, only frames from {first} to {last}; choose one.")
+    raise RecordingError(f"{run.path} has no complete frame {index}; choose one from {first} to {last}.")
 
 
 def exported_median(run: RecordedRun) -> Exported:
-    """The median of what was found in the frames that are not rejected, or in all if all are; see `median_pose`.
+    """The median of the results of the frames that are not rejected, or of all if all are; see `median_pose`.
 
     Raises:
-        RecordingError: the frames are not all of one camera on one mount.
+        RecordingError: the frames do not share one camera and one mount.
     """
     camera = run.frames[0].camera
     if not (run.one_mount and all(camera.same(frame.camera) for frame in run.frames)):
-        raise RecordingError(f"The frames of {run.path} are of several cameras or mounts; choose one with --frame.")
+        raise RecordingError(
+            f"The frames of {run.path} come from several cameras or mounts; choose one frame with --frame."
+        )
     count = sum(not frame.rejected for frame in run.frames) or len(run.frames)
     origin = f"{run.title}, median of {count} frame{'' if count == 1 else 's'}"
     verdict = run.frames_verdict
@@ -81,7 +83,7 @@ def exported_drive(run: RecordedRun) -> Exported:
     """The extrinsic that the run solved from all frames together.
 
     Raises:
-        RecordingError: the run did not do that.
+        RecordingError: the run did not solve a drive.
     """
     if run.drive is None:
         raise RecordingError(
@@ -92,12 +94,12 @@ def exported_drive(run: RecordedRun) -> Exported:
 
 
 def exported_camera(result: CameraResult) -> Exported:
-    """What was found of one camera of a rig, whether or not it is accepted."""
+    """The result of one camera of a rig, accepted or not."""
     return _judged(result.verdict.camera_from_lidar, result.camera, f"rig, camera {result.name}", result.verdict)
 
 
 def exported_folder(folder: Path) -> Exported:
-    """The calibration of a plain folder: of its ``calibration.yaml``, or the file of another tool.
+    """The calibration of a plain folder, from its ``calibration.yaml`` or the file of another tool.
 
     Raises:
         DatasetError: the file is missing or malformed, or lacks camera or extrinsic.
@@ -107,7 +109,7 @@ def exported_folder(folder: Path) -> Exported:
 
 
 def _judged(extrinsic: Extrinsic, camera: CameraModel, origin: str, verdict: Verdict | None) -> Exported:
-    """What a recording says."""
+    """A calibration with the verdict of its recording."""
     if verdict is not None and verdict.word != ACCEPTED:
         origin = f"{origin}; {verdict.word}: {explained(verdict)}"
     return Exported(extrinsic, camera, origin, verdict=verdict)

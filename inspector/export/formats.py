@@ -1,4 +1,4 @@
-"""A calibration as text that other tools read. Every format says its own convention."""
+"""Formats of a calibration as text for other tools, each of which states its convention."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ CONVENTION = f"camera_from_lidar maps LiDAR points into the camera, x_camera = R
 def as_kitti(exported: Exported) -> str:
     """A ``calib.txt`` of KITTI odometry: ``P0`` to ``P3`` and ``Tr``, 3x4 row by row.
 
-    All four cameras are the calibrated one, so that tools for whichever of them work. Comments come
-    last and look like entries, for readers take every line for one.
+    All four cameras are the calibrated one, so that tools that use any of them work. Comments come last and look like
+    entries, since readers parse every line.
     """
     projection = np.hstack([exported.camera.matrix, np.zeros((3, 1))])
     lines = [_entry(f"P{camera}", projection) for camera in range(4)]
@@ -30,14 +30,14 @@ def as_kitti(exported: Exported) -> str:
     lines.append("# cameras: P0 to P3 are the same rectified camera, pixels = P0 Tr x_lidar, without baseline")
     if not exported.camera.is_pinhole:
         named = ", ".join(f"{name} {value!r}" for name, value in lens(exported.camera).items())
-        lines.append(f"# lens: this format has no lens; rectify the pictures with the same matrix first, of {named}")
+        lines.append(f"# lens: this format has no lens; first rectify the images, with the same matrix, from {named}")
     lines += [f"# {line}" for line in covariance_lines(exported)]
     lines.append(f"# source: calib-inspect, {exported.origin}")
     return "\n".join([*lines, ""])
 
 
 def as_ros(exported: Exported) -> str:
-    """A ROS 2 launch file (YAML) of a static transform, with the same as a command line in its comment."""
+    """A ROS 2 launch file (YAML) of a static transform, with the equivalent command line in a comment."""
     frames, lidar_is_parent = exported.frames, exported.frames.lidar_is_parent
     parent, child = (frames.lidar, frames.camera) if lidar_is_parent else (frames.camera, frames.lidar)
     parent_from_child = invert(exported.camera_from_lidar) if lidar_is_parent else exported.camera_from_lidar
@@ -65,7 +65,7 @@ def as_ros(exported: Exported) -> str:
 
 
 def as_opencv(exported: Exported) -> str:
-    """A YAML file for ``cv2.FileStorage``; ``rvec`` and ``tvec`` are what ``cv2.projectPoints`` takes."""
+    """A YAML file for ``cv2.FileStorage``, with ``rvec`` and ``tvec`` as ``cv2.projectPoints`` takes them."""
     storage = cv2.FileStorage(".yaml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     storage.writeComment(CONVENTION)
     storage.writeComment("camera_matrix in pixels, their centres at integers; distortion is that of the raw images")
@@ -85,7 +85,7 @@ def as_opencv(exported: Exported) -> str:
 
 
 def as_json(exported: Exported) -> str:
-    """One object; the key ``convention`` says what the matrices mean."""
+    """One JSON object, whose key ``convention`` states what the matrices mean."""
     matrix = exported.camera_from_lidar
     content = {
         "convention": f"{CONVENTION}; quaternion x y z w; pixel centres at integers",
@@ -105,7 +105,7 @@ def as_json(exported: Exported) -> str:
 
 
 def as_calibration(exported: Exported) -> str:
-    """A ``calibration.yaml`` as plain folders have it, which `calib-inspect folder` reads again."""
+    """The ``calibration.yaml`` of a plain folder, which `calib-inspect folder` reads."""
     camera, matrix = exported.camera, exported.camera_from_lidar
     of_lens = {"distortion_model": camera.model, **camera.named, "distortion": camera.distortion.tolist()}
     content = {"width": camera.width, "height": camera.height, "camera_matrix": camera.matrix.tolist(), **of_lens}
@@ -124,7 +124,7 @@ def as_calibration(exported: Exported) -> str:
 
 
 def lens(camera: CameraModel) -> dict[str, str | float | list[float]]:
-    """A lens as files name it: its model, coefficients with names of their own, and the rest in OpenCV's order."""
+    """The lens as files store it: model, coefficients with names of their own, and the others in OpenCV's order."""
     of_model: dict[str, str | float | list[float]] = {"distortion_model": camera.model, **camera.named}
     return of_model | {"distortion_coefficients": camera.distortion.tolist()}
 

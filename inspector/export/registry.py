@@ -1,7 +1,7 @@
-"""The export formats by name; those of other packages register as ``calib_inspect.exports``.
+"""The export formats by name, including those that other packages register as ``calib_inspect.exports``.
 
 A format is a function from `inspector.export.exported.Exported` to the text of a file;
-`inspector.export.conformance.check_export_format` tests one. One of ours needs one line in `FORMATS`.
+`inspector.export.conformance.check_export_format` tests one. A new one of ours needs one line in `FORMATS`.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ FORMATS = Registry(
 SUFFIXES = {"json": "json", "koide3": "json", "urdf": "urdf"} | dict.fromkeys(
     ("ros", "yaml", "opencv", "autoware"), "yaml"
 )
-"""What names of files end with, by format."""
+"""File name suffixes by format."""
 
 
 def suffix_of(form: str) -> str:
-    """What the name of a format's file ends with, without the dot."""
+    """The file name suffix of a format, without the dot."""
     return SUFFIXES.get(form, "txt")
 
 
 def kind_of_export(text: str) -> Kind:
-    """What the text of a file is, as `calibnet.runtime.writing` tells one file from another."""
+    """The kind of an exported file, by its text, as `calibnet.runtime.writing` knows kinds."""
     return Kind.JSON if text.startswith("{") else Kind.EXPORT
 
 
@@ -51,8 +51,8 @@ def export_as(name: str, exported: Exported) -> str:
     """A calibration as the text of a file.
 
     Args:
-        name: of the format, one of ``FORMATS.names()``.
-        exported: what to write.
+        name: name of the format, one of ``FORMATS.names()``.
+        exported: the calibration.
 
     Raises:
         ConfigError: there is no such format, or its package is broken.
@@ -60,6 +60,6 @@ def export_as(name: str, exported: Exported) -> str:
     text = FORMATS.load(name)(replace(exported, origin=one_line(exported.origin)))
     if not isinstance(text, str):
         raise ConfigError(
-            f"The export format {name!r} gives {type(text).__name__} instead of text; update its package."
+            f"The export format {name!r} returns {type(text).__name__} instead of text; update its package."
         )
     return text

@@ -1,4 +1,4 @@
-"""A calibration as robots' descriptions have it: URDF, Autoware's sensor calibration, koide3's calib.json."""
+"""Formats of a calibration in robotics: URDF, Autoware's sensor calibration, koide3's calib.json."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from inspector.export.exported import Exported
 from inspector.export.formats import AXES, OF_COVARIANCE, covariance_lines, quaternion_xyzw
 
 KOIDE_MODELS = {"plumb_bob": "plumb_bob", "equidistant": "fisheye", "omnidirectional": "omnidir"}
-"""Lenses that koide3's tool knows, by its names."""
+"""Lens models that koide3's tool supports, and their names there."""
 
 
 def as_urdf(exported: Exported) -> str:
-    """A fixed joint of a robot's description; ``origin`` is the pose of the child in the parent."""
+    """A fixed joint of a URDF, whose ``origin`` is the pose of the child in the parent."""
     frames = exported.frames
     parent, child = (frames.lidar, frames.camera) if frames.lidar_is_parent else (frames.camera, frames.lidar)
     pose = invert(exported.camera_from_lidar) if frames.lidar_is_parent else exported.camera_from_lidar
@@ -46,7 +46,7 @@ def as_urdf(exported: Exported) -> str:
 def as_autoware(exported: Exported) -> str:
     """Autoware's ``sensor_kit_calibration.yaml`` with the LiDAR as the kit's base.
 
-    Its ``camera_link`` stands like a body, x forward; the image's frame hangs on it by Autoware's own quarter turns.
+    Its ``camera_link`` is oriented like a body, x forward; Autoware itself adds the rotation to the optical frame.
     """
     name = exported.frames.camera
     for suffix in ("_optical_frame", "_optical_link", "_optical"):
@@ -75,12 +75,14 @@ def as_koide3(exported: Exported) -> str:
     """``calib.json`` of direct_visual_lidar_calibration; its ``T_lidar_camera`` is the camera in the LiDAR's frame.
 
     Raises:
-        ConfigError: that tool has no such lens.
+        ConfigError: that tool does not support the lens.
     """
     camera, pose = exported.camera, invert(exported.camera_from_lidar)
     model = KOIDE_MODELS.get(camera.model)
     if model is None:
-        raise ConfigError(f"koide3's calib.json has no {camera.model} lens; export as json, opencv or yaml.")
+        raise ConfigError(
+            f"koide3's calib.json does not support the lens {camera.model}; export as json, opencv or yaml."
+        )
     (fx, _, cx), (_, fy, cy), _ = camera.matrix.tolist()
     content = {
         "camera": {

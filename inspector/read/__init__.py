@@ -1,1 +1,1 @@
-"""Reading recordings back: files, runs, sizes, and pictures of the viewer."""
+"""Reads recordings back: files, runs, sizes, and pictures of the viewer."""

@@ -1,4 +1,4 @@
-"""Opening the file of a recording, whole or cut off, and streaming the chunks of a few entities."""
+"""Opens the file of a recording, complete or cut off, and streams the chunks of a few entities."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 REPAIR_S = 300.0
-"""Time that the repair of a file may take."""
+"""Largest time for the repair of a file, in seconds."""
 
 
 class RecordingFile:
@@ -35,11 +35,11 @@ class RecordingFile:
     """
 
     def __init__(self, path: Path, applications: Sequence[str] = (entities.APPLICATION_ID,)) -> None:
-        """Open the file; nothing but its footer is read yet.
+        """Open the file and read only its footer.
 
         Args:
             path: the file.
-            applications: of `entities`, one of which must have recorded it.
+            applications: ids from `entities`, one of which must have recorded the file.
 
         Raises:
             RecordingError: there is no such file, it is not a recording, not ours, or too damaged.
@@ -47,10 +47,10 @@ class RecordingFile:
         self.path = path
         self._applications = applications
         self.cut = False
-        self._copy: tempfile.TemporaryDirectory[str] | None = None  # lives as long as this object
+        self._copy: tempfile.TemporaryDirectory[str] | None = None  # kept as long as this object
         if not path.exists():
-            raise RecordingError(f"There is no recording {path}; check the path, or make one with --save {path}.")
-        require_file(path, "Recording", None, RecordingError, "give a recording that calib-inspect made")
+            raise RecordingError(f"{path} does not exist; check the path, or make a recording with --save {path}.")
+        require_file(path, "Recording", None, RecordingError, "give a recording made by calib-inspect")
         if kind_of_file(path) is not Kind.RECORDING:
             raise self._unreadable()
         self._named = self._name_for_rerun()
@@ -58,7 +58,7 @@ class RecordingFile:
         self._entry = self._ours(entries)
 
     def chunks(self, *paths: str) -> Iterator[Chunk]:
-        """Every chunk of some entities.
+        """All chunks of some entities.
 
         Args:
             paths: entity paths or patterns such as ``extrinsic/**``; chunks of others are not read.
@@ -76,7 +76,7 @@ class RecordingFile:
                 ) from None
 
     def _name_for_rerun(self) -> Path:
-        """The file; under another name where its own is no UTF-8, which Rerun takes for no name at all."""
+        """The file, under another name if its own is not UTF-8, which Rerun does not accept."""
         try:
             str(self.path).encode()
         except UnicodeEncodeError:
@@ -87,7 +87,7 @@ class RecordingFile:
         return self.path
 
     def _open(self) -> tuple[RrdReader, list[StoreEntry]]:
-        """The file's reader and what the file holds; of a copy where the file ends within a chunk."""
+        """The file's reader and entries; those of a repaired copy if the file ends within a chunk."""
         with understood(self.path), warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             with contextlib.suppress(RuntimeError, ValueError):
@@ -101,7 +101,7 @@ class RecordingFile:
         raise self._unreadable()
 
     def _repaired_copy(self) -> Path:
-        """Everything that precedes the cut, in a file that the reader accepts; of a foreign file, no such file."""
+        """A copy of everything before the cut, which the reader accepts; for a foreign file, it does not exist."""
         self._copy = tempfile.TemporaryDirectory(prefix="calib-inspect-")
         copy = Path(self._copy.name) / "repaired.rrd"
         command = [rerun_binary(), "rrd", "filter", "--drop-entity", "/none", str(self._named), "-o", str(copy)]
@@ -118,13 +118,12 @@ class RecordingFile:
         others = ", ".join(sorted({repr(entry.application_id) for entry in entries}))
         raise RecordingError(
             f"{self.path} was recorded by {others}, not by calib-inspect seq, raw, object, folder or demo; "
-            "give a recording that one of these made."
+            "give a recording made by one of these."
         )
 
     def _unreadable(self) -> RecordingError:
         return RecordingError(
-            f"{self.path} is not a Rerun recording, or so much of it is missing that nothing can be read; "
-            "copy it again or record it again."
+            f"{self.path} is not a Rerun recording, or too much of it is missing; copy it again or record it again."
         )
 
 

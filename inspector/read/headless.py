@@ -1,4 +1,4 @@
-"""Rerun's viewer without a window: it shows a recording, is told what to show, and hands out pictures of itself."""
+"""Rerun's viewer without a window, which shows a recording and takes pictures of itself."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from inspector.read.viewer_hand import press
 PATIENCE_S: Final = 120.0
 PAUSE_S: Final = 0.3
 STILL_S: Final = 1.2
-"""A window that has stayed the same for so long, over `STILL_PICTURES` pictures, has all its data."""
+"""Seconds, over `STILL_PICTURES` pictures, after which an unchanged window has all its data."""
 STILL_PICTURES: Final = 3
 VULKAN_HINT: Final = "without a graphics card it needs a Vulkan driver; Debian: apt-get install -y mesa-vulkan-drivers"
 DARK, LIGHT = "dark", "light"
 
 Page = tuple[str, ...]
-"""Names of the tabs that lead to a page, outer first, for instance ``("Cost volumes", "Stage 3 (±5°/0.5 m)")``."""
+"""Path of tabs to a page, outermost first, for instance ``("Cost volumes", "Stage 3 (±5°/0.5 m)")``."""
 
 
 class HeadlessViewer:
-    """A viewer without a window that shows one recording; a context manager that ends its process.
+    """A viewer without a window that shows one recording; as a context manager, it ends its process.
 
     Attributes:
-        client: Rerun's own interface to it.
+        client: Rerun's interface to the viewer.
     """
 
     client: ViewerClient
 
     def __init__(self, width: int = 1920, height: int = 1080, theme: str = DARK) -> None:
-        """Say how large the window would be, in pixels, and whether it is `DARK` or `LIGHT`."""
+        """Set the size of the window in pixels and its theme, `DARK` or `LIGHT`."""
         self._size, self._theme = f"{width}x{height}", theme
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -50,7 +50,7 @@ class HeadlessViewer:
         except ConfigError as error:
             raise ConfigError(f"{error} ({VULKAN_HINT})") from None
         self.client = ViewerClient.connect(f"rerun+http://{host}:{port}/proxy")
-        if self._theme != DARK:  # which it begins with
+        if self._theme != DARK:  # the viewer starts in the dark theme
             self.client.run_command("ui.open_settings")
             press(f"http://{host}:{port}", self._theme.capitalize())
         return self
@@ -84,11 +84,11 @@ class HeadlessViewer:
         return None
 
     def show_time(self, timeline: str, value: int) -> None:
-        """Stand at a place of a timeline, paused."""
+        """Move to a place on a timeline, paused."""
         self.client.set_time(timeline, sequence=value, play_state="paused")
 
     def pages(self) -> list[Page]:
-        """Every page of every tab, as the blueprint orders them; one without a name where nothing has tabs."""
+        """Every page of every tab, in the blueprint's order; one without a name if there are no tabs."""
         blueprint = self._blueprint()
         outer = list(_outer_tabs(blueprint, _root(blueprint)))
         return [page for tabs in outer for page in _pages(blueprint, tabs)] or [()]
@@ -123,7 +123,7 @@ class HeadlessViewer:
                     break
             time.sleep(PAUSE_S)
         if not last:
-            raise ConfigError("The viewer did not answer; the machine may be too busy: try again.")
+            raise ConfigError("The viewer did not answer; try again when the machine is less busy.")
         return last
 
     def _blueprint(self) -> dict[str, Any]:
@@ -132,12 +132,12 @@ class HeadlessViewer:
 
 
 def _root(blueprint: dict[str, Any]) -> str:
-    """The container with all others in it."""
+    """The container that holds all others."""
     return f"container/{blueprint['/viewport']['ViewportBlueprint']['root_container']}"
 
 
 def _container(blueprint: dict[str, Any], part: str) -> dict[str, Any]:
-    """The fields of a container; none of a view, which may have nothing that differs from the viewer's defaults."""
+    """The fields of a container; empty for a view, all of whose properties may be the viewer's defaults."""
     fields: dict[str, Any] = blueprint.get(f"/{part}", {}).get("ContainerBlueprint", {})
     return fields
 
@@ -148,7 +148,7 @@ def _parts(blueprint: dict[str, Any], here: str) -> list[str]:
 
 
 def _outer_tabs(blueprint: dict[str, Any], here: str) -> Iterator[str]:
-    """The containers with tabs that lie in no other such, for a user may put ours among views of theirs."""
+    """The outermost containers with tabs; a user may have put ours among views of their own."""
     if _container(blueprint, here).get("container_kind") == "Tabs":
         yield here
         return

@@ -1,4 +1,4 @@
-"""The pictures of a recording: images, and points drawn over them, read when they are asked for."""
+"""The images of a recording and the points drawn over them, read on demand."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class OverlayPoints(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedPictures:
-    """The pictures of one camera, which lie below a prefix where a recording has several.
+    """The pictures of one camera.
 
     Attributes:
-        file: of the recording.
-        prefix: of the entities' paths.
+        file: the recording's file.
+        prefix: prefix of the entity paths, where a recording has several cameras.
     """
 
     file: RecordingFile
@@ -58,5 +58,5 @@ class RecordedPictures:
                 if found.size:
                     return [batch[component][int(found[-1])] for component in components]
         raise RecordingError(
-            f"{self.file.path} holds no {entity} of frame {index}; choose another frame, or record again."
+            f"{self.file.path} has no {entity} of frame {index}; choose another frame, or record again."
         )

@@ -1,4 +1,4 @@
-"""The recording of a rig read back: what was found of every camera and, on demand, their pictures."""
+"""Reads the recording of a rig: the result of every camera and, on demand, its pictures."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from inspector.rig_result import CameraResult, Residual, RigResult
 
 @dataclass(frozen=True, eq=False)
 class RecordedRig:
-    """What a recording says of a rig.
+    """The recording of a rig.
 
     Attributes:
-        path: the recording.
-        title: of it.
+        path: the recording's file.
+        title: its title.
         settings: the options that identify the run.
-        solved: what was found.
-        moments: numbers of the frames that are shown, by camera.
+        solved: the result.
+        moments: numbers of the recorded frames, by camera.
     """
 
     path: Path
@@ -39,10 +39,10 @@ class RecordedRig:
     _file: RecordingFile = field(repr=False)
 
     def camera(self, name: str) -> CameraResult:
-        """One of the cameras.
+        """The result of a camera.
 
         Raises:
-            RecordingError: there is none of this name.
+            RecordingError: there is no camera of this name.
         """
         for camera in self.solved.cameras:
             if camera.name == name:
@@ -56,7 +56,7 @@ class RecordedRig:
 
 
 def is_rig(path: Path) -> bool:
-    """Whether a recording of ours is one of a rig; false for what `inspector.read.run.read_run` reads, or refuses."""
+    """Whether a file is the recording of a rig; all others are for `inspector.read.run.read_run` to read or refuse."""
     return _said(RecordingFile(path)) is not None
 
 
@@ -64,7 +64,7 @@ def read_rig(path: Path) -> RecordedRig:
     """Read everything but the pictures.
 
     Raises:
-        RecordingError: the file is missing, damaged, foreign or no recording of a rig.
+        RecordingError: the file is missing, damaged, foreign or not the recording of a rig.
     """
     file = RecordingFile(path)
     with understood(path):
@@ -110,7 +110,7 @@ def _lens(said: dict[str, Any], path: Path) -> CameraModel:
 
 
 def _said(file: RecordingFile) -> str | None:
-    """The JSON text of a rig; None where the recording is of something else."""
+    """The JSON text of a rig; None for other recordings."""
     text = _static(file, entities.RIG).get(entities.RIG_JSON)
     return None if not text else str(text[0])
 
@@ -121,7 +121,7 @@ def _static(file: RecordingFile, entity: str) -> dict[str, list[Any]]:
 
 
 def _moments(file: RecordingFile, name: str) -> tuple[int, ...]:
-    """Frames of which a camera has a picture."""
+    """Numbers of the frames of which a camera has a picture."""
     frames: set[int] = set()
     for chunk in file.chunks(f"{entities.camera_of_rig(name)}/{entities.IMAGE}"):
         frames |= set(np.asarray(chunk.to_record_batch()[entities.FRAME]).tolist())

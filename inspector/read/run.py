@@ -1,4 +1,4 @@
-"""A recording read back: settings, extrinsics and, on demand, the pictures of a frame.
+"""Reads a recording: settings, extrinsics and, on demand, the pictures of a frame.
 
 Comparisons, checks, exports and reports read nothing else, so whoever has the ``.rrd`` can make them.
 """
@@ -47,15 +47,14 @@ class RecordedFrame:
 
     Attributes:
         index: the frame's number in its sequence.
-        seconds: since the sequence's first frame.
+        seconds: time since the sequence's first frame.
         source: name of its image file.
-        camera: its own camera, as it is, lens included.
-        initial: ``camera_from_lidar`` that the run started from, 4x4.
-        corrected: ``camera_from_lidar`` that the run ended with: the last stage's, or the initial one where that is
-            rejected.
+        camera: the frame's own camera, lens included.
+        initial: initial ``camera_from_lidar``, 4x4.
+        corrected: resulting ``camera_from_lidar``: that of the last stage, or the initial one where that is rejected.
         stages: ``camera_from_lidar`` after every stage by its number, coarse to fine.
-        reference: the true one, or None where nobody knows it.
-        verdict: whether the result is good; a recording without verdicts tells only whether it was applied.
+        reference: the true ``camera_from_lidar``; None where unknown.
+        verdict: verdict on the result; for a recording without verdicts, only whether the result was applied.
     """
 
     index: int
@@ -70,7 +69,7 @@ class RecordedFrame:
 
     @property
     def rejected(self) -> bool:
-        """Whether what the last stage found is taken to be wrong, so that the frame was left as it was."""
+        """Whether the result was rejected, so that the frame kept its initial extrinsic."""
         return self.verdict.word == REJECTED
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
@@ -80,7 +79,7 @@ class RecordedFrame:
 
 @dataclass(frozen=True, eq=False)
 class RecordedRun:
-    """A whole run; pictures stay in the file until they are asked for.
+    """A recorded run, whose pictures are read on demand.
 
     Attributes:
         path: the recording.
@@ -93,9 +92,9 @@ class RecordedRun:
         frames: the complete frames, in order; at least one.
         skipped: frames that could not be used.
         drive: ``camera_from_lidar`` solved from all frames together; None where the run did not do that.
-        drive_verdict: whether that is good; None without it, and in recordings that keep no verdicts.
-        given_verdict: whether the calibration that the run started from is good; None where that was not asked.
-        warning: one sentence when the file is cut off, to show the user; else empty.
+        drive_verdict: verdict on ``drive``; None without one, and in recordings without verdicts.
+        given_verdict: verdict on the calibration that the run started from; None where it was not judged.
+        warning: a sentence for the user if the file is cut off; else empty.
     """
 
     path: Path
@@ -121,12 +120,12 @@ class RecordedRun:
 
     @property
     def believes_drive(self) -> bool:
-        """Whether a drive was solved, and its extrinsic is not rejected."""
+        """Whether a drive was solved and not rejected."""
         return self.drive is not None and (self.drive_verdict is None or self.drive_verdict.word != REJECTED)
 
     @property
     def one_mount(self) -> bool:
-        """Whether the references of all frames are the same; true where there is none to tell."""
+        """Whether the references of all frames are the same; true without references."""
         references = [frame.reference for frame in self.frames if frame.reference is not None]
         return not references or float(np.ptp(references, axis=0).max()) < SAME_MOUNT
 
@@ -143,7 +142,7 @@ class RecordedRun:
 
     @property
     def verdict(self) -> Verdict:
-        """What the run was made for: on the calibration as given, else on the drive, else on the frames."""
+        """The run's main verdict: on the given calibration, else on the drive, else on the frames."""
         return self.given_verdict or self.drive_verdict or self.frames_verdict
 
     def image(self, index: int) -> bytes:
@@ -164,7 +163,7 @@ class RecordedRun:
         return RecordedPictures(self._file)
 
     def scalars(self, path: str) -> list[float]:
-        """A curve's values, of every frame that has one, in their order."""
+        """A curve's values, of every frame that has one, in order."""
         batches = (chunk.to_record_batch() for chunk in self.chunks(path))
         valued = [row for row in rows(batches) if row.get("Scalars:scalars")]  # the curve's style has no frame
         return [float(row["Scalars:scalars"][0]) for row in sorted(valued, key=lambda row: row[entities.FRAME])]
@@ -190,7 +189,7 @@ def _run(path: Path, file: RecordingFile) -> RecordedRun:
     options, provenance = (static_row(tables[f"{PROPERTIES}/{name}"]) for name in (entities.RUN, entities.PROVENANCE))
     if not provenance and not file.cut:
         raise RecordingError(
-            f"{path} comes from an earlier calib-inspect, which kept no extrinsics as numbers; record it again."
+            f"{path} was made by an earlier calib-inspect, which did not record extrinsics as numbers; record it again."
         )
     numbers, ranges = provenance.pop("stage_numbers", []), provenance.pop("stage_ranges", [])
     (has_reference,) = provenance.pop("has_reference", [False])
@@ -220,13 +219,13 @@ def _run(path: Path, file: RecordingFile) -> RecordedRun:
         drive=history[max(history)] if history else None,
         drive_verdict=_verdict(tables[entities.VERDICT_DRIVE], path),
         given_verdict=_verdict(tables[entities.VERDICT_GIVEN], path),
-        warning=f"{path} is cut off: only its {len(frames)} complete frames are used." if file.cut else "",
+        warning=f"{path} is cut off; only its {len(frames)} complete frames are used." if file.cut else "",
         _file=file,
     )
 
 
 def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
-    """Chunks by entity; of a file that is cut off the pictures too, for a frame may lack one of them."""
+    """Chunks by entity; for a file that is cut off, pictures too, since a frame may lack one."""
     wanted = ("extrinsic/**", "verdict/**", entities.SKIPPED, f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
     tables: dict[str, list[RecordBatch]] = defaultdict(list)
     for chunk in file.chunks(*wanted):
@@ -236,7 +235,7 @@ def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
 
 
 def _verdict(batches: list[RecordBatch], path: Path) -> Verdict | None:
-    """The one of static data."""
+    """The verdict in static data; None without one."""
     text = static_row(batches).get(entities.VERDICT)
     return read_verdict(text[0], path) if text else None
 
@@ -244,10 +243,10 @@ def _verdict(batches: list[RecordBatch], path: Path) -> Verdict | None:
 def _frames(
     tables: dict[str, list[RecordBatch]], stages: list[int], has_reference: bool, cut: bool, path: Path
 ) -> tuple[RecordedFrame, ...]:
-    """The frames of which everything is there."""
+    """The complete frames."""
     initial = matrices(tables[entities.EXTRINSIC_INITIAL])
     after = {number: matrices(tables[entities.extrinsic_stage(number)]) for number in stages}
-    # earlier recordings have the stages only: what the last one found was the result
+    # earlier recordings have only the stages; the last one's was the result
     corrected = after[max(stages)] | matrices(tables[entities.EXTRINSIC_CORRECTED])
     reference = matrices(tables[entities.EXTRINSIC_REFERENCE])
     pictures = [{row[entities.FRAME] for row in rows(tables[entity])} for entity in PICTURES] if cut else []

@@ -26,18 +26,18 @@ def take_pictures(
     wanted: Sequence[str] = (),
     theme: str = DARK,
 ) -> Iterator[Path]:
-    """Take a picture of every page, or of those that are wanted; yield each file when it is written.
+    """Take a picture of every page, or of the wanted ones; yields each file once it is written.
 
     Args:
         recording: an ``.rrd`` of ours.
-        folder: where the pictures go; created if need be.
+        folder: folder for the pictures, created if missing.
         size: width and height in pixels.
-        frame: which frame to show; None for the first, where the recording has frames.
+        frame: number of the frame to show; None for the first, if the recording has frames.
         wanted: parts of pages' names, for instance ``"Overview"`` or ``"cost volumes stage 3"``.
-        theme: of the viewer, ``dark`` or ``light``.
+        theme: theme of the viewer, ``dark`` or ``light``.
 
     Raises:
-        ConfigError: the viewer does not start or does not load the recording, or this has no such frame.
+        ConfigError: the viewer does not start or does not load the recording, or the recording has no such frame.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with HeadlessViewer(*size, theme) as viewer:
@@ -58,7 +58,7 @@ def take_pictures(
 
 
 def smaller(png: bytes) -> bytes:
-    """The same pixels in fewer bytes: the viewer writes fast and leaves a seventh to a third lying there."""
+    """The same pixels in fewer bytes; the viewer writes fast, and compresses a seventh to a third less."""
     picture = Image.open(io.BytesIO(png)).convert("RGB")  # a window is opaque
     buffer = io.BytesIO()
     picture.save(buffer, "PNG", optimize=True)

@@ -1,4 +1,4 @@
-"""What a recording's bytes go to: sizes by group of entities, read from the file's footer."""
+"""Sizes of a recording by group of entities, read from the file's footer."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ def sizes_by_group(file: Path) -> dict[str, int]:
     """Bytes on disk of every group of entities, largest first; empty for a recording without a footer."""
     try:
         store = RrdReader(file).store()
-    except RuntimeError:  # there was no room for a footer, or Ctrl-C came before it
+    except RuntimeError:  # the disk was full, or Ctrl-C came before the footer was written
         return {}
-    # Private in this version of Rerun, but the only way to the footer, which is read in milliseconds.
+    # Private in this version of Rerun, but the only access to the footer, which takes milliseconds.
     index = store._chunk_index().to_arrow()
     sizes: defaultdict[str, int] = defaultdict(int)
     for entity, size in zip(index["chunk_entity_path"].to_pylist(), index["chunk_byte_size"].to_pylist(), strict=True):

@@ -26,7 +26,7 @@ def rows(batches: Iterable[RecordBatch]) -> Iterator[dict[str, Any]]:
 
 
 def static_row(batches: Iterable[RecordBatch]) -> dict[str, list[Any]]:
-    """The one row of an entity's static data, as lists by component; empty where there is none."""
+    """The one row of an entity's static data, as lists by component; empty without any."""
     return {
         name: batch[name][0].as_py()
         for batch in batches
@@ -40,6 +40,6 @@ def matrices(batches: Iterable[RecordBatch]) -> dict[int, Extrinsic]:
     """4x4 extrinsics by frame.
 
     Raises:
-        ValueError: one is no rigid transform.
+        ValueError: one is not a rigid transform.
     """
     return {row[entities.FRAME]: extrinsic_of(row[entities.MATRIX]) for row in rows(batches)}

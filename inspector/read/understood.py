@@ -1,6 +1,6 @@
-"""What a recording may say: numbers that a run can have computed, and an error of ours for everything else.
+"""Checks the content of a recording, which must be what a run can have written; anything else is an error of ours.
 
-A recording comes from anybody, and Rerun's file format holds whatever its writer likes under the names that are read.
+Recordings come from anybody, and Rerun's file format allows any content under the names that are read.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from calibnet.runtime.text import one_line
 LARGEST = 1e6
 """Largest entry of a camera matrix in pixels, and of an extrinsic in metres."""
 RIGID_TOLERANCE = 1e-2
-"""Largest entry of ``R^T R - I`` of an extrinsic; runs of single precision stay far below."""
+"""Largest entry of ``R^T R - I`` of an extrinsic; runs in single precision stay far below."""
 Number = Annotated[float, Interval(ge=-LARGEST, le=LARGEST)]
 Side = Annotated[int, Interval(ge=1, le=65_535)]
 
@@ -36,7 +36,7 @@ class RecordingError(CalibnetError):
 
 @contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """A context in which anything that a recording says wrongly becomes a `RecordingError` that names the file."""
+    """A context that turns every error in a recording's content into a `RecordingError` that names the file."""
     try:
         yield
     except (CalibnetError, MemoryError):
@@ -50,7 +50,7 @@ def understood(path: Path) -> Iterator[None]:
 
 
 def is_panic(error: BaseException) -> bool:
-    """Whether Rust code gave up, which is no ``Exception`` in Python."""
+    """Whether the error is a panic of Rust code, which is not an ``Exception`` in Python."""
     return type(error).__name__ == "PanicException"
 
 
@@ -64,10 +64,10 @@ class _Camera:
 
 
 def camera_of(row: dict[str, Any], path: Path) -> CameraModel:
-    """The camera of a frame; earlier recordings have rectified pictures, and say no lens.
+    """The camera of a frame; earlier recordings have rectified images and no lens.
 
     Raises:
-        RecordingError: it is none.
+        RecordingError: the row is not a valid camera.
     """
     said = {
         "width": row["width"][0],
@@ -87,15 +87,15 @@ def extrinsic_of(values: Any) -> Extrinsic:
     """A 4x4 extrinsic.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not a rigid transform of plausible size.
     """
     matrix = np.reshape(np.asarray(values, dtype=np.float64), (4, 4))
     rotation = matrix[:3, :3]
     if not (np.abs(matrix) < LARGEST).all() or np.abs(rotation.T @ rotation - np.eye(3)).max() > RIGID_TOLERANCE:
-        raise ValueError("an extrinsic is no rigid transform")
+        raise ValueError("an extrinsic is not a rigid transform")
     return matrix
 
 
 def _not_ours(path: Path, error: BaseException) -> RecordingError:
     what = one_line(f"{type(error).__name__}: {error}", 160)
-    return RecordingError(f"{path} holds what calib-inspect does not record ({what}); record it again.")
+    return RecordingError(f"{path} has content that calib-inspect does not write ({what}); record it again.")

@@ -1,4 +1,4 @@
-"""Verdicts of a recording: the JSON object that `calibnet.verdict.Verdict.as_dict` makes, back to its type."""
+"""Reads verdicts from a recording: the JSON object of `calibnet.verdict.Verdict.as_dict`, parsed to a `Verdict`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class _Frames:
 
 @dataclass(frozen=True)
 class _Said:
-    """The object as JSON has it."""
+    """The JSON object."""
 
     verdict: Word
     reason: str
@@ -51,11 +51,11 @@ class _Said:
 
 
 def read_verdict(text: str, path: Path) -> Verdict:
-    """The verdict of a JSON text in the recording ``path``.
+    """Parse a verdict in the recording ``path``.
 
     Raises:
-        RecordingError: it is none.
-        ValueError: it is no JSON, or its extrinsic is none.
+        RecordingError: it is not a valid verdict.
+        ValueError: it is not JSON, or its extrinsic is not a rigid transform.
     """
     said = validated(_Said, json.loads(text), f"{path}: a verdict", RecordingError, "record it again")
     covariance = None if said.sigma is None else np.array(said.sigma.covariance)
@@ -72,10 +72,10 @@ def read_verdict(text: str, path: Path) -> Verdict:
 
 
 def former_verdict(initial: Extrinsic, corrected: Extrinsic, stages: Mapping[int, Extrinsic]) -> Verdict:
-    """That of a frame whose recording has none: what the last stage found was applied, or was not believed.
+    """The verdict on a frame of a recording without verdicts: whether the last stage's result was applied.
 
     Args:
-        initial: ``camera_from_lidar`` that the frame started from.
+        initial: the frame's initial ``camera_from_lidar``.
         corrected: its result.
         stages: ``camera_from_lidar`` after every stage, by its number.
     """

@@ -1,6 +1,6 @@
-"""A hand in Rerun's viewer, for what no command of it does: pressing a button by the name that is on it.
+"""Presses buttons of Rerun's viewer by their labels, for what no command of the viewer does.
 
-``rerun viewer-mcp`` has such hands. It speaks JSON-RPC, a message a line (the Model Context Protocol).
+Uses ``rerun viewer-mcp``, which speaks JSON-RPC, one message per line (the Model Context Protocol).
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from inspector.programs import end_with_parent, rerun_binary
 PATIENCE_S: Final = 120.0
 PROTOCOL: Final = "2025-06-18"
 OUTSIDE: Final = {"x": -50.0, "y": -50.0}
-"""Where the pointer goes afterwards: it would be in the pictures, and so would what it hovers over."""
+"""Position of the pointer afterwards; elsewhere, pictures would show it and what it hovers over."""
 
 
 def press(endpoint: str, button: str) -> None:
-    """Press a button of a viewer as soon as it is there.
+    """Press a button of a viewer as soon as it appears.
 
     Args:
-        endpoint: of the viewer, for instance ``http://127.0.0.1:9876``.
-        button: what is written on it.
+        endpoint: address of the viewer, for instance ``http://127.0.0.1:9876``.
+        button: label of the button.
 
     Raises:
         ConfigError: there is no such button, or the viewer does not answer.
@@ -38,16 +38,19 @@ def press(endpoint: str, button: str) -> None:
         {"name": "hover", "args": {"pos": OUTSIDE}},
     ]
     deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:  # a busy machine answers late, and Rerun gives up on itself before we do
+    while time.monotonic() < deadline:  # a busy machine answers late, and Rerun's own time limit is shorter than ours
         done = _call(endpoint, "batch", {"actions": acts})
         if not done.get("isError", True):
             return
         last = one_line(str(done))[:300]
-    raise ConfigError(f"The viewer does not press {button!r}: {last or 'no answer'}. Try again on a quieter machine.")
+    raise ConfigError(
+        f"The viewer's button {button!r} could not be pressed ({last or 'no answer'}); try again on a less busy "
+        "machine."
+    )
 
 
 def _call(endpoint: str, tool: str, arguments: dict[str, Any]) -> dict[str, Any]:
-    """What a tool of the server says; nothing where the server does not answer in time."""
+    """The result of a tool of the server; empty where the server does not answer in time."""
     hello = {"protocolVersion": PROTOCOL, "capabilities": {}, "clientInfo": {"name": "calib-inspect", "version": "1"}}
     messages: list[dict[str, Any]] = [
         {"id": 1, "method": "initialize", "params": hello},

@@ -1,1 +1,1 @@
-"""The main loop: where calibrations start, frames in, recording out, a summary at the end."""
+"""A run: options, initial extrinsics, the loop from frames to a recording, and the summary."""

@@ -1,4 +1,4 @@
-"""The verdict on the calibration that a run starts from; on doubt some frames are asked for the cause."""
+"""The verdict on the calibration that a run starts from, with the causes if it is not accepted."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from calibnet.verdict import ACCEPTED, Cause, Verdict
 from inspector.verdicts import causes_of
 
 SUSPECTS = 3
-"""Frames, spread over a drive, that are asked for the cause: each runs stages up to thirty times."""
+"""Number of frames, spread over a drive, in which causes are looked for; each runs stages up to thirty times."""
 
 
 def judge_initial(method: object, frames: Frames, given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
-    """Hold a calibration against what was found from it; unless it is accepted, look for the causes.
+    """Compare a calibration with the result of a run that started from it; unless accepted, look for causes.
 
     Args:
-        method: that found it, asked for causes if it is one of `calibnet.calibrator.Explainer`.
-        frames: where it was found.
+        method: the method that ran, which names causes if it is a `calibnet.calibrator.Explainer`.
+        frames: frames of the run.
         given: ``camera_from_lidar`` to verify, 4x4.
-        found: verdict on what was found.
-        standard: that it is held to, see `calibnet.judging.verify.verify`.
+        found: verdict on the run's result.
+        standard: limits to apply, see `calibnet.judging.verify.verify`.
     """
-    if getattr(method, "unjudged", ""):  # its results may be off by anything
+    if getattr(method, "unjudged", ""):  # its results prove nothing
         standard = replace(standard, farthest=None)
     verdict = verify(given, found, standard)
     if verdict.word == ACCEPTED or found.causes:
@@ -38,7 +38,7 @@ def judge_initial(method: object, frames: Frames, given: Extrinsic, found: Verdi
 
 
 def suspected(method: object, frames: Frames, given: Extrinsic) -> tuple[Cause, ...]:
-    """The causes that half or more of some frames, each by itself, name; those of most frames first."""
+    """The causes found independently in at least half of some frames, the most frequent first."""
     if not isinstance(method, Explainer):
         return ()
     verdicts: list[Verdict] = []

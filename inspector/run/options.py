@@ -1,4 +1,4 @@
-"""What a user asks of a run, checked once and passed on whole."""
+"""The options of a run, checked once and passed on as one object."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ DEFAULT_RANGE = MiscalibrationRange(5, 0.5)
 
 
 MANY_FRAMES = 200
-"""Frames up to which all are run, and recorded in full, unless the user says otherwise."""
+"""Largest number of frames of which, by default, all are run and recorded in full detail."""
 COST = {True: (0.6, 0.9), False: (0.9, 4.7)}
-"""Seconds on two cores and megabytes a frame, the drive's solution included; of overview detail, and of full."""
+"""Seconds on two cores and megabytes per frame, including the drive's solution; for overview detail (True) and full."""
 
 
 class OptionsError(ConfigError):
@@ -33,34 +33,34 @@ class OptionsError(ConfigError):
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """One calibration run, as it was asked for.
+    """Options of one calibration run.
 
     Attributes:
-        sequence: what to calibrate.
-        frames: positions in it, as `select_frames` reads them; None for all, or of a long sequence for
-            `MANY_FRAMES` from all over it.
-        camera: which camera of the rig, where the dataset has several.
-        as_is: the sequence's extrinsic is what is to be corrected, and no reference.
-        range: to draw the miscalibration from; None for `DEFAULT_RANGE`.
-        miscalibration: this one, instead of drawing any.
-        per_frame: draw one for every frame, not one for the run.
-        seed: of everything random.
-        drive: after the frames, also solve the drive's extrinsic from all of them; None for doing so with several
-            frames on one mount.
-        on_bad_frame: ``"skip"`` a frame that cannot be used, or ``"stop"`` there.
-        fix: axes of the start that are known exactly, names of `calibnet.geometry.prior.AXES`; None as an empty one.
-        prior_translation: standard deviation, in metres, to which the camera's place is known beforehand.
-        prior_rotation: likewise its rotation, in radians.
-        stages: to run; None for those within the miscalibration.
-        preset: network to use.
-        method: what calibrates: `calibnet.methods.registry.CASCADE`, or one of its ``METHODS``.
-        masks: folder of the masks of a method that needs some.
-        intrinsics: let a method that can correct the camera's intrinsics as well.
-        weights: folder of its weights; None for those of the package.
-        detail: how much of each frame is recorded; None for everything, or for what ``parts`` names.
-        parts: with `Detail.CUSTOM`, what is recorded.
-        color: of the points over the image.
-        labels: what else tells the run from others, for instance its car and drive in a fleet.
+        sequence: frames to calibrate.
+        frames: positions in the sequence, as `select_frames` reads them; None for all, or for `MANY_FRAMES` spread over
+            a longer sequence.
+        camera: camera of the rig, where the dataset has several.
+        as_is: whether the sequence's extrinsic is the one to correct rather than a reference.
+        range: range from which the miscalibration is drawn; None for `DEFAULT_RANGE`.
+        miscalibration: miscalibration to use instead of drawing one.
+        per_frame: whether to draw one for every frame instead of one for the run.
+        seed: seed of the random numbers.
+        drive: whether to solve the drive's extrinsic from all frames after the single ones; None for doing so with
+            several frames on one mount.
+        on_bad_frame: ``"skip"`` or ``"stop"`` at a frame that cannot be used.
+        fix: axes of the initial extrinsic that are exact, from `calibnet.geometry.prior.AXES`; None for none.
+        prior_translation: standard deviation, in metres, to which the camera's position is known.
+        prior_rotation: standard deviation, in radians, to which its rotation is known.
+        stages: stages to run; None for those whose range is within the miscalibration's.
+        preset: name of the network.
+        method: name of the method: `calibnet.methods.registry.CASCADE`, or one of its ``METHODS``.
+        masks: folder of masks, for a method that uses some.
+        intrinsics: whether to correct the camera's intrinsics as well, for a method that can.
+        weights: folder of weights; None for those of the package.
+        detail: how much of each frame to record; None for everything, or for what ``parts`` names.
+        parts: parts to record with `Detail.CUSTOM`.
+        color: colouring of the points over the image.
+        labels: further properties of the run, for instance its car and drive in a fleet.
 
     Raises:
         OptionsError: two of them contradict each other.
@@ -98,33 +98,34 @@ class RunOptions:
             ),
             (
                 self.miscalibration is not None and self.per_frame,
-                "--per-frame draws from --range; --miscalibrate is the same for all frames.",
+                "--per-frame draws from --range; leave --miscalibrate out, which is the same for all frames.",
             ),
             (
                 bool(self.drive) and self.per_frame,
-                "--drive needs one mount for all frames; --per-frame moves it in each.",
+                "--drive needs one mount for all frames; leave --per-frame out, which moves it in each.",
             ),
             (
                 self.as_is and self.color is Coloring.ERROR,
-                f"--color error shows the distance to the reference, and {self.sequence.name} has none: give --range "
-                "or --miscalibrate to take its calibration for the reference, or choose another --color.",
+                f"--color error needs a reference, and {self.sequence.name} has none; give --range or --miscalibrate "
+                "to take "
+                "its calibration as the reference, or choose another --color.",
             ),
             (
                 self.detail is not None and (self.detail is Detail.CUSTOM) != (self.parts is not None),
-                "--detail custom and --log belong together: --log says which parts to record.",
+                "--detail custom needs --log, and --log needs --detail custom; give both or neither.",
             ),
             (
                 self.method == CASCADE and (self.masks is not None or self.intrinsics),
-                "--masks and --intrinsics are for other methods; choose one with --method.",
+                "--masks and --intrinsics apply to other methods; choose one with --method.",
             ),
             (
                 self.method != CASCADE and (self.stages is not None or self.preset != "compact"),
-                f"--stages and --preset are those of the cascade; leave them out with --method {self.method}.",
+                f"--stages and --preset apply to the cascade; leave them out with --method {self.method}.",
             ),
             (
                 self.method != CASCADE and any((self.fix, self.prior_translation, self.prior_rotation)),
-                "Only the cascade can use what is known beforehand (--fix, --prior-translation, --prior-rotation); "
-                f"leave it out with --method {self.method}.",
+                "--fix, --prior-translation and --prior-rotation apply to the cascade; "
+                f"leave them out with --method {self.method}.",
             ),
         ):
             if wrong:
@@ -132,7 +133,7 @@ class RunOptions:
 
     @property
     def _level(self) -> Detail:
-        """The detail, or what ``parts`` alone means."""
+        """The level of detail; that of ``parts`` where only they are given."""
         if self.detail is not None:
             return self.detail
         if self.parts is not None:
@@ -144,7 +145,7 @@ class RunOptions:
         """Positions of the frames to run.
 
         Raises:
-            DatasetError: there are none.
+            DatasetError: no frame is selected.
         """
         if self.frames is None and self.is_long:
             return evenly_spaced(len(self.sequence), MANY_FRAMES)
@@ -152,21 +153,21 @@ class RunOptions:
 
     @property
     def is_long(self) -> bool:
-        """Whether the sequence has so many frames that some of them tell as much."""
+        """Whether the sequence has so many frames that by default only some are run."""
         return len(self.sequence) > MANY_FRAMES
 
     @property
     def expectation(self) -> str:
-        """What the run will take, in a sentence; empty for a short one."""
+        """A sentence on the time and space that the run will take; empty for a short run."""
         count = len(self.positions)
         if count < MANY_FRAMES:
             return ""
         seconds, megabytes = (count * cost for cost in COST[self._level is Detail.OVERVIEW])
         some = ""
         if self.frames is None and self.is_long:
-            some = f"{count} of its {len(self.sequence):,} frames, spread over all (--frames : runs every one). "
+            some = f"{count} of its {len(self.sequence):,} frames, evenly spread (--frames : runs all). "
         level = " in overview detail (--detail full keeps everything)" if self.detail is None and not self.parts else ""
-        return f"{some}Some {_minutes(seconds)} on two cores, some {_size(megabytes)}{level}."
+        return f"{some}This takes about {_minutes(seconds)} on two cores, and about {_size(megabytes)}{level}."
 
     @property
     def solves_drive(self) -> bool:
@@ -175,15 +176,15 @@ class RunOptions:
 
     @property
     def start(self) -> Start:
-        """Where the calibrations start."""
+        """The initial extrinsics of the run."""
         return Start(self.range or DEFAULT_RANGE, self.seed, self.per_frame, self.miscalibration, self.as_is)
 
     @property
     def prior(self) -> Prior:
-        """What is known of the start: as asked for, else as the dataset says (`known` of a sequence).
+        """What is known of the initial extrinsic: from the options, else from the dataset (`known` of a sequence).
 
         Raises:
-            ConfigError: it contradicts itself.
+            ConfigError: the options contradict each other.
         """
         asked = self.fix or None, self.prior_translation, self.prior_rotation
         if any(one is not None for one in asked):
@@ -192,7 +193,7 @@ class RunOptions:
 
     @property
     def contents(self) -> Contents:
-        """What is recorded of each frame."""
+        """What to record of each frame."""
         return Contents.of(self._level, self.parts or frozenset(), self.color)
 
     @property
@@ -202,7 +203,7 @@ class RunOptions:
         return f"{self.sequence.name}, {self.start}{of}"
 
     def identity(self, stages: list[int]) -> dict[str, Any]:
-        """Everything that changes the recorded data, as recordings keep it; ``stages`` are those that can run."""
+        """All options that affect the recorded data, as recordings keep them; ``stages`` are those that can run."""
         return {
             "sequence": self.sequence.name,
             "rig": self.sequence.rig,

@@ -1,4 +1,4 @@
-"""A drive that was solved before its frames are shown: what a method makes of them that knows whole drives alone."""
+"""Shows the result of a method that solves whole drives only, on each of its frames."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from calibnet.trace import CascadeTrace, DriveEstimate
 
 
 class PrecomputedDrive:
-    """A `calibnet.calibrator.DriveCalibrator` that knows its answer."""
+    """A `calibnet.calibrator.DriveCalibrator` that returns an estimate made before."""
 
     def __init__(self, estimate: DriveEstimate) -> None:
         """Answer with ``estimate``, which has traces."""
         self.estimate = estimate
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """The drive's result on one of its frames; the same for those that the method left out."""
+        """The drive's result on one of its frames, including those that the method left out."""
         found = self.estimate.traces
         return found.get(frame.index) or next(iter(found.values()))
 
@@ -33,7 +33,7 @@ def first_readable(frames: Frames) -> Frame:
     """The first frame that can be read.
 
     Raises:
-        DatasetError: none can; that of the first one.
+        DatasetError: none can; the error is that of the first.
     """
     failure: DatasetError | None = None
     for position in range(len(frames)):

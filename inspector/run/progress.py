@@ -1,4 +1,4 @@
-"""How far a run is, shown while it goes on."""
+"""Progress bars of a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from calibnet.runtime.text import one_line
 
 
 def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole drive") -> Callable[[int, int], None]:
-    """What shows how far the solving of a drive is, and ends it when a stop is requested."""
+    """An observer that shows the progress of solving a drive, and ends it when a stop is requested."""
     task = progress.add_task(name, total=None)
 
     def advance(read: int, total: int) -> None:
@@ -25,7 +25,7 @@ def drive_observer(progress: Progress, stop: StopRequest, name: str = "whole dri
 
 
 class _Description(ProgressColumn):
-    """The description as it is, where rich would take brackets in a name for markup."""
+    """The description as plain text; rich would read brackets in a name as markup."""
 
     def render(self, task: Task) -> Text:
         return Text(one_line(task.description))

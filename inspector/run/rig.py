@@ -1,4 +1,4 @@
-"""Several cameras and a LiDAR: opened from folders, and solved each on its own or as one rig."""
+"""Several cameras and a LiDAR: opened from folders, and solved one by one or as one rig."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from calibnet.drive.rig import CameraEstimate, RigEstimate
 
 CAMERAS = "cameras"
-"""Folder in which each camera of a rig has its own."""
+"""Folder of a rig that holds one folder per camera."""
 
 
 class RigCalibrator(DriveCalibrator, Protocol):
@@ -44,7 +44,7 @@ class RigCalibrator(DriveCalibrator, Protocol):
 
 
 def open_rig(folders: Sequence[Path]) -> dict[str, Folder]:
-    """The cameras of a rig by name: of one folder with ``cameras/NAME/``, or of a plain folder each.
+    """The cameras of a rig by name, from one folder with ``cameras/NAME/`` or from a plain folder per camera.
 
     Raises:
         DatasetError: there are fewer than two, two have one name, or one cannot be opened.
@@ -55,8 +55,8 @@ def open_rig(folders: Sequence[Path]) -> dict[str, Folder]:
         inside = sorted(path for path in (root / CAMERAS).glob("*") if path.is_dir())
         if len(inside) < 2:
             raise DatasetError(
-                f"{root} holds no rig: put a folder of images/ and calibration.yaml for each camera into "
-                f"{root / CAMERAS}, and the scans into {root / 'clouds'}; or give a plain folder for each camera."
+                f"{root} is not a rig's folder; put a folder with images/ and calibration.yaml for each camera into "
+                f"{root / CAMERAS}, and the scans into {root / 'clouds'}, or give a plain folder for each camera."
             )
         folders, clouds = inside, root / "clouds"
     names = [one_line(folder.resolve().name) for folder in folders]
@@ -71,10 +71,10 @@ def open_rig(folders: Sequence[Path]) -> dict[str, Folder]:
 
 
 def poses(cameras: dict[str, Folder], rigid: bool) -> tuple[dict[str, Transform], Extrinsic]:
-    """Each ``camera_from_rig``, and ``rig_from_lidar`` to start from; the rig's frame is that of the first camera.
+    """Each ``camera_from_rig``, and the initial ``rig_from_lidar``; the rig's frame is that of the first camera.
 
     Raises:
-        DatasetError: the calibrations say it of some cameras only.
+        DatasetError: only some calibrations have ``rig_from_camera``.
     """
     given = {name: camera.calibration.rig_from_camera for name, camera in cameras.items()}
     extrinsics = {name: extrinsic_of(camera) for name, camera in cameras.items()}
@@ -82,7 +82,9 @@ def poses(cameras: dict[str, Folder], rigid: bool) -> tuple[dict[str, Transform]
     known = {name: pose for name, pose in given.items() if pose is not None}
     if rigid and known and len(known) < len(given):
         lacking = ", ".join(name for name in given if name not in known)
-        raise DatasetError(f"Only some calibrations say rig_from_camera; add it to that of {lacking}, or to none.")
+        raise DatasetError(
+            f"Only some calibrations have rig_from_camera; add it to those of {lacking}, or remove it from all."
+        )
     if rigid and known:
         first_from_rig = invert(known[first])
         return {name: invert(first_from_rig @ pose) for name, pose in known.items()}, extrinsics[first]
@@ -91,7 +93,7 @@ def poses(cameras: dict[str, Folder], rigid: bool) -> tuple[dict[str, Transform]
 
 
 def extrinsic_of(camera: Folder) -> Extrinsic:
-    """The ``camera_from_lidar`` that a folder starts from."""
+    """The initial ``camera_from_lidar`` of a folder."""
     extrinsic = camera.calibration.camera_from_lidar
     assert extrinsic is not None, "a folder without one is not opened"
     return extrinsic
@@ -108,12 +110,12 @@ def solve(
     """Calibrate all cameras.
 
     Args:
-        method: that does it.
-        cameras: by name.
-        rigid: as one rig, instead of each on its own.
-        miscalibration: 4x4, put on the rig in the first camera's axes; what the folders say is the truth then.
-        observer: makes what is told of the progress, by a name.
-        tolerance: within which each camera is known on the rig; with one they are solved as one rig, too.
+        method: the method.
+        cameras: cameras by name.
+        rigid: whether to solve them as one rig instead of one by one.
+        miscalibration: 4x4, put on the rig in the first camera's axes; the folders' extrinsics are then the reference.
+        observer: makes an observer of the progress, by a name.
+        tolerance: standard deviation of each camera's place on the rig; if given, they are solved as one rig too.
 
     Raises:
         CalibrationError: nothing could be calibrated.
@@ -160,7 +162,7 @@ def camera_of(folder: Folder) -> CameraModel:
 
 
 def of_camera(rig: Verdict, found: CameraEstimate, initial: Extrinsic) -> tuple[Verdict, Residual]:
-    """The verdict on a rig as one on a camera of it, which started from ``initial``, and what it leaves."""
+    """The verdict and the residuals of one camera of a rig, which started from ``initial``."""
     verdict = replace(
         rig,
         camera_from_lidar=found.camera_from_lidar,

@@ -1,4 +1,4 @@
-"""The main loop: frames in, cascade, recording out, with progress and an orderly end."""
+"""The main loop of a run: reads frames, calibrates them and records the result, with progress."""
 
 from __future__ import annotations
 
@@ -35,30 +35,30 @@ from inspector.run.start import Start
 from inspector.run.summary import Summary
 
 MOST_EXPLAINED = 1
-"""Frames of a run that causes are looked for in; it takes as long as a dozen frames, and one frame mostly tells."""
+"""Number of frames in which causes are looked for, as that takes as long as a dozen frames; one mostly suffices."""
 INDEX = "index of the recording, MB"
-STOPPING = "Stopping after this frame; once more stops at once."
+STOPPING = "Stopping after this frame; press Ctrl-C again to stop at once."
 
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """Everything a run needs; `run` does it.
+    """Everything that a run needs, and the run itself.
 
     Attributes:
-        sequence: where frames come from.
-        positions: which of them, in order.
-        cascade: what calibrates them: ours, or another method.
-        skipped: stages that were asked for and have no weights.
-        start: where each calibration starts.
-        outputs: where the recording goes.
-        description: what the recording says about itself.
-        contents: what is logged of each frame.
-        console: where progress is shown.
-        drive: after the frames, also solve the drive's extrinsic from all of them, if they are on one mount.
-        drive_asked: the user wants it, so that a drive which cannot be solved is an error.
-        stop_on_bad_frame: end at the first frame that cannot be used, instead of going on with the next.
-        verify: also judge the calibration that the run starts from, by the only frame or by the drive.
-        watching: says of a solved drive whether the mount moved meanwhile; None where it could not be told.
+        sequence: the sequence of frames.
+        positions: positions of the frames to run, in order.
+        cascade: the cascade, or another method.
+        skipped: requested stages that have no weights.
+        start: initial extrinsic of each frame.
+        outputs: outputs of the recording.
+        description: title and properties of the recording.
+        contents: what to log of each frame.
+        console: console for progress.
+        drive: whether to solve the drive's extrinsic from all frames after the single ones, if they share one mount.
+        drive_asked: whether the user asked for it, so that a drive which cannot be solved is an error.
+        stop_on_bad_frame: whether to end at the first frame that cannot be used.
+        verify: whether to judge the calibration that the run starts from, by the only frame or by the drive.
+        watching: result of watching the solved drive for moves of the mount; None where there is none.
     """
 
     sequence: Sequence
@@ -78,7 +78,7 @@ class Session:
 
     @property
     def frames(self) -> PickedFrames:
-        """The chosen frames."""
+        """The selected frames."""
         return PickedFrames(self.sequence, self.positions)
 
     def run(self) -> Summary:
@@ -89,7 +89,7 @@ class Session:
 
         Raises:
             CalibnetError: half of the frames or more cannot be used, one cannot and ``stop_on_bad_frame`` is set, or
-                the disk is full. What was recorded is closed properly, and the message says so.
+                the disk is full. What was recorded is closed properly, and the message says where.
         """
         summary = Summary()
         recording: Recording | None = None
@@ -123,7 +123,7 @@ class Session:
                         if one_mount:
                             self._record_drive(method, recording, summary, initial, reference, progress, stop)
                         else:
-                            self._no_drive(recording, summary, "The frames are of several mounts")
+                            self._no_drive(recording, summary, "The frames come from several mounts")
                     if summary.given_verdict is not None:
                         recording.log_given(summary.given_verdict)
                     if summary.outcome is not None:
@@ -140,7 +140,7 @@ class Session:
         return summary
 
     def _method(self, progress: Progress, stop: StopRequest) -> Calibrator:
-        """What calibrates the frames; one that tells something of whole drives alone solves theirs before."""
+        """The method for single frames; one that solves whole drives only solves the drive first."""
         if not drives_only(self.cascade):
             return self.cascade
         assert isinstance(self.cascade, DriveCalibrator)
@@ -149,12 +149,12 @@ class Session:
         return PrecomputedDrive(self.cascade.calibrate_drive(self.frames, initial, drive_observer(progress, stop)))
 
     def _show(self) -> None:
-        """Open the viewer or the page, and say where it is, once."""
+        """Open the viewer or the page, and print where it is, once."""
         if self.outputs.show() and self.outputs.page is not None:
             self.console.print(f"Watch it at {self.outputs.page}", soft_wrap=True)
 
     def _range(self, first: Frame) -> tuple[int, int]:
-        """Numbers of the first and the last frame; of datasets that leave numbers out only the last frame knows it."""
+        """Numbers of the first and the last frame, read from the last frame where the dataset may skip numbers."""
         last = first
         if len(self.positions) > 1:
             with contextlib.suppress(DatasetError):
@@ -162,7 +162,7 @@ class Session:
         return first.index, last.index
 
     def _close(self, recording: Recording) -> None:
-        """Close the recording, which of a long one takes a while; after Ctrl-C it is whole, but without an index."""
+        """Close the recording, which takes a while for a long one; after Ctrl-C it is complete, but has no index."""
         with StopRequest() as stop, frame_progress(self.console, transient=True) as progress:
             task = progress.add_task(INDEX, total=None)
 
@@ -171,12 +171,12 @@ class Session:
                 return not stop.requested
 
             remark = recording.close(advance)
-            progress.update(task, total=progress.tasks[0].completed)  # fewer than there were: chunks are fewer
+            progress.update(task, total=progress.tasks[0].completed)  # the index may have fewer chunks than expected
         if remark:
             self.console.print(remark, style="yellow", soft_wrap=True)
 
     def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
-        """Read and calibrate one frame; None where it cannot be used, which the summary takes in."""
+        """Read and calibrate one frame; None where it cannot be used, which the summary counts."""
         number = index_of(self.sequence, position)
         try:
             frame = self.sequence[position]
@@ -211,7 +211,7 @@ class Session:
         progress: Progress,
         stop: StopRequest,
     ) -> None:
-        """Solve the drive's extrinsic from all frames, log how it converges, and say what came of it."""
+        """Solve the drive's extrinsic from all frames, log its convergence, and print the result."""
         assert isinstance(method, DriveCalibrator), "a drive is solved by a method that can"
         try:
             estimate = method.calibrate_drive(self.frames, initial, drive_observer(progress, stop))
@@ -235,12 +235,12 @@ class Session:
             summary.found = estimate.camera_from_lidar
 
     def _no_drive(self, recording: Recording, summary: Summary, why: str) -> None:
-        """Say why the drive is not solved, here and in the recording."""
+        """Note why the drive is not solved, in the summary and in the recording."""
         summary.drive = f"{why}: the whole drive is not solved as one."
         recording.log_no_drive([summary.drive, *summary.of_frames()])
 
     def _record_drive_overlays(self, recording: Recording, estimate: DriveEstimate, stop: StopRequest) -> None:
-        """Show the drive's extrinsic on every recorded frame, also on those that it was solved without."""
+        """Show the drive's extrinsic on every recorded frame, including those that were left out of the solution."""
         for position in self.positions:
             if stop.requested:
                 raise KeyboardInterrupt

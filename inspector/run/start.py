@@ -1,4 +1,4 @@
-"""Where the calibration of each frame starts: the dataset's extrinsic, miscalibrated or as it is."""
+"""The initial extrinsic of each frame: the dataset's, miscalibrated or as it is."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from calibnet.geometry.types import Extrinsic
 
 @dataclass(frozen=True)
 class Start:
-    """Starting extrinsics, the same for the same seed; as text, where they come from.
+    """Initial extrinsics, the same for the same seed; as text, their origin.
 
     Attributes:
-        range: what miscalibrations are drawn from, and what decides which stages run.
-        seed: of the draw.
-        per_frame: draw one for every frame, instead of one for the run (a mount that moved).
-        given: a miscalibration to use instead of drawing one.
-        as_is: start from the dataset's extrinsic; it is a guess then, and there is no reference.
+        range: range from which miscalibrations are drawn, and which decides the stages that run.
+        seed: seed of the draw.
+        per_frame: whether to draw one for every frame instead of one for the run.
+        given: miscalibration to use instead of drawing one.
+        as_is: whether to start from the dataset's extrinsic, which then is not a reference.
     """
 
     range: MiscalibrationRange
@@ -40,7 +40,7 @@ class Start:
             return "from the calibration as it is"
         if self.given is not None:
             return "miscalibrated as given"
-        return f"miscalibrated within {self.range}{', anew every frame' if self.per_frame else ''}, seed {self.seed}"
+        return f"miscalibrated within {self.range}{', anew in every frame' if self.per_frame else ''}, seed {self.seed}"
 
     def initial(self, frame: Frame) -> Extrinsic:
         """The ``camera_from_lidar`` that the cascade starts from on this frame."""
@@ -49,7 +49,7 @@ class Start:
         return self._delta(frame) @ frame.camera_from_lidar
 
     def reference(self, frame: Frame) -> Extrinsic | None:
-        """The true ``camera_from_lidar``; None where the dataset's is what is to be corrected."""
+        """The true ``camera_from_lidar``; None where the dataset's is the one to correct."""
         return None if self.as_is else frame.camera_from_lidar
 
     def _delta(self, frame: Frame) -> Extrinsic:

@@ -1,4 +1,4 @@
-"""What a run leaves behind on the terminal: errors before and after, times, where it was saved."""
+"""The summary of a run on the terminal: errors before and after, times, and the verdict."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from inspector.verdicts import counted, line
 
 @dataclass
 class Summary:
-    """Collects a few numbers a frame; constant memory is not needed for these.
+    """Collects a few numbers per frame.
 
     Attributes:
-        frames: how many were recorded.
-        verdicts: on each of them by its number, from methods that give one.
+        frames: number of recorded frames.
+        verdicts: verdicts by frame number, of methods that give one.
         skipped: frames that could not be read or calibrated.
-        unread: how many of these could not be read.
-        explained: frames whose causes were looked for.
-        interrupted: whether the run was ended before its last frame.
-        started: when the first frame was begun, in seconds of the clock.
-        ended: when the last one was done; None while it is not.
-        drive: what all frames together came to, in words.
-        found: the drive's ``camera_from_lidar`` or, of a single frame, that frame's; None where neither is accepted.
-        drive_verdict: whether that is good.
-        given_verdict: whether the calibration that the run started from is good, where it was to be verified.
+        unread: number of the skipped frames that could not be read.
+        explained: number of frames in which causes were looked for.
+        interrupted: whether the run ended before its last frame.
+        started: start of the first frame, in seconds of the clock.
+        ended: end of the last frame; None until then.
+        drive: the result of the drive, in words.
+        found: ``camera_from_lidar`` of the drive or of the only frame; None where it is not accepted.
+        drive_verdict: verdict on the drive.
+        given_verdict: verdict on the calibration that the run started from, where it was to be verified.
         method: name of the method; empty for the cascade.
     """
 
@@ -58,7 +58,7 @@ class Summary:
     _milliseconds: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list), repr=False)
 
     def add(self, observation: Observation) -> None:
-        """Take in one frame."""
+        """Add one frame."""
         trace = observation.trace
         self.frames += 1
         self.method = trace.method
@@ -80,21 +80,21 @@ class Summary:
             self._milliseconds[f"stage {stage.number}"].append(sum(stage.milliseconds.values()))
 
     def frames_done(self) -> None:
-        """Note that the frames one by one are done: what follows is not counted to their speed."""
+        """Note that the single frames are done, so that what follows does not count towards their speed."""
         self.ended = time.monotonic()
 
     def check_enough(self) -> None:
-        """See that fewer than half of the frames were left out.
+        """Check that fewer than half of the frames were left out.
 
         Raises:
             DatasetError: half of them or more could not be used, and some could not be read.
-            CalibrationError: all of these were read, but not calibrated.
+            CalibrationError: half of them or more could be read but not calibrated.
         """
         bad, tried = self.skipped, self.frames + len(self.skipped)
         if bad and 2 * len(bad) >= tried:
             each = " ".join(f"Frame {one.frame}: {one.why}" for one in bad)
             kind = DatasetError if self.unread else CalibrationError
-            raise kind(f"{len(bad)} of {tried} frames cannot be used, which is half or more. {each}")
+            raise kind(f"{len(bad)} of {tried} frames cannot be used, which is at least half. {each}")
 
     def lines(self) -> list[str]:
         """Sentences for the end of a run."""
@@ -105,7 +105,7 @@ class Summary:
         lines += self.of_frames()
         if self.skipped:
             numbers = ", ".join(str(bad.frame) for bad in self.skipped)
-            lines.append(f"{_frames(len(self.skipped))} skipped, which could not be used: {numbers}.")
+            lines.append(f"{_frames(len(self.skipped))} skipped because they could not be used: {numbers}.")
         if self.drive:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
@@ -113,26 +113,26 @@ class Summary:
         return lines
 
     def of_frames(self) -> list[str]:
-        """Sentences on the frames one by one: their median, the worst, and how many became worse."""
+        """Sentences on the single frames: their median, the worst, and how many got worse."""
         if not self._initial:
-            lines = [f"Corrected by {_middle(self._change)}, median over frames; no reference to compare with."]
+            lines = [f"Correction, median over frames: {_middle(self._change)}; there is no reference to compare with."]
             if len(self._bad) > 1 and math.isfinite(max(self._bad)):
                 worst = self._bad.index(max(self._bad))
-                lines.append(f"Fits worst: frame {self._numbers[worst]}, matches {self._bad[worst]:.1f} px off.")
+                lines.append(f"Worst fit: frame {self._numbers[worst]}, match error {self._bad[worst]:.1f} px.")
             return lines
         lines = [
             f"Error, median over frames: {_middle(self._initial)} initially, {_middle(self._corrected)} corrected."
         ]
         if len(self._corrected) > 1:
             worst = self._bad.index(max(self._bad))
-            lines.append(f"Worst: frame {self._numbers[worst]}, {_figures(self._corrected[worst])} left.")
+            lines.append(f"Worst: frame {self._numbers[worst]}, with an error of {_figures(self._corrected[worst])}.")
         if self._worse:
             count, numbers = len(self._worse), ", ".join(map(str, self._worse))
-            lines.append(f"{count} of {_frames(len(self._corrected))} worse than before, in angle or place: {numbers}.")
+            lines.append(f"{count} of {_frames(len(self._corrected))} got worse in rotation or translation: {numbers}.")
         return lines
 
     def matrix_lines(self) -> list[str]:
-        """What was found, as the rows of a matrix."""
+        """The result, as the rows of a matrix."""
         if self.found is None:
             return []
         rows = [" ".join(f"{value:9.5f}" for value in row) for row in self.found[:3]]
@@ -140,13 +140,13 @@ class Summary:
 
     @property
     def outcome(self) -> Verdict | None:
-        """Its verdict on what was given, on the drive or on its only frame; None where several frames have each one."""
+        """The verdict on the given calibration, the drive or the only frame; None where each of several has its own."""
         single = next(iter(self.verdicts.values())) if len(self.verdicts) == 1 else None
         return self.given_verdict or self.drive_verdict or single
 
     @property
     def verdict(self) -> str:
-        """The last line of a run: its verdict on what was given, on the drive or on the frames; empty without any."""
+        """The last line of a run: its verdict on the given calibration, the drive or the frames; empty without any."""
         if self.outcome is not None:
             return line(self.outcome)
         return counted(self.verdicts) if self.verdicts else ""

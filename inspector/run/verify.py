@@ -1,4 +1,4 @@
-"""Judging the calibration that a session starts from, with a recording or without."""
+"""Judges the calibration that a session starts from, with a recording or without."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from inspector.run.session import STOPPING, Session
 from inspector.run.summary import Summary
 
 UNKNOWN = np.full((4, 4), np.nan)
-"""The extrinsic where the input cannot even be made into a frame."""
+"""Extrinsic of a verdict on input that cannot be made into a frame."""
 
 
 @dataclass(frozen=True)
 class Readable:
-    """Frames, and which of them could not be read."""
+    """Frames that remember which of them could not be read."""
 
     frames: PickedFrames
     stop: bool = False
@@ -39,7 +39,7 @@ class Readable:
         return self.frames.index_of(position)
 
     def __getitem__(self, position: int) -> Frame:
-        """Read a frame, and note where that fails; input that is read and cannot be right counts as read."""
+        """Read a frame, and note a failure; input that is read but cannot be right counts as read."""
         try:
             return self.frames[position]
         except DatasetError as error:
@@ -48,7 +48,7 @@ class Readable:
             raise
 
     def first(self) -> Frame:
-        """The first one that can be read.
+        """The first frame that can be read.
 
         Raises:
             DatasetError: half of them or more cannot.
@@ -63,7 +63,7 @@ class Readable:
         raise AssertionError("without frames there is nothing to read")
 
     def check(self) -> None:
-        """See that enough frames could be read.
+        """Check that enough frames could be read.
 
         Raises:
             DatasetError: half of them or more could not, or one where ``stop`` is set.
@@ -71,7 +71,7 @@ class Readable:
         if not self.unread or not (self.stop or 2 * len(self.unread) >= len(self)):
             return
         each = " ".join(f"Frame {frame}: {why}" for frame, why in self.unread.items())
-        share = "" if self.stop else ", which is half or more"
+        share = "" if self.stop else ", which is at least half"
         raise DatasetError(f"{len(self.unread)} of {len(self)} frames cannot be read{share}. {each}")
 
 
@@ -94,8 +94,8 @@ def verify_session(session: Session, record: bool) -> Verified:
     """Judge the calibration that a session starts from, by its only frame or by the drive.
 
     Args:
-        session: with ``verify`` set.
-        record: run it as it is, recording included; otherwise only what the verdict needs is computed.
+        session: the session, with ``verify`` set.
+        record: whether to run it in full and record it; otherwise only what the verdict needs is computed.
 
     Raises:
         DatasetError: half of the frames or more cannot be read.
@@ -122,7 +122,7 @@ def verify_session(session: Session, record: bool) -> Verified:
 
 
 def as_json(verdict: Verdict) -> dict[str, object]:
-    """The verdict's JSON object; null for an extrinsic that is not known."""
+    """The verdict's JSON object, with null for an unknown extrinsic."""
     content = verdict.as_dict()
     return content if np.isfinite(verdict.camera_from_lidar).all() else content | {"camera_from_lidar": None}
 

@@ -1,1 +1,1 @@
-"""Pages on this machine: one server, one guard before it, and the files of Rerun's web viewer."""
+"""Serves pages on this machine: the server, the guard before it, and the files of Rerun's web viewer."""

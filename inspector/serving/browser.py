@@ -1,4 +1,4 @@
-"""Opening a page in the user's browser without showing its token to other users of this machine."""
+"""Opens a page in the user's browser without showing its token to other users of this machine."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pathlib import Path
 
 @contextmanager
 def opened_page(address: str) -> Iterator[Path]:
-    """Open an address in the browser; its way there is removed in the end.
+    """Open an address in the browser, by a file that is removed at the end.
 
-    The browser is given a file that leads to the address and that only its owner may read: what stands on a browser's
-    command line can be read by everybody.
+    The browser is given a file that redirects to the address and that only its owner may read, since every user can
+    read a browser's command line.
     """
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as folder:  # 0700
         file = Path(folder) / "open.html"

@@ -1,4 +1,4 @@
-"""Files as an app: a fixed list, so that a folder may hold what it wants beside them."""
+"""Serves a fixed list of files, whatever else is in their folders."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MEDIA_TYPES = {
 
 
 def file_route(files: Mapping[str, Path]) -> Route:
-    """A route that answers with files, and 404 to everything else.
+    """A route that serves files, and answers everything else with 404.
 
     Args:
-        files: by the path of their address, which begins with ``/``.
+        files: files by the path of their URL, which begins with ``/``.
     """
 
     async def answer(request: Request) -> FileResponse:

@@ -1,8 +1,8 @@
-"""What stands before every page: requests from elsewhere and without the token get nothing.
+"""Guards every page: requests from elsewhere or without the token are refused.
 
-A page on the web could let a name of its own point to 127.0.0.1 and read what is served here, so the Host header has to
-name this server. Other users of this machine can reach it as well, so every path begins with a random token, which only
-the printed address has. Answers forbid pages to load anything from elsewhere.
+A web page could let a name of its own resolve to 127.0.0.1 and read what is served here, so the Host header has to name
+this server. Other users of this machine can reach it as well, so every path begins with a random token, which only the
+printed address has. A content security policy forbids pages to load anything from elsewhere.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TOKEN_BYTES = 18
 
 
 def new_token() -> str:
-    """A path part that nobody can guess."""
+    """A random part of a path that cannot be guessed."""
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
@@ -28,15 +28,15 @@ class Guard:
     """ASGI middleware that checks Host, Origin and token, and takes the token off the path."""
 
     def __init__(self, app: ASGIApp, port: int, token: str, only_here: str | None = LOCALHOST, data: str = "") -> None:
-        """Stand before an app.
+        """Guard an app.
 
         Args:
-            app: knows nothing of the token.
-            port: that the server listens on.
-            token: of `new_token`.
-            only_here: host of the server's address, which only this machine reaches; None where others do as well: it
-                may have any name then, and the token alone is asked for.
-            data: address of a server of ours, without a path, that pages may load from as well.
+            app: app to guard, which sees paths without the token.
+            port: port on which the server listens.
+            token: token from `new_token`.
+            only_here: host of the server's address if only this machine reaches it; None if others do as well, so that
+                the server may have any name and only the token is checked.
+            data: address, without a path, of another server of ours from which pages may load.
         """
         self._app, self._only_here = app, only_here
         self._hosts = {f"{host}:{port}" for host in (only_here or LOCALHOST, LOCALHOST, "localhost")}
@@ -52,7 +52,7 @@ class Guard:
         }
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer 403 to strangers and 404 without the token; a websocket of theirs is not opened."""
+        """Answer 403 to foreign hosts and origins and 404 without the token; refuse their websockets."""
         headers = Headers(scope=scope)
         origin = headers.get("origin")
         hosts = self._hosts if self._only_here else {headers.get("host", "")}

@@ -1,4 +1,4 @@
-"""A recording in Rerun's web viewer, which is given it over HTTP while it grows: no port of Rerun's is opened."""
+"""Serves a growing recording to Rerun's web viewer over HTTP, without opening a port of Rerun's."""
 
 from __future__ import annotations
 
@@ -21,18 +21,17 @@ if TYPE_CHECKING:
 RECORDING = "recording.rrd"
 PIECE_BYTES = 1 << 20
 PAUSE_S = 0.1
-"""Pause between checks whether the file has grown."""
+"""Pause between checks whether the file has grown, in seconds."""
 
 
 def recording_app(file: Path, viewer: Path, begun: threading.Event, ended: threading.Event) -> Starlette:
     """The app for `inspector.serving.server.PageServer`.
 
     Args:
-        file: the recording; it may be replaced as a whole while it is given out.
+        file: the recording, which may be replaced as a whole while it is served.
         viewer: folder with the files of Rerun's web viewer.
-        begun: set when the file, as soon as there is one, is the recording's; one that was there before is not given
-            out.
-        ended: set when the recording grows no more.
+        begun: set once the file is the new recording; a file that existed before is not served.
+        ended: set once the recording is complete.
     """
 
     async def answer(_: Request) -> StreamingResponse:
@@ -48,7 +47,7 @@ async def _growing(path: Path, begun: threading.Event, ended: threading.Event) -
         await asyncio.sleep(PAUSE_S)
     with path.open("rb") as file:
         while True:
-            last = ended.is_set()  # asked before the file is read, so that nothing written in between is lost
+            last = ended.is_set()  # checked before the file is read, so that nothing written in between is lost
             piece = await asyncio.to_thread(file.read, PIECE_BYTES)
             if piece:
                 yield piece

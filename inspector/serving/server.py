@@ -1,7 +1,6 @@
-"""A server for the pages of one command, on this machine only if nobody asks for more, which ends with it.
+"""Serves the pages of one command while it runs, by default on this machine only.
 
-The server is uvicorn, the apps are Starlette's: both know ranges, slow clients and clients
-that hang up.
+The server is uvicorn and the apps are Starlette's, both of which handle ranges, slow clients and clients that hang up.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from inspector.serving.guard import LOCALHOST, Guard, new_token
 PATIENCE_S = 10.0
 KEEP_ALIVE_S = 15
 MOST_CONNECTIONS = 64
-"""Open at the same time; others are told to come again."""
+"""Largest number of open connections; further ones are told to try again."""
 
 
 def bound_socket(bind: str) -> socket.socket:
@@ -33,20 +32,21 @@ def bound_socket(bind: str) -> socket.socket:
     """
     opened = socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET)
     try:
-        if not bind.strip():  # to the system that is every address
+        if not bind.strip():  # the system would take it as every address
             raise ValueError
         opened.bind((bind, 0))
     except (OSError, UnicodeError, ValueError):
         opened.close()
         raise ConfigError(
-            f"--bind {one_line(bind)[:100]!r} is not an address of this machine; 127.0.0.1 is for this machine alone, "
-            "0.0.0.0 for all that reach it."
+            f"--bind {one_line(bind)[:100]!r} is not an address of this machine; give 127.0.0.1 for this machine only, "
+            "or "
+            "0.0.0.0 for every machine that can reach it."
         ) from None
     return opened
 
 
 def host_of(address: IPv4Address | IPv6Address) -> str:
-    """The host of a URL that reaches a server at an address; this machine's name, where it listens at all of them."""
+    """The host of a URL that reaches a server at an address; this machine's name if it listens on all addresses."""
     if not address.is_unspecified:
         return str(address) if address.version == 4 else f"[{address}]"
     name = socket.gethostname()
@@ -58,18 +58,18 @@ def host_of(address: IPv4Address | IPv6Address) -> str:
 
 
 class PageServer:
-    """Serves an app while it is entered as a context.
+    """A context manager that serves an app.
 
     Attributes:
-        address: where the app's root is, with the token that opens it.
+        address: address of the app's root, with the token.
     """
 
     def __init__(self, app: ASGIApp, bind: str = LOCALHOST, data: str = "") -> None:
         """Listen on a free port; `inspector.serving.guard.Guard` stands before the app.
 
         Args:
-            app: to serve.
-            bind: address of this machine to listen on; of one that others reach, whoever has the token may come.
+            app: app to serve.
+            bind: address of this machine to listen on; if other machines reach it, whoever has the token may connect.
             data: see `Guard`.
 
         Raises:
@@ -99,7 +99,7 @@ class PageServer:
         deadline = time.monotonic() + PATIENCE_S
         while not self._server.started:
             if not self._thread.is_alive() or time.monotonic() > deadline:
-                raise CalibnetError("The server of pages does not start; is the machine out of ports or memory?")
+                raise CalibnetError("The page server did not start; free some memory or ports, and try again.")
             time.sleep(0.01)
         return self
 

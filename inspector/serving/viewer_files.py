@@ -1,4 +1,4 @@
-"""The files of Rerun's web viewer, which the installed Rerun only hands out as a web server."""
+"""The files of Rerun's web viewer, fetched from the web server of the installed Rerun."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from calibnet.runtime.writing import write_whole
 from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
 QUIET = b"console.debug = () => {};\n"
-"""Precedes the viewer's program, whose 15,000 sentences about its shaders take longer than making these."""
+"""Prepended to the viewer's program, whose 15,000 log lines about its shaders take longer than compiling them."""
 VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 
 
 def viewer_files(folder: Path) -> dict[str, Path]:
-    """The files that `fetch_viewer` put into a folder, by the paths of their addresses."""
+    """The files that `fetch_viewer` put into a folder, by the paths of their URLs."""
     return {"/": folder / "index.html", **{f"/{name}": folder / name for name in VIEWER_FILES}}
 
 
 class ViewerFilesError(CalibnetError):
-    """The web viewer's files cannot be had from the installed Rerun."""
+    """The web viewer's files cannot be fetched from the installed Rerun."""
 
 
 def fetch_viewer(folder: Path) -> None:
     """Get the web viewer's files (43 MB) from the installed Rerun.
 
     Raises:
-        CalibnetError: Rerun does not start, or does not have them.
+        CalibnetError: Rerun does not start, or lacks them.
     """
     port, web_port = free_port(), free_port()
     ports = ["--port", str(port), "--web-viewer-port", str(web_port)]
@@ -41,7 +41,7 @@ def fetch_viewer(folder: Path) -> None:
                 write_whole(folder / name, (QUIET if name == "re_viewer.js" else b"") + answer.read())
     except URLError as error:
         raise ViewerFilesError(
-            f"The installed Rerun does not hand out its web viewer ({error.reason}); reinstall rerun-sdk."
+            f"The web viewer could not be fetched from the installed Rerun ({error.reason}); reinstall rerun-sdk."
         ) from None
     finally:
         server.terminate()

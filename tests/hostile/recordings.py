@@ -189,7 +189,7 @@ def rows() -> Iterator[Row]:
                 what, damaged(command, lambda data, share=share: data[: int(share * len(data))]), words=("run.rrd",)
             )
         half = damaged(command, lambda data: data[: len(data) // 2])
-        words = ("run.rrd is cut off: only its 2 complete frames are used",)
+        words = ("run.rrd is cut off; only its 2 complete frames are used",)
         yield Row(f"recording cut to half: {command}", half, code, words, replaced=WRITTEN)
         yield Row(f"recording of zeros: {command}", damaged(command, lambda data: data[:8] + bytes(len(data) - 8)))
     for what, (entity, values) in SAID.items():

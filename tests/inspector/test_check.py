@@ -183,7 +183,7 @@ def test_one_frame_does_not_scatter(
 ) -> None:
     record(tmp_path / "own.rrd", length=1, detail="overview", as_is=True)
     code, _, err = call(capsys, tmp_path / "own.rrd", "--max-scatter-rotation", 1)
-    assert code == 3 and "which cannot scatter" in err
+    assert code == 3 and "so there is no scatter" in err
 
 
 def test_without_reference_it_is_one_sentence(

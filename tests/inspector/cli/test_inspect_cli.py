@@ -164,7 +164,7 @@ def test_report_keeps_the_recording_where_no_other_place_is_named(invoke: Invoke
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (("--color", "error"), "has none: give --range or --miscalibrate"),
+        (("--color", "error"), "has none; give --range or --miscalibrate"),
         (("--log", "curves,pictures"), "'pictures' is not a part of a frame; choose from curves,"),
         (("--log", "curves", "--detail", "full"), "belong together"),
         (("--detail", "custom"), "belong together"),

@@ -151,7 +151,7 @@ def test_what_a_method_cannot_do_is_a_sentence(
 
 
 def test_options_of_the_cascade_are_refused(calibrated: Callable[..., Path]) -> None:
-    with pytest.raises(click.UsageError, match="--stages and --preset are those of the cascade"):
+    with pytest.raises(click.UsageError, match="--stages and --preset apply to the cascade"):
         calibrated("boaster", stages=(3,))
     with pytest.raises(click.UsageError, match="choose one with --method"):
         calibrated("cascade", intrinsics=True)

@@ -109,7 +109,7 @@ def test_a_rig_is_one_folder_or_one_for_each_camera(rig: Path, tmp_path: Path) -
 
 
 def test_what_is_no_rig(rig: Path, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="holds no rig: put a folder of images/ and"):
+    with pytest.raises(DatasetError, match="is not a rig's folder; put a folder with images/ and"):
         open_rig([tmp_path])
     other = write_folder(tmp_path / "other" / "left", 1)
     with pytest.raises(DatasetError, match="Two cameras are called left"):
@@ -127,7 +127,7 @@ def test_rig_from_camera_goes_before_the_extrinsics(rig: Path) -> None:
     body_from_left = transform(rotation_from_vector([0.1, 0.2, 0.3]), [1.0, 2.0, 3.0])
     other = transform(rotation_from_vector([0.0, -0.01, 0.0]), [0.6, 0.0, 0.0])
     change(rig / "cameras" / "left", rig_from_camera=body_from_left.tolist())
-    with pytest.raises(DatasetError, match="Only some calibrations say rig_from_camera; add it to that of right"):
+    with pytest.raises(DatasetError, match="Only some calibrations have rig_from_camera; add it to those of right"):
         poses(open_rig([rig]), rigid=True)
     change(rig / "cameras" / "right", rig_from_camera=(body_from_left @ other).tolist())
     camera_from_rig, start = poses(open_rig([rig]), rigid=True)
@@ -146,14 +146,14 @@ def test_what_is_found_is_told_of_every_camera(rig: Path, invoke: Invoke, rigid:
     assert_allclose(content["cameras"]["right"]["camera_from_lidar"], right, atol=1e-9)
     expected = adjoint(RIGHT_FROM_LEFT) @ COVARIANCE @ adjoint(RIGHT_FROM_LEFT).T if rigid else COVARIANCE
     assert_allclose(content["cameras"]["right"]["sigma"]["covariance"], expected, atol=1e-12)
-    assert f"of 2 cameras {'as one rigid rig' if rigid else 'each on its own'}" in err
+    assert f"2 cameras, solved {'as one rigid rig' if rigid else 'one by one'}" in err
     assert_allclose(read_calibration(Path("found/right.yaml")).camera_from_lidar, right, atol=1e-9)
 
 
 def test_a_disturbed_rig_is_held_against_what_it_was(rig: Path, invoke: Invoke) -> None:
     _, out, _ = invoke(str(rig), "--rigid", "--miscalibrate", "0,0,0,0,0,0")
     assert "left: accepted, corrected by 0.37°" in out and "off the reference by 0.37°" in out
-    assert out.splitlines()[-1] == "Verdict: accepted, of 2 cameras as one rigid rig."
+    assert out.splitlines()[-1] == "Verdict: accepted (2 cameras, solved as one rigid rig)."
 
 
 def test_the_worst_camera_decides(rig: Path, invoke: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,7 +175,7 @@ def test_a_tolerance_is_handed_on_and_told(rig: Path, invoke: Invoke) -> None:
     residual = content["cameras"]["left"]["residual"]
     assert residual["rotation_deg"] == pytest.approx(0.5) and residual["translation_cm"] == pytest.approx(5.0)
     assert residual["match_error_px"] == 1.5
-    assert "left: accepted" in err and "0.50° / 5.0 cm from what its own frames say" in err
+    assert "left: accepted" in err and "0.50° / 5.0 cm from the result of its own frames" in err
     assert "as one rig, each within 0.5° / 2 cm of its place on it" in err
     assert invoke(str(rig), "--tolerance", "2cm")[0] == 2
     assert invoke(str(rig), "--tolerance", "1deg/1cm", "--rigid")[0] == 2

@@ -38,7 +38,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("watched", "code", "said"),
     [
-        (STEP, 1, ["Frame 50: the mount has moved by 0.5", "Changed: the mount moved once (100 frames, 1 skipped)."]),
+        (STEP, 1, ["Frame 50: the mount moved by 0.5", "Changed: the mount moved once (100 frames, 1 skipped)."]),
         (DRIFT, 1, ["Frames 0 to 299: the mount drifts by 1.", "Changed: the mount moved once (300 frames)."]),
         (STILL, 0, ["No change (100 frames). A step of 0."]),
         (BLIND, 4, ["Cannot tell. 12 frames are too few to tell a change; 16 are needed."]),

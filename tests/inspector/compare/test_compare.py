@@ -126,7 +126,7 @@ def test_without_any_reference_only_distances_are_left(runs: dict[str, RecordedR
 @pytest.mark.parametrize("setting", ["sequence", "rig", "camera"])
 def test_other_data_is_refused(runs: dict[str, RecordedRun], setting: str) -> None:
     one, other = (replace(runs["A"], settings={setting: value}) for value in ("x", "y"))
-    with pytest.raises(RecordingError, match=f"is of {setting} 'x' and .* is of|of {setting} 'y'"):
+    with pytest.raises(RecordingError, match=f"has the {setting} 'x' and .* has 'y'"):
         Comparison.of([one, other], ["A", "B"])
 
 
@@ -138,7 +138,7 @@ def test_other_pictures_under_the_same_numbers_are_refused(
             return fakes.make_frame(position, width=480)
 
     record(tmp_path / "wide.rrd", detail="overview", strides=(32,), sequence=Wider(3))
-    with pytest.raises(RecordingError, match="Frame 0 is another picture or has another camera"):
+    with pytest.raises(RecordingError, match="Frame 0 has a different image or camera"):
         Comparison.of([runs["A"], read_run(tmp_path / "wide.rrd")], ["A", "B"])
 
 

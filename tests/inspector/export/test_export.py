@@ -213,7 +213,7 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
     first, *others = recorded.frames
     moved = first.reference.copy()
     moved[0, 3] += 0.1
-    with pytest.raises(RecordingError, match="several cameras or mounts; choose one with --frame"):
+    with pytest.raises(RecordingError, match="several cameras or mounts; choose one frame with --frame"):
         exported_median(replace(recorded, frames=(replace(first, reference=moved), *others)))
 
 
@@ -226,9 +226,9 @@ def test_frames_of_several_mounts_have_no_median(recorded: RecordedRun) -> None:
         (("--folder", "x", "--median"), 2, "leave them out with --folder"),
         (("RUN", "--lidar-frame", "two words"), 2, "not a valid ROS frame name"),
         (("RUN", "--drive"), 3, "record it with --drive"),
-        (("RUN", "--frame", 9), 3, "has no complete frame 9, only frames from 0 to 2"),
+        (("RUN", "--frame", 9), 3, "has no complete frame 9; choose one from 0 to 2"),
         (("--folder", "nowhere"), 3, "cannot be read"),
-        (("nowhere.rrd",), 3, "There is no recording nowhere.rrd"),
+        (("nowhere.rrd",), 3, "nowhere.rrd does not exist"),
     ],
 )
 def test_what_cannot_be_exported(

@@ -25,10 +25,10 @@ def test_formats_keep_their_promises(name: str) -> None:
 @pytest.mark.parametrize(
     ("write", "sentence"),
     [
-        (lambda exported: as_json(exported).encode(), "returns bytes and not text"),
+        (lambda exported: as_json(exported).encode(), "returns bytes instead of text"),
         (lambda exported: as_json(exported).strip(), "line break"),
         (lambda exported: as_json(replace(exported, origin="me")), "where the calibration comes from"),
-        (lambda exported: f"{np.round(exported.camera_from_lidar, 3)} {exported.origin}\n", "tell a change"),
+        (lambda exported: f"{np.round(exported.camera_from_lidar, 3)} {exported.origin}\n", "show a change"),
     ],
 )
 def test_what_a_format_does_wrong_is_named(write: Callable[[Exported], str], sentence: str) -> None:

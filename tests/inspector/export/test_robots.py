@@ -105,5 +105,5 @@ def test_koide3_s_file_is_read_back(tmp_path: Path):
         assert found.camera is not None and found.camera.same(camera)
         assert_allclose(found.camera_from_lidar, example().camera_from_lidar, atol=1e-12)
     double_sphere = replace(example().camera, model="double_sphere", coefficients=np.array([0.1, 0.5]))
-    with pytest.raises(ConfigError, match="has no double_sphere lens; export as json, opencv or yaml"):
+    with pytest.raises(ConfigError, match="does not support the lens double_sphere; export as json, opencv or yaml"):
         as_koide3(replace(example(), camera=double_sphere))

@@ -96,7 +96,7 @@ def test_pictures_come_back(full_recording: Path, fakes: ModuleType) -> None:
     pixels = project(frame.points, frame.camera_from_lidar, frame.camera).pixels
     nearest = np.abs(pixels[None] - points.uv[:50, None]).max(axis=-1).min(axis=1)
     assert nearest.max() <= 0.126  # positions are rounded to a quarter of a pixel
-    with pytest.raises(RecordingError, match="holds no image of frame 7"):
+    with pytest.raises(RecordingError, match="has no image of frame 7"):
         run.image(7)
 
 
@@ -165,11 +165,11 @@ def from_before(file: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda file: None, "There is no recording"),
+        (lambda file: None, "does not exist"),
         (lambda file: file.write_bytes(b""), "is not a Rerun recording"),
         (lambda file: file.write_bytes(b"not a recording" * 99), "is not a Rerun recording"),
         (foreign, "was recorded by 'somebody-else'"),
-        (from_before, "comes from an earlier calib-inspect"),
+        (from_before, "was made by an earlier calib-inspect"),
     ],
 )
 def test_what_cannot_be_read_is_one_sentence(make: Callable[[Path], Any], sentence: str, tmp_path: Path) -> None:

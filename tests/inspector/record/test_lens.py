@@ -112,4 +112,4 @@ def test_coefficients_with_names_of_their_own_are_read_back(
 
 
 def test_kitti_has_no_lens_and_says_so(run: RecordedRun) -> None:
-    assert "# lens: this format has no lens; rectify the pictures" in export_as("kitti", exported_median(run))
+    assert "# lens: this format has no lens; first rectify the images" in export_as("kitti", exported_median(run))

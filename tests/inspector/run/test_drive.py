@@ -152,7 +152,7 @@ def test_a_comparison_leads_with_the_drives(
 def test_frames_of_several_mounts_are_no_drive(record: Callable[..., Any], tmp_path: Path) -> None:
     file = tmp_path / "mounts.rrd"
     summary = record(file, detail="overview", strides=(32,), drive=True, per_frame=True)
-    assert summary.drive == "The frames are of several mounts: the whole drive is not solved as one."
+    assert summary.drive == "The frames come from several mounts: the whole drive is not solved as one."
     assert summary.drive in summary.lines() and summary.drive in text_of(file)
     assert read_run(file).drive is None
 
@@ -194,7 +194,7 @@ def test_frames_that_became_worse_are_counted(record: Callable[..., Any], tmp_pa
     assert told[1].startswith("Worst: frame 1, ")
     caption = said_last(tmp_path / "w.rrd", entities.caption(entities.OVERLAY_WORST), "text")
     assert caption.startswith("frame 1, worse than before"), "the tab of the worst frame shows it at all times"
-    assert told[2] == "1 of 3 frames worse than before, in angle or place: 1."
+    assert told[2] == "1 of 3 frames got worse in rotation or translation: 1."
 
 
 def test_the_end_of_a_run_has_what_was_found_as_a_matrix(record: Callable[..., Any], tmp_path: Path) -> None:

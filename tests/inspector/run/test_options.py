@@ -28,9 +28,9 @@ def asked(**options: Any) -> RunOptions:
         ({"range": RANGE, "miscalibration": np.eye(4)}, "Give --range or --miscalibrate, not both."),
         ({"miscalibration": np.eye(4), "per_frame": True}, "--per-frame draws from --range"),
         ({"drive": True, "per_frame": True}, "--drive needs one mount for all frames"),
-        ({"as_is": True, "color": Coloring.ERROR}, "test/drive has none: give --range or --miscalibrate"),
-        ({"detail": Detail.CUSTOM}, "belong together"),
-        ({"detail": Detail.FULL, "parts": frozenset({Part.SCENE})}, "belong together"),
+        ({"as_is": True, "color": Coloring.ERROR}, "test/drive has none; give --range or --miscalibrate"),
+        ({"detail": Detail.CUSTOM}, "give both or neither"),
+        ({"detail": Detail.FULL, "parts": frozenset({Part.SCENE})}, "give both or neither"),
     ],
 )
 def test_options_that_contradict_each_other(options: dict[str, Any], sentence: str) -> None:
@@ -50,7 +50,7 @@ def test_nothing_asked_is_a_run_of_everything_within_five_degrees() -> None:
 def test_what_is_asked_arrives() -> None:
     options = asked(frames="1:", range=RANGE, per_frame=True, seed=3, parts=frozenset({Part.SCENE, Part.CURVES}))
     assert options.positions == [1, 2]
-    assert str(options.start) == "miscalibrated within 2/0.2, anew every frame, seed 3"
+    assert str(options.start) == "miscalibrated within 2/0.2, anew in every frame, seed 3"
     assert options.contents.parts == {Part.SCENE, Part.CURVES}
     assert str(asked(as_is=True).start) == "from the calibration as it is"
     assert str(asked(miscalibration=np.eye(4)).start) == "miscalibrated as given"
@@ -97,10 +97,10 @@ def test_of_a_long_sequence_frames_from_all_over_it_are_run_and_it_says_what_tha
     assert not options.contents.dense and options.identity([5])["detail"] == "overview"
     assert options.identity([5])["frames"] == "200 spread over all"
     assert options.expectation == (
-        "200 of its 4,541 frames, spread over all (--frames : runs every one). Some 2 minutes on two cores, some "
-        "180 MB in overview detail (--detail full keeps everything)."
+        "200 of its 4,541 frames, evenly spread (--frames : runs all). This takes about 2 minutes on two cores, and "
+        "about 180 MB in overview detail (--detail full keeps everything)."
     )
     everything = RunOptions(sequence=many, frames=":", detail=Detail.FULL)
     assert len(everything.positions) == 4541 and everything.contents.dense
-    assert everything.expectation == "Some 68 minutes on two cores, some 21.3 GB."
+    assert everything.expectation == "This takes about 68 minutes on two cores, and about 21.3 GB."
     assert asked().expectation == "" and asked().contents.dense

@@ -129,7 +129,7 @@ def test_bad_frames_are_skipped_named_and_counted(
     file = tmp_path / "run.rrd"
     summary = record(file, length=5, **SMALL, sequence=BrokenSequence(fakes.FakeSequence(5), bad=(0, 2)))
     assert summary.frames == 3 and [bad.frame for bad in summary.skipped] == [0, 2]
-    assert "2 frames skipped, which could not be used: 0, 2." in summary.lines()
+    assert "2 frames skipped because they could not be used: 0, 2." in summary.lines()
     assert [frame for frame, _ in read(file, "image", "EncodedImage:blob")] == [1, 3, 4]
     told = read(file, "skipped", "TextLog:text")
     assert [frame for frame, _ in told] == [0, 2] and "cut short" in told[1][1].as_py()[0]
