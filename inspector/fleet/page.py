@@ -20,9 +20,10 @@ from inspector.report.template import html_page, stylesheet
 MOST_ROWS, MOST_CARS = 1000, 300
 """Drives and mounts on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
-HEADS = ("car", "drive", "date", "verdict", "moved", "sigma", "by its car", "frames", "why", "picture")
+UNCERTAINTY = "± (1σ)"
+HEADS = ("car", "drive", "date", "verdict", "moved", UNCERTAINTY, "by its car", "frames", "why", "picture")
 LONGEST_REASON = 300
-"""Characters; the whole of it is in the table and in the drive's log."""
+"""Characters of a reason that are shown at once; the rest unfolds."""
 
 
 def write_page(rows: Sequence[Row], folder: Path) -> Path:
@@ -106,7 +107,7 @@ def _row(row: Row, folder: Path) -> str:
         f"<td>{escape(row.date[:10])}</td>",
         f'<td class="word {GRADES[row.word]}" data-key="{ORDER.index(row.word)}">{row.word}{cause}{alone}</td>',
         _pair("moved", row.moved_deg, row.moved_cm, off(row)),
-        _pair("sigma", row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
+        _pair(UNCERTAINTY, row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
         _pair("by its car", row.by_car_moved_deg, row.by_car_moved_cm, row.by_car_moved_deg or 0.0),
         f'<td class="number" data-key="{row.frames}" data-head="frames">{used}</td>',
         f'<td class="reason">{_reasons(row)}</td>',
@@ -117,10 +118,19 @@ def _row(row: Row, folder: Path) -> str:
 
 def _reasons(row: Row) -> str:
     """Why: first what the word is for, then what else there is."""
-    alone, together = (escape(one_line(text, LONGEST_REASON)) for text in (row.reason, row.by_car_reason))
+    alone, together = _folded(row.reason), _folded(row.by_car_reason)
     if row.word != row.verdict:
         return f'{together}<br><span class="about">Alone: {alone}</span>'
     return alone + (f'<br><span class="about">By its car: {together}</span>' if together else "")
+
+
+def _folded(text: str) -> str:
+    """A text of which, where it is long, the beginning is shown until one wants the rest."""
+    whole = one_line(text)
+    if len(whole) <= LONGEST_REASON:
+        return escape(whole)
+    end = whole.rfind(" ", 0, LONGEST_REASON) if " " in whole[:LONGEST_REASON] else LONGEST_REASON
+    return f"<details><summary>{escape(whole[:end])} …</summary>{escape(whole[end:].strip())}</details>"
 
 
 def _pair(head: str, degrees: float | None, centimetres: float | None, key: float) -> str:

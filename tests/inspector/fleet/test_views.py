@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 from urllib.error import HTTPError
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 from urllib.request import Request, urlopen
 
 import numpy as np
@@ -212,10 +214,15 @@ def test_foreign_names_are_text_on_the_page(tmp_path: Path) -> None:
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
 
 
-def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
-    import re
-    from urllib.parse import unquote
+def test_a_long_reason_unfolds_and_loses_nothing(tmp_path: Path) -> None:
+    reason = "It begins so. " + 40 * "Frame 7: cut. " + "<It ends so.>"
+    page = make_page([row("d1", reason=reason), row("d2", reason="Short.")], tmp_path)
+    (start, rest) = re.findall(r"<details><summary>(.*) …</summary>(.*)</details>", page)[0]
+    assert len(start) <= 300 and unescape(f"{start} {rest}") == reason
+    assert '<td class="reason">Short.</td>' in page
 
+
+def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
     Path("DRIVES.csv").write_text("path,car,drive\ncar-a/monday,50% <a>,x/y?z#w\n")
     assert invoke("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")[0] == 0
     code, out, _ = invoke("fleet-report", "all")
