@@ -62,13 +62,15 @@ def serve_report(folder: Path) -> None:
     from calibnet.runtime.interruption import StopRequest
     from inspector.record.outputs import has_display
     from inspector.report.serve import report_app
+    from inspector.report.write import PAGE
     from inspector.serving.browser import opened_page
     from inspector.serving.server import PageServer
-    from inspector.serving.viewer_files import fetch_viewer
+    from inspector.serving.viewer_files import INDEX, fetch_viewer
 
     with tempfile.TemporaryDirectory(prefix="calib-inspect-") as viewer:
         fetch_viewer(Path(viewer))
-        with StopRequest() as stop, PageServer(report_app(folder, Path(viewer))) as server:
+        app, pages = report_app(folder, Path(viewer)), [folder / PAGE, Path(viewer) / INDEX]
+        with StopRequest() as stop, PageServer(app, pages=pages) as server:
             say(f"Serving at {server.address} until Ctrl-C.")
             with opened_page(server.address) if has_display() else nullcontext():
                 stop.wait()

@@ -16,7 +16,7 @@ from inspector.programs import open_window
 from inspector.record.outputs import has_display
 from inspector.serving.files import file_route
 from inspector.serving.server import PageServer
-from inspector.serving.viewer_files import fetch_viewer, viewer_files
+from inspector.serving.viewer_files import INDEX, fetch_viewer, viewer_files
 
 
 @contextmanager
@@ -32,8 +32,8 @@ def open_viewer(address: str, in_browser: bool, headless: bool) -> Iterator[str]
         data = f"http://{urlsplit(address).netloc}"
         with TemporaryDirectory(prefix="calib-inspect-") as folder:
             fetch_viewer(Path(folder))
-            pages = Starlette(routes=[file_route(viewer_files(Path(folder)))])
-            with PageServer(pages, data=data) as server:
+            app = Starlette(routes=[file_route(viewer_files(Path(folder)))])
+            with PageServer(app, data=data, pages=[Path(folder) / INDEX]) as server:
                 yield f"In a browser: {server.address}?url={quote(address, safe='')}&hide_welcome_screen=1"
         return
     opened = False

@@ -153,11 +153,11 @@ class Outputs:
         """Give out a file while it grows, in Rerun's web viewer, whose files go to a folder."""
         from inspector.serving.recording import RECORDING, recording_app  # only who serves waits for a server's import
         from inspector.serving.server import PageServer
-        from inspector.serving.viewer_files import fetch_viewer
+        from inspector.serving.viewer_files import INDEX, fetch_viewer
 
         fetch_viewer(folder)
         app = recording_app(file, folder, self._begun, self._ended)
-        server = self._serving.enter_context(PageServer(app, self.bind))
+        server = self._serving.enter_context(PageServer(app, self.bind, pages=[folder / INDEX]))
         self.page = f"{server.address}?url={quote(server.address + RECORDING, safe='')}&hide_welcome_screen=1"
 
 

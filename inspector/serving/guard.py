@@ -7,7 +7,11 @@ printed address has. A content security policy forbids pages to load anything fr
 
 from __future__ import annotations
 
+import re
 import secrets
+from base64 import b64encode
+from hashlib import sha256
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -24,10 +28,25 @@ def new_token() -> str:
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
+def inline_scripts(*pages: Path) -> str:
+    """What a policy names the scripts within HTML files by, so that they run, and one that was slipped in does not."""
+    texts = (page.read_text("utf-8") for page in pages)
+    scripts = (script for text in texts for script in re.findall(r"<script>(.*?)</script>", text, re.DOTALL))
+    return " ".join(f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" for script in scripts)
+
+
 class Guard:
     """ASGI middleware that checks Host, Origin and token, and takes the token off the path."""
 
-    def __init__(self, app: ASGIApp, port: int, token: str, only_here: str | None = LOCALHOST, data: str = "") -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        port: int,
+        token: str,
+        only_here: str | None = LOCALHOST,
+        data: str = "",
+        scripts: str = "",
+    ) -> None:
         """Guard an app.
 
         Args:
@@ -37,13 +56,15 @@ class Guard:
             only_here: host of the server's address if only this machine reaches it; None if others do as well, so that
                 the server may have any name and only the token is checked.
             data: address, without a path, of another server of ours from which pages may load.
+            scripts: hashes from `inline_scripts` of the scripts within the app's pages.
         """
         self._app, self._only_here = app, only_here
         self._hosts = {f"{host}:{port}" for host in (only_here or LOCALHOST, LOCALHOST, "localhost")}
         self._token = token
         live, pages = (" ".join(f"{scheme}://{host}" for host in sorted(self._hosts)) for scheme in ("ws", "http"))
         self._headers = {
-            "content-security-policy": "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:; "
+            "content-security-policy": "default-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+            f"object-src 'none'; script-src 'self' 'wasm-unsafe-eval' {scripts}; "
             f"connect-src 'self' data: blob: {live} {data}; frame-src {pages}; frame-ancestors {pages}; "
             "form-action 'self'; base-uri 'none'",
             "cross-origin-resource-policy": "same-origin",

@@ -8,7 +8,9 @@ from __future__ import annotations
 import socket
 import threading
 import time
+from collections.abc import Iterable
 from ipaddress import IPv4Address, IPv6Address, ip_address
+from pathlib import Path
 from types import TracebackType
 
 import uvicorn
@@ -16,7 +18,7 @@ from starlette.types import ASGIApp
 
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.text import one_line
-from inspector.serving.guard import LOCALHOST, Guard, new_token
+from inspector.serving.guard import LOCALHOST, Guard, inline_scripts, new_token
 
 PATIENCE_S = 10.0
 KEEP_ALIVE_S = 15
@@ -64,13 +66,14 @@ class PageServer:
         address: address of the app's root, with the token.
     """
 
-    def __init__(self, app: ASGIApp, bind: str = LOCALHOST, data: str = "") -> None:
+    def __init__(self, app: ASGIApp, bind: str = LOCALHOST, data: str = "", pages: Iterable[Path] = ()) -> None:
         """Listen on a free port; `inspector.serving.guard.Guard` stands before the app.
 
         Args:
             app: app to serve.
             bind: address of this machine to listen on; if other machines reach it, whoever has the token may connect.
             data: see `Guard`.
+            pages: HTML files of the app that have scripts within them, see `inspector.serving.guard.inline_scripts`.
 
         Raises:
             ConfigError: this machine has no such address.
@@ -80,8 +83,9 @@ class PageServer:
         token, here = new_token(), ip_address(address)
         host = host_of(here)
         self.address = f"http://{host}:{port}/{token}/"
+        only_here, scripts = host if here.is_loopback else None, inline_scripts(*pages)
         config = uvicorn.Config(
-            Guard(app, port, token, only_here=host if here.is_loopback else None, data=data),
+            Guard(app, port, token, only_here=only_here, data=data, scripts=scripts),
             lifespan="off",
             log_config=None,
             access_log=False,

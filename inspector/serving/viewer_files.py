@@ -12,12 +12,13 @@ from inspector.programs import LOCALHOST, free_port, rerun_binary, start_program
 
 QUIET = b"console.debug = () => {};\n"
 """Prepended to the viewer's program, whose 15,000 log lines about its shaders take longer than compiling them."""
-VIEWER_FILES = ("index.html", "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
+INDEX = "index.html"
+VIEWER_FILES = (INDEX, "re_viewer.js", "re_viewer_bg.wasm", "favicon.ico")
 
 
 def viewer_files(folder: Path) -> dict[str, Path]:
     """The files that `fetch_viewer` put into a folder, by the paths of their URLs."""
-    return {"/": folder / "index.html", **{f"/{name}": folder / name for name in VIEWER_FILES}}
+    return {"/": folder / INDEX, **{f"/{name}": folder / name for name in VIEWER_FILES}}
 
 
 class ViewerFilesError(CalibnetError):

@@ -82,6 +82,19 @@ function showChoices(answer) {
     }));
   for (const [i, [value]] of choices.entries()) {
     buttons[i].setAttribute("aria-checked", String(value === live.step));
+    buttons[i].tabIndex = value === live.step ? 0 : -1;
     buttons[i].onclick = () => show(live.current, value);
   }
 }
+
+// Arrows go through these buttons as through every group of radio buttons, and not on to the next frame.
+const BY = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
+at("shown").addEventListener("keydown", (event) => {
+  const buttons = Array.from(at("shown").children), by = BY[event.key];
+  if (!by || event.ctrlKey || event.altKey || event.metaKey) return;
+  event.preventDefault();
+  event.stopPropagation();
+  const next = buttons.at((buttons.indexOf(event.target) + by) % buttons.length);
+  next.focus();
+  next.click();
+});

@@ -166,6 +166,25 @@ def test_the_page_and_its_viewer_keep_to_the_policy(
     hint = page.frame_locator("#viewer").locator("#hint")
     expect(hint).to_have_text("Taking in your first try.", timeout=PATIENCE)
     assert not [text for text in complaints if "Content Security Policy" in text]
+    page.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'slipped = 1'}))")
+    assert page.evaluate("typeof slipped") == "undefined"
+
+
+def test_arrows_go_through_what_is_drawn_and_not_to_another_frame(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    session = make()
+    page = opened(browser, serve(session))
+    page.get_by_role("radio", name="Mine").focus()
+    page.keyboard.press("ArrowRight")
+    says(page, "#shown :focus", "Reference")
+    says(page, "#caption", "reference")
+    page.keyboard.press("ArrowRight")
+    says(page, "#shown :focus", "Mine")
+    page.keyboard.press("ArrowUp")
+    says(page, "#caption", "reference")
+    assert page.locator("#shown [tabindex='0']").all_inner_texts() == ["Reference"]
+    assert session.workspace.position == 0
 
 
 def test_keys_fields_and_undo(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:

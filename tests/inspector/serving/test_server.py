@@ -6,6 +6,7 @@ import http.client
 import socket
 import stat
 from collections.abc import Iterator
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -18,6 +19,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from inspector.serving.browser import opened_page
+from inspector.serving.guard import inline_scripts
 from inspector.serving.server import PageServer
 
 
@@ -134,7 +136,21 @@ def test_pages_may_compile_the_viewer_and_evaluate_nothing_else(server: PageServ
     connection.request("GET", address.path)
     policy = str(connection.getresponse().headers["content-security-policy"])
     connection.close()
-    assert "'wasm-unsafe-eval'" in policy and "'unsafe-eval'" not in policy
+    scripts = next(part.split() for part in policy.split(";") if part.split()[0] == "script-src")
+    assert scripts[1:] == ["'self'", "'wasm-unsafe-eval'"]
+
+
+def test_scripts_within_a_page_are_named_by_their_hash(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("<!doctype html><script src='x.js'></script><script>alert(1)</script>")
+    digest = "'sha256-bhHHL3z2vDgxUt0W3dWQOrprscmda2Y5pLsLg4GF+pI='"  # base64 of what sha256sum says of alert(1)
+    assert inline_scripts(page) == digest
+    with PageServer(Starlette(), pages=[page]) as running:
+        address = urlsplit(running.address)
+        connection = http.client.HTTPConnection(str(address.hostname), address.port, timeout=10)
+        connection.request("GET", address.path)
+        assert f"'wasm-unsafe-eval' {digest};" in str(connection.getresponse().headers["content-security-policy"])
+        connection.close()
 
 
 def test_the_token_is_on_no_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
