@@ -61,8 +61,8 @@ def serve_report(folder: Path) -> None:
     """Serve a report and the viewer until Ctrl-C or SIGTERM; opens a browser if there is a display."""
     from calibnet.runtime.interruption import StopRequest
     from inspector.record.outputs import has_display
+    from inspector.report.files import PAGE
     from inspector.report.serve import report_app
-    from inspector.report.write import PAGE
     from inspector.serving.browser import opened_page
     from inspector.serving.server import PageServer
     from inspector.serving.viewer_files import INDEX, fetch_viewer

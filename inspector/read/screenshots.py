@@ -52,7 +52,7 @@ def take_pictures(
             stem = file_stem(page)
             if not wanted or any(file_stem((part,)) in stem for part in wanted):
                 viewer.show(page)
-                file = folder / f"{stem}.png"
+                file = folder / f"{stem or recording.stem}.png"  # a recording without tabs is one page
                 write_whole(file, smaller(viewer.picture()), Kind.PNG)
                 yield file
 

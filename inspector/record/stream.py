@@ -62,12 +62,14 @@ class Stream:
         self.rec.send_recording_name(one_line(title))
 
     def _opened(self, sinks: Sequence[Any], is_new: bool) -> rr.RecordingStream:
-        """Rerun's stream, which of a new recording says when it was begun."""
+        """Rerun's stream, which says of a new recording when it was begun; a whole one stands still when opened."""
         application_id, recording_id = self._identity
         batching = rr.ChunkBatcherConfig(flush_tick=timedelta(days=1), flush_num_bytes=FLUSH_BYTES)
         rec = rr.RecordingStream(
             application_id, recording_id=recording_id, batcher_config=batching, send_properties=is_new
         )
+        if not is_new and hasattr(self._blueprint, "time_panel"):  # else a viewer plays it at once, to its last frame
+            self._blueprint.time_panel.play_state = "Paused"
         with _passed_on(self._blueprint) as blueprint:
             if sinks:
                 rec.set_sinks(*sinks, default_blueprint=blueprint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +13,25 @@ import rerun.blueprint as rrb
 
 from calibnet.runtime.claim import Claim
 from calibnet.runtime.writing import Kind
-from inspector import entities
+from inspector import colors, entities
+from inspector.record.pictures.legends import log_names
 from inspector.record.stream import Stream
+from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import View, curve_view, legend
 
 if TYPE_CHECKING:
     from calibnet.training.progress import Progress
     from calibnet.training.validation import ValidationFigures
+
+
+LEGEND_ERRORS, LEGEND_LOSSES = "legend/errors", "legend/losses"
+ON_TRAINING = ("training", colors.STAGES[4])
+HELD_OUT = {
+    "{}": ("held-out frames, median", colors.FOUND),
+    "{}_p95": ("95 % of them are below", colors.STAGES[2]),
+    "initial_{}": ("before the stage, median", colors.INITIAL),
+}
+"""Curves of figures on held-out frames, by the pattern of their names: what they are called, and their colour."""
 
 
 class TrainingLog:
@@ -28,9 +42,20 @@ class TrainingLog:
         sinks = [self._claim.begin()]
         self._stream = Stream(entities.TRAINING_APPLICATION_ID, uuid4().hex, name, sinks, training_blueprint())
         self.recording = self._stream.rec
+        self._rec = Subtree(self.recording)
+        log_names(self._rec, LEGEND_ERRORS, dict([ON_TRAINING, *HELD_OUT.values()]))
+        for kind, unit in entities.ERROR_KINDS.items():
+            self._name(f"{entities.TRAINING}/{kind}_{unit}", *ON_TRAINING)
+            for pattern, named in HELD_OUT.items():
+                self._name(f"{entities.VALIDATION}/{pattern.format(kind)}_{unit}", *named)
 
     def progressed(self, progress: Progress) -> None:
         """Log the running means of the losses."""
+        names = [name for name in progress.losses if not name.endswith(tuple(entities.ERROR_KINDS.values()))]
+        terms = dict(zip(names, itertools.cycle(colors.STAGES.values())))
+        log_names(self._rec, LEGEND_LOSSES, terms)
+        for name, color in terms.items():
+            self._name(f"{entities.TRAINING}/{name}", name, color)
         self._at(progress)
         for loss, value in progress.losses.items():
             if not math.isfinite(value):  # the warm-up has no pose whose error could be plotted
@@ -55,28 +80,30 @@ class TrainingLog:
             self._claim.complete()
         self._claim.release()
 
+    def _name(self, path: str, name: str, color: colors.Rgb) -> None:
+        line = rr.SeriesLines(names=name, colors=color, widths=2.0)
+        self._rec.log_once(path, line, rr.SeriesPoints(names=name, colors=color, marker_sizes=2.5))
+
     def _at(self, progress: Progress) -> None:
         self.recording.set_time("samples", sequence=progress.samples)
         self.recording.set_time("training time", duration=60 * progress.minutes)
 
 
 def training_blueprint() -> rrb.Blueprint:
-    """Losses above, errors in degrees and centimetres below."""
-
-    def plot(name: str, *contents: str) -> rrb.TimeSeriesView:
-        return rrb.TimeSeriesView(name=name, contents=list(contents))
-
-    training, held_out = f"/{entities.TRAINING}", f"/{entities.VALIDATION}"
-    rotation = [f"{training}/rotation_deg"]
-    rotation += [f"{held_out}/{name}_deg" for name in ("rotation", "rotation_p95", "initial_rotation")]
-    translation = [f"{training}/translation_cm"]
-    translation += [f"{held_out}/{name}_cm" for name in ("translation", "initial_translation")]
-    losses = [f"{training}/**", f"- {training}/rotation_deg", f"- {training}/translation_cm"]
-    return rrb.Blueprint(
-        rrb.Vertical(
-            plot("Losses (weighted)", *losses),
-            rrb.Horizontal(plot("Rotation error, degrees", *rotation), plot("Translation error, cm", *translation)),
-        ),
-        rrb.TimePanel(timeline="samples"),
-        collapse_panels=True,
+    """Errors in degrees and centimetres above, what was minimised below."""
+    errors = rrb.Horizontal(
+        *(
+            curve_view(
+                f"{kind.capitalize()} error [{unit}]",
+                "/",
+                f"/{entities.TRAINING}/{kind}_{unit}",
+                *(f"/{entities.VALIDATION}/{name.format(kind)}_{unit}" for name in HELD_OUT),
+            )
+            for kind, unit in entities.ERROR_KINDS.items()
+        )
     )
+    figures = (f"- /{entities.TRAINING}/{kind}_{unit}" for kind, unit in entities.ERROR_KINDS.items())
+    losses = curve_view("Terms of the loss, weighted", f"/{entities.TRAINING}", "$origin/**", *figures)
+    rows: list[View] = [errors, legend("Errors", LEGEND_ERRORS), losses, legend("Losses", LEGEND_LOSSES)]
+    panel = rrb.TimePanel(timeline="samples", state="collapsed")
+    return rrb.Blueprint(rrb.Vertical(*rows, row_shares=[10, 1, 10, 1]), panel, collapse_panels=True)

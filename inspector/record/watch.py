@@ -11,6 +11,7 @@ from calibnet.watch import Watch
 from inspector import entities
 from inspector.record.stream import Stream
 from inspector.record.subtree import Subtree
+from inspector.record.tabs.views import span_named
 from inspector.record.tabs.watch import log_curve_styles, log_watch, watch_view
 
 
@@ -30,7 +31,7 @@ def record_watch(sinks: Sequence[Any], title: str, recording_id: str, found: Wat
     stream = Stream(entities.APPLICATION_ID, recording_id, title, sinks, watch_blueprint())
     try:
         rec = Subtree(stream.rec)
-        log_curve_styles(rec)
+        log_curve_styles(rec, {} if found is None else span_named(int(found.frames[0]), int(found.frames[-1])))
         log_watch(rec, found, lines, lambda frame: stream.rec.set_time(entities.FRAME, sequence=frame))
     finally:
         stream.close()

@@ -46,12 +46,11 @@ def log_map_legends(rec: Subtree) -> None:
 def log_decided_legend(rec: Subtree, with_truth: bool) -> None:
     """What the brightness of maps of where probability lies stands for, at `entities.LEGEND_DECIDED`."""
     strip = colors.map_colors(np.linspace(0.0, 1.0, BAR_WIDTH), 0.0, 1.0)
-    low, high = "undecided: all displacements alike", "decided: one has all probability"
-    labels = {
-        0.0: f"{low}; none on the truth" if with_truth else low,
-        0.5: "the hourglass should brighten",
-        1.0: f"{high}; all on the truth" if with_truth else high,
-    }
+    low, brighten, high = "undecided: all displacements alike", "the hourglass should brighten", "decided: one has all"
+    if with_truth:
+        low, high = "undecided, none on the truth", "decided, all on the truth"
+        brighten += "; no colour: the truth is beyond its window"
+    labels = {0.0: low, 0.5: brighten, 1.0: high}
     bar = Bar(strip, labels)
     _log_bar(rec, entities.LEGEND_DECIDED, bar, POINT_BAR_HEIGHT)
 

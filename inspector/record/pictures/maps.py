@@ -74,6 +74,13 @@ def mass_on_truth(probability: NDArray[np.floating], true: NDArray[np.floating])
     return np.clip(mass, 0.0, 1.0)
 
 
+def within_window(scale: ScaleTrace, true: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """``[h, w]``: where the true displacement ``[h, w, 2]`` in cells is one of those that the window searches."""
+    down, across = scale.probability.shape[:2]
+    reach = np.array([across // 2 + 1, down // 2 + 1])
+    return np.asarray((abs(true) <= reach).all(axis=-1))
+
+
 def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:
     """``[Dy, Dx, h, w]``: what the matching scores alone, before aggregation, would make of every displacement."""
     scores = LOGIT_SCALE * scale.volume.astype(np.float32)

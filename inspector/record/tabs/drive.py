@@ -179,11 +179,8 @@ def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
         f"{error.translation_cm:.1f} cm; "
     )
-    sure = f"sure to {estimate.rotation_deg:.2f}° / {estimate.translation_cm:.1f} cm"
+    sure = f"±{estimate.rotation_deg:.2f}° / {estimate.translation_cm:.1f} cm (1σ)"
     if estimate.networks is None:
-        return f"{result}by the frames' scatter it is {sure}, not counting what all of them get wrong."
+        return f"{result}{sure} by the frames' scatter, not counting what all of them get wrong."
     alone = pose_error(estimate.networks.camera_from_lidar, initial if reference is None else reference)
-    return (
-        f"{result}{sure} (one standard deviation). Before its edges were aligned: {alone.rotation_deg:.2f}° / "
-        f"{alone.translation_cm:.1f} cm."
-    )
+    return f"{result}{sure}. Before its edges were aligned: {alone.rotation_deg:.2f}° / {alone.translation_cm:.1f} cm."

@@ -18,7 +18,13 @@ from inspector.record.contents import Contents, Part
 from inspector.record.observation import Grid, Layout, Observation, StageLayout
 from inspector.record.pictures.channel_grid import channel_grid, liveliest_channels, palette_png
 from inspector.record.pictures.legends import log_decided_legend
-from inspector.record.pictures.maps import decidedness, mass_on_truth, matching_probability, share_image
+from inspector.record.pictures.maps import (
+    decidedness,
+    mass_on_truth,
+    matching_probability,
+    share_image,
+    within_window,
+)
 from inspector.record.pictures.matches import StartingPoints
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import View, image_view, legend, map_view, scale_name, with_legend
@@ -99,12 +105,14 @@ def _log_probability(rec: Subtree, stage: StageTrace, scale: ScaleTrace, points:
     """How decided the windows are, and how much of them lies on the truth, before and after aggregation."""
     before = matching_probability(scale)
     maps = {DECIDED_BEFORE: decidedness(before), DECIDED_AFTER: decidedness(scale.probability)}
+    seen = dict.fromkeys(maps, scale.occupied)
     true = points.true_field(scale.stride)
     if true is not None:
-        maps[TRUTH_BEFORE] = mass_on_truth(before, true / scale.stride)
-        maps[TRUTH_AFTER] = mass_on_truth(scale.probability, true / scale.stride)
+        cells = true / scale.stride
+        maps |= {TRUTH_BEFORE: mass_on_truth(before, cells), TRUTH_AFTER: mass_on_truth(scale.probability, cells)}
+        seen |= dict.fromkeys((TRUTH_BEFORE, TRUTH_AFTER), scale.occupied & within_window(scale, cells))
     for name, values in maps.items():
-        rec.log(entities.of_scale(stage.number, scale.stride, name), share_image(values, scale.occupied))
+        rec.log(entities.of_scale(stage.number, scale.stride, name), share_image(values, seen[name]))
 
 
 def _log_activations(rec: Subtree, number: int, scale: ScaleTrace) -> None:

@@ -24,6 +24,8 @@ COLORED_BY = {
     Coloring.ERROR: "Points: pixels off against the reference",
 }
 
+TO_THE_END = rr.TimeRangeBoundary.infinite()
+
 View = rrb.View | rrb.Container
 
 
@@ -105,9 +107,10 @@ def with_legend(view: View, below: View, name: str) -> View:
 def curve_view(name: str, origin: str, *contents: str, highest: float | None = None) -> rrb.TimeSeriesView:
     """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose.
 
-    Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them. The range
-    of frames is left to the viewer, since one that is given would hold on the other timelines as well. It draws no tick
-    at the last frame, so that legends name that, see `frames_named`.
+    Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them. All frames
+    are shown; the viewer alone would show a thousand to either side of the one at hand. Ends are not given as numbers,
+    since these would hold on the other timelines as well. It draws no tick at the last frame, so that legends name
+    that, see `frames_named`.
 
     Args:
         name: of the view.
@@ -120,15 +123,19 @@ def curve_view(name: str, origin: str, *contents: str, highest: float | None = N
         contents=list(contents) or "$origin/**",
         name=name,
         plot_legend=rrb.PlotLegend(visible=False),
+        axis_x=rrb.TimeAxis(view_range=rr.TimeRange(start=TO_THE_END, end=TO_THE_END)),
         axis_y=None if highest is None else rrb.ScalarAxis(range=(0.0, highest)),
     )
 
 
 def frames_named(layout: Layout) -> dict[str, colors.Rgb]:
     """What the legend of curves says of their ends, in a colour that has no dot."""
-    if layout.frames is None or not layout.several:
-        return {}
-    return {"from frame {} to {}".format(*layout.frames): colors.GROUND}
+    return span_named(*layout.frames) if layout.frames is not None and layout.several else {}
+
+
+def span_named(first: int, last: int) -> dict[str, colors.Rgb]:
+    """The same of frames by their numbers."""
+    return {f"frames {first} to {last}": colors.GROUND}
 
 
 def tensor_view(name: str, path: str) -> rrb.TensorView:

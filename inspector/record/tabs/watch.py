@@ -105,7 +105,7 @@ def watch_view() -> View:
     """The same without a layout."""
     units = {axis: "cm" if axis in ("x", "y", "z") else "deg" for axis in AXES}
     views = [
-        curve_view(f"{axis.capitalize()} off the whole drive's [{unit}]", f"/watch/{axis}")
+        curve_view(f"{axis.capitalize()} against the whole drive [{unit}]", f"/watch/{axis}")
         for axis, unit in units.items()
     ]
     text = rrb.TextDocumentView(origin=TEXT, name="Did the mount move?")

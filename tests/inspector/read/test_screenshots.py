@@ -8,13 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
 from inspector.read.headless import LIGHT, HeadlessViewer
-from inspector.read.screenshots import file_stem, smaller
+from inspector.read.screenshots import file_stem, smaller, take_pictures
 
+PNG = smaller(cv2.imencode(".png", np.zeros((3, 4, 3), np.uint8))[1].tobytes())
 VULKAN_FOLDERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d")
 
 
@@ -87,6 +89,26 @@ def test_a_layout_without_tabs_is_one_page() -> None:
     viewer.client = Blueprints({"/viewport": {"ViewportBlueprint": {"root_container": "gone"}}})  # type: ignore[assignment]
     assert viewer.pages() == [()]
     viewer.show(())
+
+
+class Window:
+    """A viewer of a recording without tabs and frames."""
+
+    def __init__(self, *_: object) -> None:
+        self.open = self.times = self.show = lambda *_: None
+        self.pages, self.picture = lambda: [()], lambda: PNG
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+def test_the_only_page_of_a_recording_is_named_like_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inspector.read.screenshots.HeadlessViewer", Window)
+    (file,) = take_pictures(Path("training.rrd"), tmp_path, (4, 3))
+    assert file == tmp_path / "training.png" and file.read_bytes() == PNG
 
 
 def test_a_picture_is_written_with_the_same_pixels_in_fewer_bytes() -> None:

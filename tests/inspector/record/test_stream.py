@@ -6,6 +6,7 @@ from pathlib import Path
 
 import psutil
 import rerun.blueprint as rrb
+from rerun.blueprint.components import PlayState
 from rerun.chunk import RrdReader
 
 from inspector.record.stream import Stream, release_closed
@@ -13,7 +14,7 @@ from inspector.record.stream import Stream, release_closed
 
 def record(file: Path) -> None:
     views = [rrb.TextDocumentView(origin=f"/{number}", name=str(number)) for number in range(5)]
-    Stream("calib-inspect", file.stem, "title", [file], rrb.Blueprint(rrb.Tabs(*views))).close()
+    Stream("calib-inspect", file.stem, "title", [file], rrb.Blueprint(rrb.Tabs(*views), rrb.TimePanel())).close()
     release_closed()
 
 
@@ -24,3 +25,11 @@ def test_closed_recordings_leave_no_threads_and_have_their_layout(tmp_path: Path
         record(tmp_path / f"{number}.rrd")
     assert psutil.Process().num_threads() <= threads  # it was four more a recording
     assert len(RrdReader(tmp_path / "4.rrd").blueprints()) == 1
+
+
+def test_a_whole_recording_stands_still_when_it_is_opened(tmp_path: Path) -> None:
+    record(tmp_path / "whole.rrd")
+    (layout,) = RrdReader(tmp_path / "whole.rrd").blueprints()
+    panel = RrdReader(tmp_path / "whole.rrd").stream(store=layout).filter(content="/time_panel")
+    states = [chunk.to_record_batch().to_pydict().get("TimePanelBlueprint:play_state") for chunk in panel]
+    assert [[PlayState.Paused.value]] in states

@@ -19,6 +19,7 @@ from inspector.record.pictures.maps import (
     mass_on_truth,
     matching_probability,
     subcell_match,
+    within_window,
 )
 
 
@@ -86,6 +87,8 @@ def test_mass_on_the_truth_is_what_lies_within_a_cell_of_it() -> None:
     probability[0, 0, 0, 1], probability[2, 4, 0, 1] = 0.75, 0.25  # two corners of the window
     true = np.array([[[0.0, 0.0], [1.5, 0.5], [-1.5, 0.0], [9.0, 0.0]]])  # on a cell, near a corner, between cells, out
     np.testing.assert_allclose(mass_on_truth(probability, true), [[9 / 15, 0.25, 6 / 15, 0.0]], atol=2e-3)
+    scale = ScaleTrace(8, probability, probability, true, probability[0], probability[0], np.ones((1, 4), bool))
+    assert within_window(scale, true).tolist() == [[True, True, True, False]]
 
 
 def test_before_aggregation_the_scores_are_weighed_as_the_network_does() -> None:

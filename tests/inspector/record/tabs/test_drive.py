@@ -53,7 +53,7 @@ def estimate(aligned: bool) -> DriveEstimate:
 def test_the_sentence_says_what_alignment_changed() -> None:
     sentence = drive_sentence(estimate(aligned=True), REFERENCE, found(5, 0.3))
     assert sentence.startswith("Whole drive as one (3 frames, 1 more could not be used): off by 0.50° / ")
-    assert "sure to 0.30° / 7.0 cm (one standard deviation)" in sentence
+    assert "±0.30° / 7.0 cm (1σ). Before" in sentence
     before = offset_cm(found(1.5, 0.12))
     assert sentence.endswith(f"Before its edges were aligned: 1.50° / {before:.1f} cm.")
 
@@ -61,7 +61,7 @@ def test_the_sentence_says_what_alignment_changed() -> None:
 def test_networks_alone_are_said_not_to_know_what_they_share() -> None:
     sentence = drive_sentence(estimate(aligned=False), None, found(5, 0.3))
     assert "changed the calibration by 4.50° / " in sentence and "aligned" not in sentence
-    assert sentence.endswith("sure to 0.30° / 7.0 cm, not counting what all of them get wrong.")
+    assert sentence.endswith("±0.30° / 7.0 cm (1σ) by the frames' scatter, not counting what all of them get wrong.")
 
 
 def test_deviations_have_the_units_of_their_curves() -> None:
