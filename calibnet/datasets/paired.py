@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -162,13 +163,13 @@ def require_folder(folder: Path, remedy: str) -> Path:
 
 
 def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str, Path]:
-    """The files of ``folder`` with one of the endings, sorted, by their name without it.
+    """The files of ``folder`` with one of the endings by their name without it, in order: ``9`` before ``10``.
 
     Raises:
         DatasetError: there is none, or two share a stem.
     """
     files: dict[str, Path] = {}
-    for path in sorted(folder.iterdir()):
+    for path in sorted(folder.iterdir(), key=_in_order):
         suffix = ending(path, suffixes)
         if not suffix or path.name.startswith(".") or path.name == TIMES:
             continue
@@ -181,6 +182,12 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
         there = f", only {', '.join(others[:5])}" if others else ""
         raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}){there}; put them there.")
     return files
+
+
+def _in_order(path: Path) -> tuple[list[str | int], str]:
+    """What files are sorted by: words as words, numbers as numbers."""
+    parts = re.split(r"([0-9]+)", path.name)
+    return [int(part) if place % 2 else part for place, part in enumerate(parts)], path.name
 
 
 def check_paired(images: dict[str, Path], scans: dict[str, Path]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,7 +57,9 @@ def pair(images: Mapping[str, Path], scans: Mapping[str, Path], most_ms: float |
     """Pair the images and scans of two folders, each sorted by name.
 
     By name, if no name lacks its partner or no times are known; a frame without a partner is kept, to be told of when
-    it is read. Otherwise by time, of `TIMES` or of the names: each image with the nearest scan, each scan once.
+    it is read. By the number in the names, if these are alike otherwise in each folder (``frame_0001``, ``scan_0001``)
+    and no name is in both. Otherwise by time, of `TIMES` or of the names: each image with the nearest scan, each scan
+    once.
 
     Args:
         images: files by stem.
@@ -76,6 +78,8 @@ def pair(images: Mapping[str, Path], scans: Mapping[str, Path], most_ms: float |
             "files by their times."
         )
     if most_ms is None and (images.keys() == scans.keys() or not by_time):
+        if not images.keys() & scans.keys() and (numbered := _numbered(images, scans)) is not None:
+            return numbered
         return _by_name(images, scans, image_times)
     assert image_times is not None and scan_times is not None
     return _by_time(images, scans, image_times, scan_times, MAX_TIME_DIFFERENCE_MS if most_ms is None else most_ms)
@@ -97,6 +101,30 @@ def _by_name(images: Mapping[str, Path], scans: Mapping[str, Path], times: Float
         return Pairing(pairs)
     few = ", ".join(lacking[:3]) + (" and so on" if len(lacking) > 3 else "")
     return Pairing(pairs, (f"{len(lacking)} of {len(stems)} names have an image or a scan only ({few}).",))
+
+
+def _numbered(images: Mapping[str, Path], scans: Mapping[str, Path]) -> Pairing | None:
+    """Pairs of one number; None where names differ in more than that, or both folders have numbers of their own.
+
+    One counted from 0 and the other from 1 would pair as well, and wrongly.
+    """
+    image_numbers, scan_numbers = numbers_in(images), numbers_in(scans)
+    if image_numbers is None or scan_numbers is None:
+        return None
+    if not (image_numbers.keys() <= scan_numbers.keys() or scan_numbers.keys() <= image_numbers.keys()):
+        return None
+    image, scan = next((image_numbers[one], scan_numbers[one]) for one in image_numbers if one in scan_numbers)
+    renamed = {image_numbers.get(number, stem): scans[stem] for number, stem in scan_numbers.items()}
+    paired = _by_name(images, renamed, times_of(images))
+    return Pairing(paired.pairs, (f"Paired by the number in their names, as {image} and {scan}.", *paired.notes))
+
+
+def numbers_in(stems: Iterable[str]) -> dict[int, str] | None:
+    """Names by the last number in each; None where they differ in anything else, or have one twice or none."""
+    found = [(re.fullmatch(r"(.*?)(\d{1,18})(\D*)", stem), stem) for stem in stems]
+    parts = {(match[1], match[3]) for match, _ in found if match is not None}
+    numbers = {int(match[2]): stem for match, stem in found if match is not None}
+    return numbers if len(parts) == 1 and len(numbers) == len(found) else None
 
 
 def _by_time(

@@ -30,8 +30,8 @@ SAME_SHAPE, OTHER_SIZE, SURELY_OTHER = 0.1, 1.35, 1.8
 """A matrix is of another size where its factors across and down are alike within the first, and exceed the second."""
 NEAREST_M, FARTHEST_M = 0.5, 250.0
 """Metres between which the median distance of a scan's points lies."""
-LONGEST_ARM_M = 30.0
-"""Largest distance between camera and LiDAR; a lorry is 20 m long."""
+LONG_ARM_M, LONGEST_ARM_M = 5.0, 30.0
+"""Distance between camera and LiDAR that only lorries have, and the largest; a lorry is 20 m long."""
 STEEP = 0.9
 """Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
 FLAT = 0.4
@@ -214,10 +214,10 @@ def principal_point(camera: PinholeCamera) -> Implausible | None:
 def arm(camera_from_lidar: Extrinsic) -> Implausible | None:
     """The distance of camera and LiDAR."""
     metres = float(np.linalg.norm(camera_from_lidar[:3, 3]))
-    if metres <= LONGEST_ARM_M:
+    if metres <= LONG_ARM_M:
         return None
     text = f"camera_from_lidar puts {metres:.0f} m between camera and LiDAR; give its translation in metres"
-    return Implausible("units", text, certain=True)
+    return Implausible("units", text, certain=metres > LONGEST_ARM_M)
 
 
 def viewing_direction(camera_from_lidar: Extrinsic) -> Implausible | None:

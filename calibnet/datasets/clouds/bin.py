@@ -71,7 +71,7 @@ def recognised(data: bytes) -> tuple[str, ...]:
     if not fitting:
         _check_width(data)
         raise CloudError(
-            f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns ({DECLARE})"
+            f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns; {DECLARE}"
         )
     values = np.frombuffer(data, "<f4")
     if _halves_are_odd(values):
@@ -162,4 +162,4 @@ def _plausible(rows: NDArray[np.float32]) -> bool:
 
 
 def _ask() -> NoReturn:
-    raise CloudError(f"it does not show how many columns of float32 it has ({DECLARE})")
+    raise CloudError(f"it does not show how many columns of float32 it has; {DECLARE}")

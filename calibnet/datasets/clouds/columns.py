@@ -30,7 +30,7 @@ INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity
 
 
 class CloudError(ValueError):
-    """What is wrong with a cloud, in words that continue a sentence."""
+    """What is wrong with a cloud, in words that continue a sentence; after a semicolon what to do, if that is known."""
 
 
 @dataclass(frozen=True)

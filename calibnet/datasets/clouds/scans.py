@@ -58,7 +58,8 @@ def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.f
             return points_of(_BY_COLUMNS[suffix](data, columns))
         return _READERS[suffix](data)
     except CloudError as error:
-        raise DatasetError(f"Scan {path} cannot be read: {error}; copy it again or write it anew.") from None
+        remedy = "" if ";" in str(error) else "; copy it again or write it anew"
+        raise DatasetError(f"Scan {path} cannot be read: {error}{remedy}.") from None
 
 
 def full_scale_of(intensities: NDArray[np.floating]) -> float:

@@ -40,6 +40,40 @@ def test_names_that_have_nothing_in_common_are_refused(write_layout):
         layout.open()
 
 
+@pytest.mark.parametrize(
+    ("images", "scans"),
+    [
+        (["frame_0007", "frame_0008", "frame_0009"], ["scan7", "scan8", "scan9"]),
+        (["0000_left", "0001_left", "0002_left"], ["0", "1", "2"]),
+        (["cam2_1_rect", "cam2_2_rect", "cam2_10_rect"], ["lidar_000001", "lidar_000002", "lidar_000010"]),
+    ],
+)
+def test_names_that_differ_but_in_their_number_pair_by_it(images, scans, write_layout):
+    layout = write_layout("folder")
+    rename(layout.images, images)
+    rename(layout.scans, scans)
+    sequence = layout.open()
+    assert [(one.image.stem, one.scan.stem) for one in sequence.files] == list(zip(images, scans, strict=True))
+    assert sequence.notes == (f"Paired by the number in their names, as {images[0]} and {scans[0]}.",)
+    layout.scans[1].unlink()
+    assert "1 of 3 names have an image or a scan only" in layout.open().notes[1]
+
+
+def test_numbers_are_in_order_whatever_their_length(write_layout):
+    layout = write_layout("folder")
+    for files in (layout.images, layout.scans):
+        rename(files, ["9", "10", "100"])
+    assert [one.index for one in layout.open().files] == [9, 10, 100]
+
+
+@pytest.mark.parametrize("scans", [["scan_1", "scan_2", "scan_3"], ["a_0", "b_1", "c_2"], ["s_0", "s_0_", "s_1"]])
+def test_numbers_that_may_count_something_else_pair_nothing(scans, write_layout):
+    layout = write_layout("folder")
+    rename(layout.scans, scans)
+    with pytest.raises(DatasetError, match="have no name in common"):
+        layout.open()
+
+
 def test_each_image_gets_the_scan_that_is_nearest_in_time(write_layout):
     layout = write_layout("folder")
     rename(layout.scans, ["a", "b", "c"])

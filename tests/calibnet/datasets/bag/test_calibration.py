@@ -141,7 +141,7 @@ def test_a_file_that_does_not_say_the_size_gets_that_of_the_images(tmp_path: Pat
 
 
 def test_a_file_that_says_nothing_is_refused(tmp_path: Path) -> None:
-    path, guess = bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}), tmp_path / "launch.yaml"
-    guess.write_text("launch: [{node: {pkg: tf2_ros}}]\n")
+    path, guess = bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}), tmp_path / "notes.yaml"
+    guess.write_text("source: a colleague\n")
     with pytest.raises(DatasetError, match="says neither where the LiDAR is nor what the camera is"):
         Bag([path], BagOptions(guess=guess))
