@@ -1,1 +1,1 @@
-"""Many drives: which they are, what was done already, who does the rest, and one table, page and catalogue of all."""
+"""Fleets of drives: their list, the ledger of finished ones, the engine for the rest, and table, page and catalogue."""

@@ -1,8 +1,8 @@
-"""All recordings of a fleet in Rerun's own catalogue: a table to sort and filter, whose rows open with our layout.
+"""All recordings of a fleet in Rerun's catalogue: a table to sort and filter, whose rows open in our layout.
 
-Rerun's server reads the recordings where they lie. Their properties are the table's columns
-(`inspector.record.outcome`), its layout is a blueprint of ours, and that of the drives is the one in a recording of the
-fleet.
+Rerun's server reads the recordings where they are. Their properties are the table's columns
+(`inspector.record.outcome`), the table's layout is a blueprint of ours, and the layout of the drives is taken from one
+of the recordings.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from inspector.programs import own_address
 
 DATASET = "fleet"
 KNOWN = "known"
-"""Name of a layer over each recording, and of its property: what the fleet's table knows of the drive."""
+"""Name of a layer over each recording, and of its property with the columns of the fleet's table."""
 RUN, OUTCOME, TOLD = (f"property:{name}" for name in (entities.RUN, entities.OUTCOME, KNOWN))
 SHOWN = {
     f"{RUN}:car": "car",
@@ -49,18 +49,18 @@ SHOWN = {
     f"{TOLD}:by_car_reason": "why by its car",
     f"{OUTCOME}:reason": "why",
 }
-"""Columns in their order, and what they are called; all others can be switched on in the viewer."""
+"""Columns in order, and their headings; all others can be switched on in the viewer."""
 FIGURES = ("moved_deg", "moved_cm", "sigma_deg", "sigma_cm", "by_car_moved_deg", "by_car_moved_cm")
-"""Columns of the fleet's table that are shown with two decimals; the recordings' own have fifteen digits."""
+"""Columns of the fleet's table that are shown with two decimals."""
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """A server that runs.
+    """A running server.
 
     Attributes:
-        address: of the fleet's table, for a viewer.
-        count: of drives in it.
+        address: address of the fleet's table, for a viewer.
+        count: number of drives in the table.
     """
 
     address: str
@@ -72,11 +72,11 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     """Serve the recordings of a fleet on this machine while the context is entered.
 
     Args:
-        rows: of its table.
-        folder: of the fleet.
+        rows: rows of the fleet's table.
+        folder: the fleet's folder.
 
     Raises:
-        ConfigError: the extra is not installed, there are no recordings, or the server does not take one.
+        ConfigError: the extra is not installed, there are no recordings, or the server rejects one.
     """
     require_extra("datafusion")
     import rerun as rr
@@ -84,7 +84,7 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     recorded = {folder / row.recording: row for row in rows if row.recording and (folder / row.recording).is_file()}
     files = list(recorded)
     if not files:
-        raise ConfigError(f"{folder} holds no recording of the drives in its table; run `calib-inspect fleet` again.")
+        raise ConfigError(f"{folder} has no recordings of the drives in its table; run `calib-inspect fleet` again.")
     with ExitStack() as stack:
         ours = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
         try:
@@ -95,16 +95,18 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
             columns = {field.name for field in dataset.segment_table().schema()}
             table_layout(columns).save(entities.APPLICATION_ID, ours / "table.rbl")
             dataset.register_blueprint((ours / "table.rbl").as_uri(), segment_table=True)
-            layout = max(files, key=lambda file: file.stat().st_size)  # one that failed has no layout of a drive
+            layout = max(files, key=lambda file: file.stat().st_size)  # that of a failed drive has no layout
             dataset.register_blueprint(layout.as_uri())
         except (RuntimeError, ValueError, LookupError, OSError) as error:
             said = one_line(str(error), 300)
-            raise ConfigError(f"Rerun's server does not take the recordings of {folder} ({said}).") from None
+            raise ConfigError(
+                f"Rerun's server rejects the recordings of {folder} ({said}); run `calib-inspect fleet` again."
+            ) from None
         yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
 
 
 def _layer(layer: Path, recording: Path, row: Row) -> Path:
-    """A file that adds to a drive's recording what the table says of it, what its car says included."""
+    """A file that adds the columns of the fleet's table to a drive's recording."""
     import rerun as rr
 
     (of, *_) = RrdReader(recording).recordings()
@@ -123,7 +125,7 @@ def _layer(layer: Path, recording: Path, row: Row) -> Path:
 
 
 def table_layout(columns: set[str]) -> Any:
-    """The layout of the table, with the columns that it has; those that failed and were rejected come last."""
+    """The layout of the table, with the columns that it has; failed and rejected drives come last."""
     from rerun.blueprint.table import Column, SortBy, TableBlueprint, TableLayout
 
     shown = [Column(source, name=name) for source, name in SHOWN.items() if source in columns]

@@ -1,4 +1,4 @@
-"""The drives of a fleet: rows of DRIVES.csv, or folders, and the command line that calibrates each by hand."""
+"""The drives of a fleet, from rows of DRIVES.csv or from folders, and the command line that verifies each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from calibnet.runtime.text import file_name, one_line
 
 BAG, FOLDER = "bag", "folder"
 PATH_OPTIONS = ("--guess", "--weights")
-"""Options of a drive that name files: relative to its list, like its path."""
+"""Options of a drive that name files, which like its path are relative to the list."""
 MOST_DRIVES = 1_000_000
 REMEDY = "docs/fleet.md says what a list of drives holds"
 
@@ -33,7 +33,7 @@ Text = Annotated[str, Len(0, 4000)]
 
 @dataclass(frozen=True)
 class _Columns:
-    """A row of the list as it stands in the file; everything but the path has a default."""
+    """A row of the list as in the file; everything but the path has a default."""
 
     __pydantic_config__: ClassVar = {"extra": "forbid"}
 
@@ -50,20 +50,20 @@ class _Columns:
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive of one camera: what is calibrated as one.
+    """One drive of one camera, which is calibrated as a whole.
 
     Attributes:
-        car: whose sensors these are.
-        drive: its name; with the car and the camera it is unique in a fleet.
-        date: when it was driven, ISO 8601, or empty; drives of a car are in this order.
-        dataset: a name of `calibnet.datasets.dataset_names`, or ``"bag"``.
-        path: folder or file, absolute, or a URL that fsspec knows.
-        sequence: of a dataset that has several below its folder: ``"04"``, ``"2011_09_26/0005"``.
-        camera: which one, where there are several; empty for the default.
-        frames: which of them, as ``--frames`` has it; empty for the default.
-        common: options of ``calib-inspect verify`` for every drive, in words; everything else here counts more.
-        options: further ones of this drive, which count most.
-        origin: where it is named, for messages.
+        car: car or robot that carries the sensors.
+        drive: name of the drive, unique in a fleet together with car and camera.
+        date: date of the drive in ISO 8601, by which drives of a car are ordered, or empty.
+        dataset: a name from `calibnet.datasets.dataset_names`, or ``"bag"``.
+        path: absolute path of a folder or file, or a URL that fsspec supports.
+        sequence: sequence of a dataset that has several, for instance ``"04"`` or ``"2011_09_26/0005"``.
+        camera: name of the camera, where there are several; empty for the default.
+        frames: selection of frames, as for ``--frames``; empty for the default.
+        common: options of ``calib-inspect verify`` for every drive, as words, which everything else here overrides.
+        options: options of this drive, which override all others.
+        origin: where it is listed, for messages.
     """
 
     car: str
@@ -80,25 +80,25 @@ class Drive:
 
     @property
     def name(self) -> str:
-        """For messages and titles."""
+        """Name for messages and titles."""
         return f"{self.car}/{self.drive}" + (f", camera {self.camera}" if self.camera else "")
 
     @property
     def folder(self) -> str:
-        """Folder of its results, below the fleet's; foreign names are quoted."""
+        """Folder of its results, relative to the fleet's, with special characters quoted."""
         last = f"{self.drive}@{self.camera}" if self.camera else self.drive
         return f"drives/{file_name(self.car)}/{file_name(last)}"
 
     @property
     def labels(self) -> dict[str, str]:
-        """What tells its recording from others."""
+        """Properties that tell its recording from others."""
         return {"car": self.car, "drive": self.drive, **({"date": self.date} if self.date else {})}
 
     def arguments(self, path: str | None = None) -> list[str]:
-        """What follows ``calib-inspect verify`` to do by hand what the fleet does with it.
+        """Arguments of ``calib-inspect verify`` that do by hand what the fleet does with the drive.
 
         Args:
-            path: where its data lies, if that is not its own path.
+            path: path of its data, if not its own.
         """
         path, camera = self.path if path is None else path, self.camera
         if self.dataset in PUBLISHED:
@@ -110,27 +110,27 @@ class Drive:
             arguments = [self.dataset, path]
         else:
             arguments = [FOLDER, path, "--dataset", self.dataset]
-        arguments += self.common  # of an option that is given twice the last one counts
+        arguments += self.common  # the last one of a repeated option counts
         arguments += ["--camera", camera] if camera else []
         arguments += ["--frames", self.frames] if self.frames else []
         return [*arguments, *self.options]
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Patterns, below its path, of the files that belong to it; an empty one for all."""
+        """Patterns, relative to its path, of the files that belong to it; an empty pattern for all."""
         of_it = PUBLISHED.get(self.dataset)
         return ("",) if of_it is None else of_it.files_of(self.sequence, self.camera)
 
 
 def find_drives(sources: Sequence[str], options: str = "") -> list[Drive]:
-    """The drives that a command's arguments name.
+    """The drives that are named by a command's arguments.
 
     Args:
         sources: one ``.csv`` file, or folders of the plain layout.
-        options: further options of every drive; what a row says counts more.
+        options: options of every drive, which those of a row override.
 
     Raises:
-        ConfigError: a row cannot be right, or two drives have one name.
+        ConfigError: a row is not valid, or two drives have the same name.
     """
     common = _words(options, "--options", Path.cwd())
     if len(sources) == 1 and sources[0].lower().endswith(".csv"):
@@ -145,7 +145,7 @@ def read_drives(file: Path, common: Sequence[str] = ()) -> Iterator[Drive]:
     """The rows of a list of drives.
 
     Raises:
-        ConfigError: the file cannot be read, or a row cannot be right; the sentence names the row.
+        ConfigError: the file cannot be read, or a row is not valid; the sentence names the row.
     """
     text = read_text(file, "List of drives", TEXT_BYTES, ConfigError, REMEDY)
     reader = csv.DictReader(io.StringIO(text, newline=""), restkey="", strict=True)
@@ -154,22 +154,22 @@ def read_drives(file: Path, common: Sequence[str] = ()) -> Iterator[Drive]:
         for count, values in enumerate(reader, start=1):
             yield _of_row(values, f"{file}, row {count} (line {reader.line_num})", file.parent, common)
             if count > MOST_DRIVES:
-                raise ConfigError(f"{file} has more than {MOST_DRIVES:,} rows; split it.")
+                raise ConfigError(f"{file} has more than {MOST_DRIVES:,} rows; split it into several lists.")
     except csv.Error as error:
         raise ConfigError(f"{file}, row {count + 1}: {error}; {REMEDY}.") from None
     if not count:
-        raise ConfigError(f"{file} names no drive; {REMEDY}.")
+        raise ConfigError(f"{file} lists no drives; {REMEDY}.")
 
 
 def _of_row(values: dict[str, str | list[str] | None], origin: str, base: Path, common: Sequence[str]) -> Drive:
     if "" in values:
-        raise ConfigError(f"{origin}: it has more fields than the first line names; {REMEDY}.")
+        raise ConfigError(f"{origin}: the row has more fields than the first line; {REMEDY}.")
     given = {str(name).strip(): str(value or "").strip() for name, value in values.items()}
     row = validated(_Columns, given, origin, ConfigError, REMEDY)
     dataset = row.dataset or FOLDER
     known = (*dataset_names(), BAG)
     if dataset not in known:
-        raise ConfigError(f"{origin}: dataset {dataset!r} is unknown; choose one of {', '.join(known)}.")
+        raise ConfigError(f"{origin}: dataset {dataset!r} is not known; choose from {', '.join(known)}.")
     if dataset in PUBLISHED:
         _check_sequence(PUBLISHED[dataset], dataset, row.sequence, origin)
     path = row.path if "://" in row.path else _absolute(base, row.path)
@@ -190,13 +190,15 @@ def _of_row(values: dict[str, str | list[str] | None], origin: str, base: Path, 
 
 
 def _check_sequence(published: Published, dataset: str, sequence: str, origin: str) -> None:
-    """Find out whether a row names a sequence of its dataset that is one drive.
+    """Check that a row names a sequence of its dataset that is one drive.
 
     Raises:
         ConfigError: it does not.
     """
     if not published.one_mount:
-        raise ConfigError(f"{origin}: the frames of {dataset} are of several mounts, so none of it is a drive.")
+        raise ConfigError(
+            f"{origin}: the frames of {dataset} come from several mounts and do not form a drive; leave the row out."
+        )
     if not sequence and published.whole is None:
         raise ConfigError(f"{origin}: sequence is missing, for instance {published.example}; {REMEDY}.")
     try:
@@ -227,7 +229,7 @@ def _words(text: str, origin: str, base: Path) -> tuple[str, ...]:
     try:
         words = shlex.split(text)
     except ValueError as error:
-        raise ConfigError(f"{origin} cannot be split into words ({error}).") from None
+        raise ConfigError(f"{origin} cannot be split into words ({error}); check the quotes.") from None
     made: list[str] = []
     for word in words:
         option, equals, value = word.partition("=")
@@ -250,5 +252,5 @@ def _check_distinct(drives: Iterable[Drive]) -> None:
 
 
 def _absolute(base: Path, path: str) -> str:
-    """A path from a folder, as it is on this machine; links are kept."""
+    """The absolute form of a path relative to ``base``, with links kept."""
     return os.path.normpath(base.absolute() / path)

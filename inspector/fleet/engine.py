@@ -1,7 +1,7 @@
-"""Drives on Dask: a cluster on this machine, or one that runs somewhere, and an orderly end whatever happens to it.
+"""Runs drives on Dask, on a cluster of this machine or a running one, with an orderly end whatever happens.
 
-Dask schedules, moves the work of a worker that dies to another, tries again what fails, and shows on its dashboard how
-far it is. Here is only what a fleet adds: one drive at a time a worker, bounded threads and memory, and Ctrl-C.
+Dask schedules, moves the work of a dead worker to another, retries failures and shows progress on its dashboard. This
+module adds what a fleet needs: one drive per worker at a time, bounded threads and memory, and Ctrl-C.
 """
 
 from __future__ import annotations
@@ -29,37 +29,37 @@ Work = TypeVar("Work")
 Done = TypeVar("Done")
 
 TRIES = 2
-"""Tries of a drive that fails, and of one whose worker dies."""
+"""Number of tries of a drive that fails or whose worker dies."""
 FULL = 0.6
-"""Share of a worker's memory beyond which another process takes its place."""
+"""Share of a worker's memory beyond which a new process replaces it."""
 POLL_S = 0.1
 FETCH_S = 2.0
 PATIENCE_S = 15.0
-"""For a scheduler to answer."""
+"""Seconds to wait for a scheduler's answer."""
 SETTINGS = {
-    "distributed.scheduler.worker-saturation": 1.0,  # a worker has what it does and no more: that is all it can lose
+    "distributed.scheduler.worker-saturation": 1.0,  # a worker holds only the drive it runs, so no more can be lost
     "distributed.scheduler.allowed-failures": TRIES - 1,
-    "distributed.admin.tick.limit": "1h",  # a busy machine is no news, and not looked for fifty times a second
+    "distributed.admin.tick.limit": "1h",  # do not look fifty times a second whether the machine is busy
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.memory.terminate": 0.95,
-    "distributed.worker.profile.enabled": False,  # samples of the stack, kept for an hour: 3 MB a drive
-    "distributed.deploy.lost-worker-timeout": "1000h",  # or one that takes long to come back is given up for ever
+    "distributed.worker.profile.enabled": False,  # samples of the stack would take 3 MB per drive
+    "distributed.deploy.lost-worker-timeout": "1000h",  # or a worker that takes long to restart is given up for good
 }
 
 
 class EngineError(CalibnetError):
-    """The cluster is gone, or cannot be had."""
+    """The cluster is gone or cannot be reached."""
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Where drives are done.
+    """Where drives run.
 
     Attributes:
-        workers: processes on this machine; 0 does them one after the other in this process, without Dask.
-        scheduler: address of one that runs already, instead.
-        memory: bytes, or a text such as ``"4GB"``, that a worker may have; ``"auto"`` for its share of the machine.
-        prepare: called in every worker before its first drive, with the threads it may use or 0 to leave that alone.
+        workers: number of processes on this machine; 0 runs them one after the other in this process, without Dask.
+        scheduler: address of a running scheduler to use instead.
+        memory: memory of a worker, in bytes or as a text such as ``"4GB"``; ``"auto"`` for its share of the machine.
+        prepare: called in every worker before its first drive with the number of threads to use, or 0 for no limit.
     """
 
     workers: int
@@ -75,7 +75,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Outcome(Generic[Work, Done]):
-    """What came of one piece of work: its result, or why there is none."""
+    """The result of one piece of work, or the error that prevented it."""
 
     work: Work
     done: Done | None = None
@@ -89,18 +89,18 @@ def run_all(
     stop: StopRequest,
     tell: Callable[[str], None] = lambda sentence: None,
 ) -> Iterator[Outcome[Work, Done]]:
-    """Do every piece, in any order; after a stop is requested only those that a worker has begun.
+    """Run all pieces, in any order; after a stop is requested, only those that a worker has begun.
 
     Args:
-        engine: where.
-        act: what to do with a piece, importable by workers.
-        pieces: what to do it with.
-        stop: asks to end.
-        tell: hears sentences for the user, for instance where the dashboard is.
+        engine: where to run them.
+        act: function to call with a piece, importable by workers.
+        pieces: pieces of work.
+        stop: request to stop.
+        tell: called with sentences for the user, for instance on the dashboard.
 
     Raises:
         ConfigError: the extra is not installed, or there is no scheduler.
-        EngineError: the scheduler went away.
+        EngineError: the connection to the scheduler was lost.
     """
     if not engine.workers and engine.scheduler is None:
         yield from _here(engine, act, pieces, stop)
@@ -109,14 +109,14 @@ def run_all(
         if client.dashboard_link and engine.scheduler is None:
             tell(f"Progress of every worker: {client.dashboard_link}")
         if engine.scheduler is not None and not client.scheduler_info()["workers"]:
-            tell("The scheduler has no workers yet; drives begin when one comes.")
+            tell("The scheduler has no workers yet; drives will start when one connects.")
         yield from _on(client, act, pieces, stop)
 
 
 def _here(
     engine: Engine, act: Callable[[Work], Done], pieces: Sequence[Work], stop: StopRequest
 ) -> Iterator[Outcome[Work, Done]]:
-    """One after the other: what the engine is measured against."""
+    """Run the pieces one after the other in this process."""
     engine.prepare(0)
     for piece in pieces:
         if stop.requested:
@@ -170,25 +170,25 @@ def _on(
 
 
 def is_lasting(error: Exception) -> bool:
-    """Whether another try would fail alike, as the error says by an attribute ``lasting``."""
+    """Whether another try would fail too, according to the error's attribute ``lasting``."""
     return bool(getattr(error, "lasting", False))
 
 
 def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Outcome[Work, Done]:
-    """Do a piece on a worker that has room; one whose memory is taken retires first, and its nanny starts another.
+    """Run a piece on a worker with enough memory; one without retires first, and its nanny starts a new one.
 
     An error that is not lasting is raised, so that Dask tries again.
 
-    Libraries may keep some memory of whatever they did. Nothing is under way at this moment, so nothing is lost; beyond
-    0.8 Dask would give the worker nothing any more, and beyond 0.95 end it in the middle. A worker that simply ended
-    would count against its piece, which finds the next one as full, for all fill alike.
+    Libraries may hold on to memory after their work. At this moment nothing runs, so nothing is lost by retiring;
+    beyond a share of 0.8 Dask would assign the worker no more work, and beyond 0.95 kill it in the middle of a piece. A
+    worker that simply exited would count as a failed try of its piece, and all workers fill up at about the same time.
     """
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
     limit = worker.memory_manager.memory_limit
     if limit and worker.nanny and worker.monitor.get_process_memory() > FULL * limit:
-        time.sleep(FETCH_S)  # for the result of the piece before, which lies here
+        time.sleep(FETCH_S)  # lets the scheduler fetch the previous result, which this worker holds
         worker.loop.add_callback(_retire, worker)
         raise Reschedule
     try:
@@ -200,20 +200,20 @@ def _on_a_worker(act: Callable[[Work], Done], piece: Work) -> Outcome[Work, Done
 
 
 async def _retire(worker: Any) -> None:
-    """Take leave of the scheduler, and end; a worker that closes in order sometimes never does."""
+    """Tell the scheduler, and exit; an orderly close of a worker sometimes never ends."""
     leave = {"close_workers": False, "remove": True, "stimulus_id": f"memory-{time.time()}"}
     await worker.scheduler.retire_workers(workers=[worker.address], **leave)
     os._exit(0)
 
 
 def _not_begun(client: Client, works: dict[Any, Any]) -> list[Any]:
-    """Those that no worker has."""
+    """The pieces that no worker has begun."""
     begun = {str(key) for keys in client.processing().values() for key in keys}
     return [future for future in works if str(future.key) not in begun and not future.done()]
 
 
 def _register(client: Client, plugin: Any) -> None:
-    """Have every worker prepared, now or when it comes; one that dies meanwhile is replaced, and asked again.
+    """Have every worker prepared, now or when it connects; one that dies meanwhile is replaced and tried again.
 
     Raises:
         EngineError: it happens again and again.
@@ -222,28 +222,30 @@ def _register(client: Client, plugin: Any) -> None:
         try:
             client.register_plugin(plugin, name="calib-inspect")
             return
-        except OSError:  # as Dask says that a connection was closed
+        except OSError:  # Dask's error for a closed connection
             if not rest:
                 raise EngineError(
-                    "Workers die before they begin; see whether the machine has memory for them."
+                    "Workers die before they start; give them more memory with --memory, or use fewer --workers."
                 ) from None
             time.sleep(POLL_S)
 
 
 def _lost(client: Client) -> EngineError:
     where = client.scheduler.address if client.scheduler is not None else "the scheduler"
-    return EngineError(f"The scheduler at {where} went away, and what it was doing with it.")
+    return EngineError(
+        f"The connection to the scheduler at {where} was lost, and with it the running drives; start it again."
+    )
 
 
 @contextmanager
 def _client(engine: Engine) -> Iterator[Client]:
-    """A client of the cluster, and the cluster itself where it is ours."""
+    """A client of the cluster, and the cluster itself if it is ours."""
     require_extra("distributed", "bokeh", "cryptography")
     import dask
     from distributed import Client, LocalCluster
     from distributed.security import Security
 
-    for name in ("distributed", "distributed.client"):  # it gives some of them levels of their own
+    for name in ("distributed", "distributed.client"):  # Dask gives some of them levels of their own
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     with ExitStack() as stack:
         if engine.scheduler is not None:
@@ -257,7 +259,7 @@ def _client(engine: Engine) -> Iterator[Client]:
             _register(client, _worker_plugin(engine.prepare, 0, ours=False))
         else:
             environment = {name: str(engine.threads) for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")}
-            environment["MALLOC_TRIM_THRESHOLD_"] = "65536"  # give back what a large drive took
+            environment["MALLOC_TRIM_THRESHOLD_"] = "65536"  # return memory to the system after a large drive
             stack.enter_context(dask.config.set({**SETTINGS, "distributed.nanny.pre-spawn-environ": environment}))
             cluster = stack.enter_context(
                 LocalCluster(
@@ -265,7 +267,7 @@ def _client(engine: Engine) -> Iterator[Client]:
                     threads_per_worker=1,
                     memory_limit=engine.memory,
                     host=LOCALHOST,
-                    protocol="tls://",  # who reaches a scheduler runs code on it: other users of this machine, too
+                    protocol="tls://",  # or other users of this machine could run code on the scheduler
                     security=Security.temporary(),
                     dashboard_address=f"{LOCALHOST}:0",
                     silence_logs=logging.CRITICAL,
@@ -277,12 +279,12 @@ def _client(engine: Engine) -> Iterator[Client]:
 
 
 def _worker_plugin(prepare: Callable[[int], None], threads: int, ours: bool) -> Any:
-    """What every worker does when it starts, those that take the place of others included."""
+    """A plugin that prepares every worker when it starts, replacements included."""
     from distributed import WorkerPlugin
 
     class Prepared(WorkerPlugin):
         def setup(self, worker: Any) -> None:
-            if ours:  # Ctrl-C reaches the whole terminal; the command tells its workers when to end
+            if ours:  # Ctrl-C reaches all processes of the terminal; workers end when the command tells them
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
             prepare(threads)
 

@@ -1,4 +1,4 @@
-"""What the fleet needs beyond the package: the extra ``[fleet]``, imported only where it is used."""
+"""The optional dependencies of fleets, the extra ``[fleet]``, imported only where used."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from calibnet.errors import ConfigError
 
 
 def require_extra(*modules: str) -> None:
-    """See that modules of the extra are installed.
+    """Check that modules of the extra are installed.
 
     Raises:
         ConfigError: one is not; the sentence says how to install them.

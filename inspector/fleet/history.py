@@ -1,7 +1,7 @@
-"""What the drives of a car say together: where its mount was, when it moved, and how good each calibration was.
+"""The history of a car from all its drives: where the mount was, when it moved, and how good each calibration was.
 
-A drive alone often cannot tell; all drives of a car between two moves of its mount can (`calibnet.judging.mount`). What
-they agree on is held against the calibration that each of them had, as `verify` does it for one.
+A single drive often cannot tell; all drives of a car between two moves of its mount can (`calibnet.judging.mount`).
+Their common result is compared with the calibration that each came with, as `verify` does for one.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict
 from inspector.fleet.table import APART, FAILED, ByCar, Row
 
 SCATTERED = 3.0
-"""Times that a drive's frames may agree less than those of its car's other drives."""
-WHY = "the mount may have moved during the drive, or scans and pictures not belong together."
+"""Largest scatter of a drive's frames, relative to that of the car's other drives."""
+WHY = "the mount may have moved during the drive, or scans and images may not belong together."
 
 
 @dataclass(frozen=True)
 class Move:
-    """A mount that is elsewhere than before.
+    """A move of a mount.
 
     Attributes:
-        before, after: the last drive on which it was where it had been, and the first one of those after.
-        rotation_deg, translation_cm: how far it moved.
-        drives: after it, until the next.
-        certain: whether on either side enough drives agree, or one says by itself where the mount is.
+        before, after: the last drive before the move, and the first one after it.
+        rotation_deg, translation_cm: size of the move.
+        drives: number of drives from this move to the next.
+        certain: whether enough drives agree on either side, or one is sufficient by itself.
     """
 
     before: Row
@@ -48,18 +48,18 @@ class Move:
         far = f"by {self.rotation_deg:.2f}° / {self.translation_cm:.0f} cm"
         if self.certain:
             return f"The mount moved {between}, {far}."
-        return f"The mount seems to have moved {between}, {far}; there are too few drives yet to be sure."
+        return f"The mount seems to have moved {between}, {far}; more drives are needed to be sure."
 
 
 @dataclass(frozen=True)
 class History:
-    """The drives of one camera of a car, and where its mount was.
+    """The drives of one camera of a car, and the positions of its mount.
 
     Attributes:
-        car, camera: whose.
+        car, camera: names of both.
         rows: all drives, in order.
-        told: those that say where the mount was.
-        mount: where it was; positions are among ``told``.
+        told: drives that say where the mount was.
+        mount: positions of the mount, by index into ``told``.
     """
 
     car: str
@@ -70,17 +70,17 @@ class History:
 
     @property
     def name(self) -> str:
-        """For pages."""
+        """Name for pages."""
         return f"{self.car}, camera {self.camera}" if self.camera else self.car
 
     @property
     def moves(self) -> tuple[Move, ...]:
-        """Moves of the mount, in their order."""
+        """Moves of the mount, in order."""
         return tuple(self._moves())
 
     @property
     def sentence(self) -> str:
-        """What has to be known of it."""
+        """The history in a sentence or two."""
         moves = self.moves
         parts = [str(move) for move in moves]
         wrong = [row for row in self.rows if row.verdict == REJECTED and row.cause]
@@ -91,19 +91,19 @@ class History:
             causes = ", ".join(dict.fromkeys(row.cause for row in wrong))
             parts.append(f"{_drives(len(wrong))} with wrong input ({causes}).")
         if off:
-            same = ", by the same on all" if len(off) > 1 and not moves else ""
+            same = ", by the same amount on all" if len(off) > 1 and not moves else ""
             parts.append(f"The calibration is off on {_drives(len(off))}{same}.")
         if apart:
-            parts.append(f"{_named(apart)} {'stands' if len(apart) == 1 else 'stand'} apart from the others.")
+            parts.append(f"{_named(apart)} {'is an outlier' if len(apart) == 1 else 'are outliers'}.")
         if failed:
             parts.append(f"{_drives(len(failed))} failed.")
         if not parts and not any(row.word in (ACCEPTED, REJECTED) for row in self.rows):
-            parts.append("No drive tells.")
-        return " ".join(parts) or "Nothing moved."
+            parts.append("No drive is conclusive.")
+        return " ".join(parts) or "The mount did not move."
 
     @cached_property
     def judged(self) -> tuple[Row, ...]:
-        """Its drives, each with what all of them say of the calibration that it had."""
+        """Its drives, each with the verdict of all of them on the calibration that it came with."""
         suspect = 2 * sum(bool(row.cause) for row in self.rows) > len(self.rows)
         places = {row.folder: at for at, row in enumerate(self.told)}
         return tuple(
@@ -111,9 +111,11 @@ class History:
         )
 
     def _judged(self, row: Row, at: int, suspect: bool) -> Row:
-        """A drive at a position of `told`; ``suspect`` where most drives of the car have wrong input."""
+        """The drive at an index into `told`; ``suspect`` if most drives of the car have wrong input."""
         if ratio := self._scatter(row):
-            return _with(row, APART, f"Its frames agree {ratio:.0f} times less than those of the other drives: {WHY}")
+            return _with(
+                row, APART, f"Its frames scatter {ratio:.0f} times as much as those of the other drives: {WHY}"
+            )
         firm = [stay for stay in self.mount.stays if stay.is_firm]
         stay = self.mount.stay_of(at)
         if not firm:
@@ -121,8 +123,8 @@ class History:
         if stay is None or not stay.is_firm:
             near = min(firm, key=lambda one: min(abs(member - at) for member in one.members))
             turn, shift = difference(near, _alone(row))
-            others = f"{len(near.members)} other drives find the mount {turn:.2f}° / {shift:.0f} cm elsewhere"
-            return _with(row, APART, f"It stands apart: {others}.")
+            others = f"{len(near.members)} other drives find the mount {turn:.2f}° / {shift:.0f} cm away"
+            return _with(row, APART, f"It is an outlier: {others}.")
         if row.given is None:
             return _with(row)
         found = verify(row.given, Verdict(ACCEPTED, "", stay.camera_from_lidar, covariance=stay.covariance), DRIVE)
@@ -131,7 +133,7 @@ class History:
         return _with(row, found.word, f"{len(stay.members)} drives of the car agree. {found.reason}", found)
 
     def _scatter(self, row: Row) -> float:
-        """How many times less its frames agree than those of the other drives do, 0 where that is nothing unusual."""
+        """Scatter of its frames relative to the other drives', or 0 if that is not unusual."""
         others = [_agreement(other) for other in self.told if other.folder != row.folder]
         if len(others) < FEWEST:
             return 0.0
@@ -146,18 +148,20 @@ class History:
                 yield Move(last, first, *difference(before, after), len(after.members), certain)
 
     def _is_sure(self, stay: Stay) -> bool:
-        """Whether it is more than a few drives that nobody can tell about."""
+        """Whether enough drives agree on it, or one is sufficient by itself."""
         return stay.is_firm or any(believed(self.told[at]) for at in stay.members)
 
 
 def histories(rows: Iterable[Row]) -> list[History]:
-    """The history of every camera of every car: those that moved first, then those with the worst drives."""
+    """The history of every camera of every car: first those that moved, then those with the worst drives."""
 
     def whose(row: Row) -> tuple[str, str]:
         return row.car, row.camera
 
     fleet = [list(drives) for _, drives in groupby(sorted(rows, key=whose), key=whose)]
-    ordered = [sorted(drives, key=lambda row: row.date) for drives in fleet]  # stable: without dates as listed
+    ordered = [
+        sorted(drives, key=lambda row: row.date) for drives in fleet
+    ]  # stable, so drives without dates stay as listed
     told = [[row for row in drives if _tells(row)] for drives in ordered]
     excess = excess_of([[_finding(row) for row in drives] for drives in told])
     found = [
@@ -168,18 +172,18 @@ def histories(rows: Iterable[Row]) -> list[History]:
 
 
 def judged_by_cars(rows: Sequence[Row]) -> list[Row]:
-    """The rows as they stand, each with what the drives of its car say together of the calibration that it had."""
+    """The rows in the same order, each with the verdict of all drives of its car."""
     judged = {row.folder: row for history in histories(rows) for row in history.judged}
     return [judged[row.folder] for row in rows]
 
 
 def believed(row: Row) -> bool:
-    """Whether a drive says by itself where the mount is."""
+    """Whether a drive by itself is sufficient to say where the mount is."""
     return _tells(row) and row.verdict in (ACCEPTED, REJECTED)
 
 
 def _tells(row: Row) -> bool:
-    """Whether what was found on a drive is something of the mount, be it unsure; with wrong input it is not."""
+    """Whether a drive's result says something about the mount, if only vaguely; with wrong input it does not."""
     return row.extrinsic is not None and row.uncertainty is not None and not row.cause
 
 
@@ -189,7 +193,7 @@ def _finding(row: Row) -> Finding:
 
 
 def _with(row: Row, word: ByCar = "", reason: str = "", found: Verdict | None = None) -> Row:
-    """A drive with the columns that its car fills; empty where that says nothing."""
+    """A drive with the columns of its car's verdict, empty without one."""
     return replace(
         row,
         by_car=word,
@@ -202,7 +206,7 @@ def _with(row: Row, word: ByCar = "", reason: str = "", found: Verdict | None = 
 
 
 def _agreement(row: Row) -> Floats:
-    """Deviation ``[2]`` that a single one of its frames would have: degrees and centimetres."""
+    """Standard deviation ``[2]`` of a single frame, in degrees and centimetres."""
     return np.asarray([row.sigma_deg or 0.0, row.sigma_cm or 0.0], np.float64) * math.sqrt(max(row.frames, 1))
 
 

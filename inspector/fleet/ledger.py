@@ -1,4 +1,4 @@
-"""What is done: of each drive an entry in its folder, written last, that says of what input, weights and options."""
+"""The ledger of finished drives: an entry in each drive's folder, written last, with its input, weights and options."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ LARGEST = 1 << 20
 
 @dataclass(frozen=True)
 class Key:
-    """What a result depends on.
+    """Everything that a result depends on.
 
     Attributes:
-        arguments: of the command that does the same by hand, without where its results go.
-        weights: digest of the weights and of how they are used.
-        seen: digest of what the input's files look like, `inspector.fleet.places.seen`.
-        content: digest of what is in them; empty where that was not found out.
+        arguments: arguments of the command that does the same by hand, without its outputs.
+        weights: digest of the weights and the version that uses them.
+        seen: digest of the names, sizes and times of the input files, `inspector.fleet.places.seen`.
+        content: digest of their content; empty if it was not computed.
     """
 
     arguments: tuple[str, ...]
@@ -37,7 +37,7 @@ class Key:
     content: Annotated[str, Len(0, 64)] = ""
 
     def is_same(self, other: Key) -> bool:
-        """Whether it stands for the same result: input that looks the same is the same, else its content tells."""
+        """Whether both give the same result: the input looks the same or has the same content."""
         if (self.arguments, self.weights) != (other.arguments, other.weights):
             return False
         return bool(self.seen and self.seen == other.seen) or bool(self.content and self.content == other.content)
@@ -45,7 +45,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Entry:
-    """A drive that is done, and the command that did it."""
+    """A finished drive, and the command that verified it."""
 
     key: Key
     row: Row
@@ -53,7 +53,7 @@ class Entry:
 
 
 def read_entry(store: Store, drive: Drive) -> Entry | None:
-    """The entry of a drive; None where it is not done, or what it says is not there."""
+    """The entry of a drive; None if it is not done, or its results are missing."""
     data = store.read(f"{drive.folder}/{ENTRY}", LARGEST)
     if data is None:
         return None
@@ -64,7 +64,7 @@ def read_entry(store: Store, drive: Drive) -> Entry | None:
     files = (entry.row.recording, entry.row.report, entry.row.json)
     if not all(store.has(file) for file in files if file):
         return None
-    return replace(entry, row=replace(entry.row, date=drive.date))  # the list may know better by now
+    return replace(entry, row=replace(entry.row, date=drive.date))  # the list may have changed since
 
 
 def write_entry(store: Store, drive: Drive, entry: Entry) -> None:
@@ -73,17 +73,17 @@ def write_entry(store: Store, drive: Drive, entry: Entry) -> None:
 
 
 def failed_row(drive: Drive, sentence: str, seconds: float = 0.0, recording: str = "") -> Row:
-    """The row of a drive that could not be done."""
+    """The row of a drive that failed."""
     return row_of(drive, verdict=FAILED, reason=sentence, seconds=seconds, recording=recording)
 
 
 def counted(rows: Sequence[Row]) -> str:
-    """How many drives are what, in words, as `Row.word` has it."""
+    """The number of drives with each `Row.word`, in words."""
     counts = {word: sum(row.word == word for row in rows) for word in reversed(ORDER)}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "none"
 
 
 def told_together(rows: Sequence[Row]) -> str:
-    """How many of them say that only with the other drives of their car; empty for none."""
+    """The number of verdicts that need the other drives of the car, in words; empty for none."""
     count = sum(row.word != row.verdict for row in rows)
-    return f"{count} of them by what all drives of the car say together." if count else ""
+    return f"{count} of these verdicts come from all drives of the car together." if count else ""

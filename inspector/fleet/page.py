@@ -1,4 +1,4 @@
-"""The page of a fleet: what became of its cars, and every drive, worst first; one HTML file beside the table."""
+"""The page of a fleet: its cars and all drives, worst first, in one HTML file beside the table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from inspector.report.files import PAGE, result_picture
 from inspector.report.template import html_page, stylesheet
 
 MOST_ROWS, MOST_CARS = 1000, 300
-"""Drives and mounts on the page; a browser has trouble with more, and nobody reads them. All are in the table."""
+"""Largest number of drives and mounts on the page, since browsers slow down with more; all are in the table."""
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 UNCERTAINTY = "± (1σ)"
 HEADS = ("car", "drive", "date", "verdict", "moved", UNCERTAINTY, "by its car", "frames", "why", "picture")
@@ -30,8 +30,8 @@ def write_page(rows: Sequence[Row], folder: Path) -> Path:
     """Write the page of a fleet beside its table.
 
     Args:
-        rows: of the table.
-        folder: of the fleet.
+        rows: rows of the table.
+        folder: the fleet's folder.
 
     Returns:
         The page.
@@ -42,7 +42,7 @@ def write_page(rows: Sequence[Row], folder: Path) -> Path:
 
 
 def make_page(rows: Sequence[Row], folder: Path) -> str:
-    """The page; links lead below its folder."""
+    """The HTML of the page, with links relative to the folder."""
     cars, worst = histories(rows), worst_first(rows)
     names = {car.car for car in cars}
     headline = f"{number_of(len(rows), 'drive')} of {number_of(len(names), 'car')}: {counted(rows)}"
@@ -71,7 +71,7 @@ def _resource(name: str) -> str:
 
 def _moved(cars: int) -> str:
     if not cars:
-        return "No mount is seen to have moved between drives."
+        return "No mount was found to have moved between drives."
     return f"{'1 car has a mount' if cars == 1 else f'{cars} cars have a mount'} that moved between drives."
 
 
@@ -117,7 +117,7 @@ def _row(row: Row, folder: Path) -> str:
 
 
 def _reasons(row: Row) -> str:
-    """Why: first what the word is for, then what else there is."""
+    """The reason of the drive's word, then the other one."""
     alone, together = _folded(row.reason), _folded(row.by_car_reason)
     if row.word != row.verdict:
         return f'{together}<br><span class="about">Alone: {alone}</span>'
@@ -134,7 +134,7 @@ def _folded(text: str) -> str:
 
 
 def _pair(head: str, degrees: float | None, centimetres: float | None, key: float) -> str:
-    """Rotation and translation in one cell, and what it is sorted by."""
+    """A cell with rotation and translation, and the key by which it is sorted."""
     if degrees is None or centimetres is None:
         return '<td class="number" data-key=""></td>'
     text = f"{degrees:.2f}°<br>{centimetres:.1f} cm"
@@ -142,7 +142,7 @@ def _pair(head: str, degrees: float | None, centimetres: float | None, key: floa
 
 
 def _picture(row: Row, folder: Path) -> str:
-    """The report's own overlay, small."""
+    """A small picture of the report."""
     file = result_picture(folder / row.folder) if row.report else None
     if file is None:
         return ""
@@ -151,7 +151,7 @@ def _picture(row: Row, folder: Path) -> str:
 
 
 def _link(path: str) -> str:
-    """A path below the page's folder as an address: what is quoted in a name is quoted once more."""
+    """A path relative to the page as a URL; names that are quoted already are quoted once more."""
     return escape(quote(path))
 
 

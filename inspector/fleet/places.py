@@ -1,4 +1,4 @@
-"""Folders on this machine and in buckets alike: what a drive is read from, and where its results go (fsspec)."""
+"""Folders on this machine and in buckets (by fsspec), from which drives are read and to which results are written."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def is_url(path: str) -> bool:
 
 @dataclass(frozen=True)
 class Item:
-    """A file of a drive: its path below the drive's, how large it is, and what changes when it is written."""
+    """A file of a drive: its path relative to the drive's, its size, and a mark that changes when it is written."""
 
     path: str
     size: int
@@ -36,7 +36,7 @@ class Item:
 
 
 def items_of(drive: Drive) -> list[Item]:
-    """The files that a drive is made of, by name; those that its options name among them.
+    """The files of a drive, by name, including those named by its options.
 
     Raises:
         DatasetError: the place cannot be listed.
@@ -50,9 +50,9 @@ def items_of(drive: Drive) -> list[Item]:
 
 
 def seen(items: Sequence[Item]) -> str:
-    """A digest of what the files look like from outside: quick, and another after every change.
+    """A digest of the files' names, sizes and times, which is quick and different after every change.
 
-    Empty where that cannot be told, as of a web server that names its files and nothing more.
+    Empty where these are unknown, for instance on a web server that only lists names.
     """
     if not all(item.mark for item in items):
         return ""
@@ -63,11 +63,11 @@ def seen(items: Sequence[Item]) -> str:
 
 
 def content(folder: Path, drive: Drive) -> str:
-    """A digest of what is in the files of a drive, wherever they lie and whenever they were written.
+    """A digest of the content of a drive's files, wherever they are and whenever they were written.
 
     Args:
-        folder: where its path lies on this machine.
-        drive: whose files.
+        folder: folder of its files on this machine.
+        drive: the drive.
 
     Raises:
         DatasetError: a file cannot be read.
@@ -77,19 +77,21 @@ def content(folder: Path, drive: Drive) -> str:
     found += [(named, Path(named)) for named in _guesses(drive)]
     for name, path in sorted(found):
         digest.update(name.encode(errors="surrogatepass") + b"\0")
-        if not path.is_file():  # a fifo that nobody writes to is not waited for
+        if not path.is_file():  # opening a fifo without a writer would wait for ever
             continue
         try:
             with open_file(path, remember=False) as file:
                 digest.update(hashlib.file_digest(cast(BufferedReader, file), "sha256").digest())
         except OSError as error:
-            raise DatasetError(f"{path} cannot be read ({_reason(error)}); restore it.") from None
+            raise DatasetError(
+                f"{path} cannot be read ({_reason(error)}); check its permissions, or restore it."
+            ) from None
     return digest.hexdigest()
 
 
 @contextmanager
 def on_this_machine(drive: Drive) -> Iterator[Path]:
-    """Where a drive's path lies on this machine: itself, or a copy of what belongs to it, removed in the end.
+    """A drive's path on this machine: its own, or that of a temporary copy of its files.
 
     Raises:
         DatasetError: it cannot be copied.
@@ -99,7 +101,7 @@ def on_this_machine(drive: Drive) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="calib-inspect-drive-") as temporary:
         system, root = _system(drive.path)
-        copy = Path(temporary) / file_name(root.rpartition("/")[2])  # its last name is in titles
+        copy = Path(temporary) / file_name(root.rpartition("/")[2])  # the last name appears in titles
         try:
             for item in _remote_items(drive):
                 if ".." in Path(item.path).parts:
@@ -107,24 +109,26 @@ def on_this_machine(drive: Drive) -> Iterator[Path]:
                 target = copy / item.path
                 target.parent.mkdir(parents=True, exist_ok=True)
                 system.get_file(f"{root}/{item.path}".rstrip("/"), str(target))
-        except Exception as error:  # every file system has errors of its own
-            raise DatasetError(f"{drive.path} cannot be copied to this machine ({_reason(error)}).") from None
+        except Exception as error:  # every file system raises errors of its own
+            raise DatasetError(
+                f"{drive.path} cannot be copied to this machine ({_reason(error)}); check the path, or free some space."
+            ) from None
         yield copy
 
 
 @dataclass(frozen=True)
 class Store:
-    """The fleet's folder: a path on this machine, or a URL that fsspec knows."""
+    """The fleet's folder: a path on this machine, or a URL that fsspec supports."""
 
     root: str
 
     @property
     def local(self) -> Path | None:
-        """The folder, where it is on this machine."""
+        """The folder if it is on this machine, else None."""
         return None if is_url(self.root) else Path(self.root)
 
     def check(self) -> None:
-        """Create it.
+        """Create the folder, and check that it can be written.
 
         Raises:
             ConfigError: it cannot be written.
@@ -140,7 +144,7 @@ class Store:
             raise ConfigError(f"{self.root} cannot be written ({_reason(error)}); choose another --output.") from None
 
     def read(self, name: str, largest: int) -> bytes | None:
-        """A file, or None where there is none that can be read."""
+        """The content of a file; None if it cannot be read."""
         with suppress(Exception):
             if self.local is not None:
                 with open_file(self.local / name, largest, remember=False) as file:
@@ -150,14 +154,14 @@ class Store:
         return None
 
     def has(self, name: str) -> bool:
-        """Whether there is such a file."""
+        """Whether a file exists."""
         if self.local is not None:
             return (self.local / name).is_file()
         system, root = _system(self.root)
         return bool(system.exists(f"{root}/{name}"))
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file of the fleet's bookkeeping whole."""
+        """Write a file of the fleet's bookkeeping, whole or not at all."""
         if self.local is not None:
             write_whole(self.local / name, data)
             return
@@ -167,9 +171,9 @@ class Store:
 
     @contextmanager
     def workplace(self, name: str) -> Iterator[Path]:
-        """A folder to write results into: itself, or one on this machine whose files replace those there in the end.
+        """A folder to write results into: that of the store, or a temporary one whose files replace those in the store.
 
-        They do so after an error as well, so that a drive which fails shows no earlier result.
+        Files are replaced after an error as well, so that a failed drive shows no earlier result.
         """
         if self.local is not None:
             folder = self.local / name
@@ -180,13 +184,13 @@ class Store:
             try:
                 yield Path(temporary)
             except Exception:
-                with suppress(Exception):  # the error itself is what has to be known
+                with suppress(Exception):  # the first error is the one to report
                     self._replace(name, Path(temporary))
                 raise
             self._replace(name, Path(temporary))
 
     def _replace(self, name: str, folder: Path) -> None:
-        """Put the files of a folder on this machine in place of those in a folder of the store elsewhere."""
+        """Replace the files in a folder of a remote store by those of a folder on this machine."""
         system, root = _system(self.root)
         there = f"{root}/{name}"
         earlier = set(system.find(there)) if system.exists(there) else set()
@@ -203,14 +207,16 @@ def _system(url: str) -> tuple[Any, str]:
     """The file system of a URL, and its path there.
 
     Raises:
-        ConfigError: fsspec does not know it, or lacks what it needs.
+        ConfigError: fsspec does not support it, or lacks a dependency.
     """
     import fsspec
 
     try:
         system, root = fsspec.core.url_to_fs(url)
     except (ValueError, ImportError) as error:
-        raise ConfigError(f"{url} cannot be opened ({_reason(error)}).") from None
+        raise ConfigError(
+            f"{url} cannot be opened ({_reason(error)}); check the address, or install the package that it needs."
+        ) from None
     return system, str(root).rstrip("/")
 
 
@@ -228,7 +234,7 @@ def _local_items(root: Path, patterns: Sequence[str], prefix: str = "") -> list[
 
 
 def _files(start: Path) -> Iterator[Path]:
-    """All files below a folder, those in folders that are linked included, or the file itself."""
+    """All files below a folder, including those in linked folders, or the file itself."""
     if not start.is_dir():
         if os.path.lexists(start):
             yield start
@@ -236,7 +242,7 @@ def _files(start: Path) -> Iterator[Path]:
     been: set[tuple[int, int]] = set()
     for folder, below, names in os.walk(start, followlinks=True):
         status = Path(folder).stat()
-        if (status.st_dev, status.st_ino) in been:  # a link back up
+        if (status.st_dev, status.st_ino) in been:  # a link to a parent
             below.clear()
             continue
         been.add((status.st_dev, status.st_ino))
@@ -259,7 +265,7 @@ def _remote_items(drive: Drive) -> list[Item]:
 
 
 def _guesses(drive: Drive) -> list[str]:
-    """Files that a drive's options name: those of the initial guess."""
+    """Files of the initial guess, named by a drive's options."""
     options = (*drive.common, *drive.options)
     named = [value for option, value in pairwise(options) if option == "--guess"]
     return named + [word.removeprefix("--guess=") for word in options if word.startswith("--guess=")]

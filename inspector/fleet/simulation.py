@@ -1,4 +1,4 @@
-"""A fleet of synthetic drives: a few streets rendered once, reused with calibrations that are drawn anew."""
+"""A fleet of synthetic drives: a few streets, rendered once and reused with different calibrations."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from calibnet.runtime.writing import write_whole
 
 Fault = Literal["none", "moved", "camera", "truncated"]
 STREETS, FRAMES = 4, 4
-"""Streets that are rendered, and frames of each."""
+"""Number of streets that are rendered, and of frames in each."""
 DRIVES_A_CAR = 10
 FIRST_DAY = date(2026, 1, 5)
 SMALL_DEG, SMALL_M = 0.1, 0.01
-"""Standard deviations, on every axis, of how far a good calibration is off."""
+"""Standard deviation per axis of the error of a good calibration."""
 MOVED_DEG, MOVED_M = 2.0, 0.25
-"""How far a mount moves, about and along an axis drawn at random."""
+"""Size of a mount's move, about and along a random axis."""
 FOCAL = 1.12
-"""By what the focal length of a wrong camera matrix is too long."""
+"""Factor by which the focal length of a wrong camera matrix is too long."""
 LIST, TRUTH = "DRIVES.csv", "truth.csv"
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """A drive that is to be written."""
+    """A drive to be written."""
 
     car: int
     drive: int
@@ -56,24 +56,24 @@ def simulate(
     frames: int = FRAMES,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write a fleet: ``DRIVES.csv``, the drives it names, and ``truth.csv``, what is wrong with each.
+    """Write a fleet: ``DRIVES.csv``, the drives that it lists, and ``truth.csv`` with the fault of each.
 
     Args:
-        folder: new or empty.
-        count: of drives.
-        seed: of everything random.
-        frames: of each drive.
-        progress: hears how many frames of how many are rendered.
+        folder: a new or empty folder.
+        count: number of drives.
+        seed: seed of the random numbers.
+        frames: number of frames of each drive.
+        progress: called with the number of rendered frames and the total.
 
     Returns:
         The list of drives.
 
     Raises:
-        ConfigError: the folder holds something, or cannot be written.
+        ConfigError: the folder is not empty or cannot be written.
     """
     try:
         if folder.is_dir() and any(folder.iterdir()):
-            raise ConfigError(f"{folder} is not empty; a simulated fleet goes into a new folder.")
+            raise ConfigError(f"{folder} is not empty; give a new folder.")
         streets = min(STREETS, count)
         for street in range(streets):
             sequence = SyntheticSequence(seed * 1000 + street, frames, KITTI_LIKE)
@@ -93,9 +93,10 @@ def simulate(
 
 
 def draw(count: int, streets: int, generator: Generator) -> list[Simulated]:
-    """The drives of a fleet: of every 20 cars one has a mount that moves, one a wrong camera; some scans are cut off.
+    """Draw the drives of a fleet.
 
-    A mount stays where it has moved to, so a car's later drives are off as well.
+    Of every 20 cars, one has a mount that moves and one a wrong camera matrix; some scans are cut off. A mount stays
+    where it moved to, so a car's later drives are off as well.
     """
     cars = -(-count // DRIVES_A_CAR)
     order = generator.permutation(cars)
@@ -116,7 +117,7 @@ def draw(count: int, streets: int, generator: Generator) -> list[Simulated]:
 
 
 def _delta(car: int, fault: Fault, generator: Generator) -> Transform:
-    """What a drive's calibration is off by."""
+    """The error of a drive's calibration."""
     if fault != "moved":
         return miscalibration(generator.normal(0.0, SMALL_DEG, 3), generator.normal(0.0, SMALL_M, 3))
     moves = np.random.default_rng([car, 23])  # the same for all drives of the car
@@ -131,7 +132,7 @@ def _write_frame(frame: Frame, folder: Path) -> None:
 
 
 def _write_drive(one: Simulated, folder: Path) -> None:
-    """A plain folder whose frames are links into the street, and its calibration."""
+    """Write a plain folder with a calibration, whose frames are links into the street."""
     street, drive = folder / "streets" / str(one.street), folder / _path(one)
     drive.mkdir(parents=True)
     for name in ("images", "clouds"):

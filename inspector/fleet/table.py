@@ -1,4 +1,4 @@
-"""The fleet's table: one row a drive, in a Parquet file that everything reads."""
+"""The fleet's table: a Parquet file with one row per drive."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ FAILED = "failed"
 """Word for a drive that could not be read or calibrated."""
 ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
 APART: ByCar = "apart"
-"""Word for a drive that says something else than the others of its car."""
+"""Word for a drive whose result differs from that of its car's other drives."""
 ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
-"""Words for a drive by all that is known of it, worst first."""
+"""All words for a drive, worst first."""
 LARGEST = 1 << 30
 
 Sixteen = Annotated[tuple[float, ...], Len(16, 16)]
@@ -37,29 +37,29 @@ ThirtySix = Annotated[tuple[float, ...], Len(36, 36)]
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What came of one drive.
+    """The result of one drive.
 
     Attributes:
         car, drive, date, dataset, path, sequence, camera: as of `Drive`.
-        selection: which of its frames were run, as ``--frames`` has it; empty for the default.
-        options: further ones, as one text.
-        verdict: on the calibration that it had: accepted, rejected, cannot tell; or failed.
-        cause: names of what is wrong with the input, with commas; empty where the mount moved or nothing is wrong.
-        reason: a sentence.
-        by_car: verdict on the same calibration of all drives of the car together, ``inspector.fleet.history``;
-            apart, where this drive says something else than they; empty where they say nothing.
-        by_car_reason: a sentence.
-        by_car_moved_deg, by_car_moved_cm: from the calibration that it had to what the drives of the car find.
-        by_car_sigma_deg, by_car_sigma_cm: standard deviation of that.
-        moved_deg, moved_cm: from the calibration that it had to what was found.
-        sigma_deg, sigma_cm: standard deviation of what was found, over all axes.
-        frames, skipped: how many were used, and left out.
-        seconds: that it took.
-        given_camera_from_lidar: the calibration that it had, 16 numbers row by row.
-        camera_from_lidar: what was found, likewise.
-        covariance: of it, 36 numbers row by row, ``(translation m, rotation rad)``.
-        folder: of its results, below the fleet's.
-        recording, report, json: files in the fleet's folder; empty where there is none.
+        selection: selection of its frames, as for ``--frames``; empty for the default.
+        options: further options, as one text.
+        verdict: verdict on the calibration that it came with: accepted, rejected, cannot tell; or failed.
+        cause: names of the faults in the input, comma-separated; empty where the mount moved or nothing is wrong.
+        reason: the reason of the verdict, in a sentence.
+        by_car: verdict of all drives of the car together on the same calibration, see ``inspector.fleet.history``;
+            apart where this drive differs from the others; empty where they are not conclusive.
+        by_car_reason: the reason of ``by_car``, in a sentence.
+        by_car_moved_deg, by_car_moved_cm: distance from the calibration that it came with to the result of all drives.
+        by_car_sigma_deg, by_car_sigma_cm: standard deviation of that result.
+        moved_deg, moved_cm: distance from the calibration that it came with to the drive's own result.
+        sigma_deg, sigma_cm: standard deviation of that result, over all axes.
+        frames, skipped: numbers of frames that were used and left out.
+        seconds: computing time.
+        given_camera_from_lidar: the calibration that it came with, 16 numbers row by row.
+        camera_from_lidar: the drive's own result, likewise.
+        covariance: covariance of that result, 36 numbers row by row, ``(translation m, rotation rad)``.
+        folder: folder of its results, relative to the fleet's.
+        recording, report, json: files, relative to the fleet's folder; empty if missing.
     """
 
     car: str
@@ -97,28 +97,28 @@ class Row:
 
     @property
     def word(self) -> str:
-        """What is known of its calibration: by itself or, where that is less or better, by the drives of its car."""
+        """The drive's final word: its own verdict, or that of its car's drives where that is more certain or worse."""
         heard = {"cannot tell": ("accepted", "rejected", APART), "accepted": ("rejected", APART)}
         return self.by_car if self.by_car in heard.get(self.verdict, ()) else self.verdict
 
     @property
     def given(self) -> Extrinsic | None:
-        """The calibration that it had, 4x4."""
+        """The calibration that it came with, 4x4."""
         return None if self.given_camera_from_lidar is None else np.reshape(self.given_camera_from_lidar, (4, 4))
 
     @property
     def extrinsic(self) -> Extrinsic | None:
-        """What was found, 4x4."""
+        """The drive's own result, 4x4."""
         return None if self.camera_from_lidar is None else np.reshape(self.camera_from_lidar, (4, 4))
 
     @property
     def uncertainty(self) -> Matrix6 | None:
-        """Covariance of it, 6x6."""
+        """Covariance of the result, 6x6."""
         return None if self.covariance is None else np.reshape(self.covariance, (6, 6))
 
     @property
     def name(self) -> str:
-        """For pages and messages."""
+        """Name for pages and messages."""
         return f"{self.car}/{self.drive}" + (f", camera {self.camera}" if self.camera else "")
 
 
@@ -140,7 +140,7 @@ def row_of(drive: Drive, **what_came: Any) -> Row:
 
 
 def of_verdict(verdict: Verdict) -> dict[str, Any]:
-    """The columns that a verdict fills."""
+    """The columns of a verdict."""
     return {
         "verdict": verdict.word,
         "cause": ", ".join(cause.name for cause in verdict.causes if cause.name in CAUSES),
@@ -157,14 +157,14 @@ def of_verdict(verdict: Verdict) -> dict[str, Any]:
 
 
 def worst_first(rows: Iterable[Row]) -> list[Row]:
-    """Failed, rejected, apart from their car's others, cannot tell, accepted; among equals those farthest off."""
+    """The rows in the order of `ORDER`; among equals, those farthest off come first."""
     return sorted(rows, key=lambda row: (ORDER.index(row.word), -off(row), row.car, row.date, row.drive))
 
 
 def off(row: Row) -> float:
-    """How far off a drive's calibration is: in tolerances of `calibnet.judging.verify.DRIVE`, or in two deviations.
+    """How far off a drive's calibration is, in tolerances of `calibnet.judging.verify.DRIVE` or in units of 2σ.
 
-    Whichever is more counts, so that a large but uncertain movement does not come before a certain one.
+    The larger unit counts, so that a large but uncertain movement does not come before a certain one.
     """
     turn = (row.moved_deg or 0.0) / math.hypot(DRIVE.tolerances[-1].rotation_deg, 2 * (row.sigma_deg or 0.0))
     shift = (row.moved_cm or 0.0) / math.hypot(DRIVE.tolerances[-1].translation_cm, 2 * (row.sigma_cm or 0.0))
@@ -195,7 +195,7 @@ def read_table(file: Path) -> list[Row]:
     """The rows of a table.
 
     Raises:
-        DatasetError: it cannot be read, or is no such table.
+        DatasetError: it cannot be read, or is not the table of a fleet.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -210,5 +210,5 @@ def read_table(file: Path) -> list[Row]:
 
 
 def flat(matrix: Extrinsic | Matrix6) -> tuple[float, ...] | None:
-    """A matrix row by row, as a row of the table has it; None for one that is not known."""
+    """A matrix row by row, as in the table; None for an unknown one."""
     return tuple(matrix.ravel().tolist()) if np.isfinite(matrix).all() else None

@@ -1,4 +1,4 @@
-"""A viewer on an address of Rerun's server: a window, or a page in a browser."""
+"""Opens a viewer on an address of Rerun's server, as a window or as a page in a browser."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from inspector.serving.viewer_files import INDEX, fetch_viewer, viewer_files
 
 @contextmanager
 def open_viewer(address: str, in_browser: bool, headless: bool) -> Iterator[str]:
-    """Open one, and say where it is or how to open one; a web server of ours ends with the context.
+    """Open a viewer, and yield a line on where it is or how to open one; a web server of ours ends with the context.
 
     Args:
-        address: what it shows.
-        in_browser: serve the web viewer, behind the guard of all pages, instead of opening a window.
-        headless: open no window.
+        address: address that it shows.
+        in_browser: whether to serve the web viewer, behind the guard of all pages, instead of opening a window.
+        headless: whether to open no window.
     """
     if in_browser:
         data = f"http://{urlsplit(address).netloc}"

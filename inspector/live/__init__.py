@@ -1,5 +1,5 @@
-"""``calib-inspect live``: move an extrinsic by hand, and see what the cascade answers.
+"""``calib-inspect live``: move an extrinsic by hand, and see the cascade's answer.
 
-`workspace` holds what is tried, `session` acts on what the page asks for, `worker` computes beside it, `stream` records
-every try for the viewer, and `app` connects them to the page in `page/`.
+`workspace` holds the state, `session` acts on requests from the page, `worker` computes in a thread of its own,
+`stream` records every try for the viewer, and `app` connects them to the page in `page/`.
 """

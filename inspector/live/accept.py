@@ -1,4 +1,4 @@
-"""Keeping what was found as a calibration: a new file, never the one that was read."""
+"""Writes an accepted calibration to a new file, never to the one that was read."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from inspector.verdicts import explained
 
 @dataclass(frozen=True)
 class Target:
-    """Where an accepted calibration goes.
+    """File for an accepted calibration.
 
     Attributes:
-        file: that is written; one that this wrote before is replaced.
-        form: of `inspector.export.registry.FORMATS`.
+        file: path of the file; one that was written here before is replaced.
+        form: format, from `inspector.export.registry.FORMATS`.
     """
 
     file: Path
     form: str = "yaml"
 
     def check(self) -> None:
-        """Find out before the work that it may be written.
+        """Check before the work that the file may be written.
 
         Raises:
-            OutputError: it may not.
+            OutputError: it must not be written.
         """
         check_output(self.file, kind_of_export(export_as(self.form, example())))
 
     def write(self, frame: Frame, extrinsic: Extrinsic, origin: str, verdict: Verdict | None) -> str:
-        """Write it, and say so in a sentence.
+        """Write a calibration; returns a sentence that says so.
 
         Raises:
-            OutputError: the file may not be replaced.
+            OutputError: the file must not be replaced.
         """
         doubt = doubts(verdict)
         exported = Exported(
@@ -54,7 +54,7 @@ class Target:
 
 
 def verdict_on(extrinsic: Extrinsic, tries: list[Try]) -> Verdict | None:
-    """The newest verdict on just this extrinsic; None where it was set by hand."""
+    """The newest verdict on exactly this extrinsic; None if it was set by hand."""
     for made in reversed(tries):
         if np.allclose(made.found, extrinsic, atol=1e-9):
             return made.verdict
@@ -62,7 +62,7 @@ def verdict_on(extrinsic: Extrinsic, tries: list[Try]) -> Verdict | None:
 
 
 def doubts(verdict: Verdict | None) -> str:
-    """Why one should think twice before keeping a calibration; empty where it is accepted."""
+    """Reason to doubt a calibration before keeping it; empty if it is accepted."""
     if verdict is None:
-        return "set by hand: nothing has judged it"
+        return "set by hand, without a verdict"
     return "" if verdict.word == ACCEPTED else f"{verdict.word}: {explained(verdict)}"

@@ -1,7 +1,7 @@
-"""What takes long in a live session: running stages, solving the drive, looking for the worst frame, looking there.
+"""Long computations of a live session: running stages, solving the drive, finding the worst frame.
 
-Each is a job of the session's worker. An answer is told before anything is recorded of it: its details, which cost as
-much again, are run stage by stage and recorded when nobody waits.
+Each is a job of the session's worker. An answer is shown before it is recorded; its details, which cost as much again,
+are computed stage by stage and recorded when nobody waits.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from inspector.record.observation import Observation
 from inspector.record.pictures.matches import point_at
 
 MOST_SEARCHED = 24
-"""Frames, spread over the drive, among which the worst is looked for."""
+"""Number of frames, spread over the drive, among which the worst is searched."""
 REACH_PX = 12.0
-"""Distance from a click up to which a point counts."""
+"""Largest distance of a point from a click, in pixels."""
 Progress = Callable[[int, int], None]
 
 
 class Answers:
-    """Asks the method about what is on the workspace, and keeps what it says.
+    """Runs the method on the workspace, and keeps its answers.
 
     Attributes:
-        stream: the recording of it.
+        stream: the recording of the tries.
     """
 
     def __init__(
@@ -50,13 +50,13 @@ class Answers:
         worker: Worker,
         tell_try: Callable[[Try], Awaitable[None]],
     ) -> None:
-        """Nothing runs yet.
+        """Start idle.
 
         Args:
-            workspace: what is tried.
-            stream: where tries are recorded.
-            method: that answers.
-            worker: that runs it.
+            workspace: state of the session.
+            stream: recording of the tries.
+            method: method that answers.
+            worker: worker that runs it.
             tell_try: called with every answer.
         """
         self._workspace, self.stream, self._method, self._worker = workspace, stream, method, worker
@@ -68,7 +68,7 @@ class Answers:
 
     @property
     def stages(self) -> list[int]:
-        """Those that can be run one at a time."""
+        """Numbers of the stages that can be run one at a time."""
         return list(self._method.numbers) if isinstance(self._method, StagedCalibrator) else []
 
     @property
@@ -77,14 +77,14 @@ class Answers:
         return isinstance(self._method, DriveCalibrator)
 
     def get_ready(self) -> None:
-        """Let the networks see the frame once, unasked: the first look at a size of picture takes twice as long."""
+        """Run the networks on the frame once in advance, since the first run on an image size takes twice as long."""
         method, frame, start = self._method, self._workspace.frame, self._workspace.extrinsic
         if self._ready or not isinstance(method, StagedCalibrator):
             return
         self._ready = True
 
         def compute(_: Progress) -> None:
-            with contextlib.suppress(CalibrationError):  # whoever asks is told
+            with contextlib.suppress(CalibrationError):  # a real request reports it
                 method.calibrate(frame, start)
 
         async def finish(_: object) -> None:
@@ -93,7 +93,7 @@ class Answers:
         self._worker.ask_later(Job("getting ready", compute, finish))
 
     def run(self, number: int | None = None) -> None:
-        """Run all stages, or the one that is named, from the pose.
+        """Run all stages, or the given one, from the pose.
 
         Raises:
             ConfigError: the method has no stages.
@@ -102,7 +102,7 @@ class Answers:
         method = self._method
         if number is not None:
             if not isinstance(method, StagedCalibrator):
-                raise ConfigError("This method has no stages to run one at a time.")
+                raise ConfigError("This method has no stages that run one at a time; run all of it.")
             method = method.only(number)
         frame, start, reference = self._workspace.frame, self._workspace.extrinsic, self._workspace.reference
 
@@ -120,8 +120,8 @@ class Answers:
         self._worker.ask(Job("running all stages" if number is None else f"running stage {number}", compute, finish))
 
     def _record(self, made: Try, method: Calibrator, frame: Frame, answer: Observation) -> None:
-        """Record a try when nobody waits for an answer: only then is it run again with all its details."""
-        seen: list[Observation] = []  # what is there already when the job had to make room
+        """Record a try once nobody waits for an answer, by running it again with all details."""
+        seen: list[Observation] = []  # kept when the job has to make room
 
         def compute(tell: Progress) -> Observation:
             if not seen:
@@ -145,12 +145,12 @@ class Answers:
         """Solve all frames together, from the pose.
 
         Raises:
-            ConfigError: the method solves no drives.
+            ConfigError: the method cannot solve drives.
         """
         frames, start, index = self._workspace.frames, self._workspace.extrinsic, self._workspace.frame.index
         method = self._method
         if not isinstance(method, DriveCalibrator):
-            raise ConfigError("This method calibrates single frames and solves no drive.")
+            raise ConfigError("This method calibrates single frames and cannot solve a drive; run a frame.")
 
         def compute(tell: Progress) -> tuple[DriveEstimate, float]:
             began = time.perf_counter()
@@ -164,7 +164,7 @@ class Answers:
         self._worker.ask(Job("solving the drive", compute, finish))
 
     def worst(self, shown: Callable[[], Awaitable[None]]) -> None:
-        """Show the frame, of some from all over the drive, that the method leaves worst from this pose."""
+        """Show the frame, of some spread over the drive, with the worst result from this pose."""
         workspace, frames, pose = self._workspace, self._workspace.frames, self._workspace.pose
 
         def compute(tell: Progress) -> tuple[int, Frame]:
@@ -189,16 +189,16 @@ class Answers:
     def look(
         self, made: Try, under: Extrinsic, pixel: tuple[float, float], found: Callable[[float], Awaitable[None]]
     ) -> None:
-        """Move the search windows of the newest try to the point at a pixel of the picture.
+        """Move the search windows of the newest try to the point at a pixel of the image.
 
         Args:
             made: the newest try.
-            under: ``camera_from_lidar`` that the picture shows.
+            under: ``camera_from_lidar`` that the image shows.
             pixel: ``(u, v)``.
-            found: told how many metres away the point is.
+            found: called with the distance of the point in metres.
 
         Raises:
-            ConfigError: it is not the newest one of this frame, is still being recorded, or no point lies there.
+            ConfigError: the try is not the newest one of this frame or is still being recorded, or there is no point.
         """
         if made.number in self._unrecorded:
             raise ConfigError(f"Try {made.number} is still being recorded; click again in a moment.")
@@ -207,7 +207,7 @@ class Answers:
             raise ConfigError("Only the newest try on this frame still has its cost volumes; run again from there.")
         point = point_at(observation.projected(under), pixel, REACH_PX)
         if point is None:
-            raise ConfigError("No point of the scan lies there; click on one.")
+            raise ConfigError("There is no point of the scan here; click on a point.")
 
         def compute(_: Progress) -> None:
             self.stream.log_point(made, observation, point)
@@ -220,13 +220,13 @@ class Answers:
 
 
 def detailed(method: Calibrator, frame: Frame, answer: CascadeTrace, tell: Progress) -> CascadeTrace:
-    """An answer with all its details, looked at again stage by stage: between two of them it can make room.
+    """An answer with all its details, computed again stage by stage, so that it can make room in between.
 
     Args:
-        method: that gave it.
-        frame: on this one.
-        answer: without details.
-        tell: called with (done, in all) before each stage; it may raise.
+        method: method that gave it.
+        frame: frame of the answer.
+        answer: answer without details.
+        tell: called with (done, total) before each stage; may raise.
     """
     if not isinstance(method, StagedCalibrator):
         tell(0, 1)
@@ -240,7 +240,7 @@ def detailed(method: Calibrator, frame: Frame, answer: CascadeTrace, tell: Progr
 
 
 def _badness(trace: CascadeTrace, reference: Extrinsic | None) -> float:
-    """How wrong a frame ended: by its error in degrees and decimetres or, without a reference, by its fit."""
+    """How bad a frame's result is: its error in degrees and decimetres or, without a reference, its match error."""
     if reference is None:
         return trace.stages[-1].match_error_px if trace.stages else 0.0
     error = pose_error(trace.arrived, reference)

@@ -1,4 +1,4 @@
-"""The page's app: the page and its picture over HTTP, messages and the recording over websockets."""
+"""The app of the page: the page and its image over HTTP, messages and the recording over websockets."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ PAGE = Path(__file__).parent / "page"
 
 
 class LiveApp:
-    """Connects windows to a session: all of them show the same."""
+    """Connects browser windows to a session; all of them show the same."""
 
     def __init__(self, session: LiveSession, viewer: Path) -> None:
         """Serve a session.
 
         Args:
-            session: what they act on.
+            session: the session.
             viewer: folder with the files of Rerun's web viewer.
         """
         assert isinstance(session.stream, TryStream), "a page's viewer gets pieces"
@@ -53,7 +53,7 @@ class LiveApp:
         )
 
     def _answer(self, make: Callable[[Any], bytes], media_type: str) -> Callable[[Request], Awaitable[Response]]:
-        """Answer about the current frame; the page adds its position to the address, so that no old answer is shown."""
+        """A handler on the current frame; the page adds the position to the URL, so that no old answer is shown."""
 
         async def answer(_: Request) -> Response:
             content = await asyncio.to_thread(make, self._session.workspace.frame)
@@ -62,10 +62,10 @@ class LiveApp:
         return answer
 
     async def _control(self, window: WebSocket) -> None:
-        """Messages of a window, as JSON."""
+        """Exchange JSON messages with a window."""
         await window.accept()
         hello = self._session.hello()
-        self._windows.add(window)  # before anything else can be told: what hello lacks is heard after it
+        self._windows.add(window)  # before anything else is sent, so that what hello lacks follows it
         await window.send_json(hello)
         self._session.opened()
         try:
@@ -80,7 +80,7 @@ class LiveApp:
             self._windows.discard(window)
 
     async def _stream(self, viewer: WebSocket) -> None:
-        """The pieces of the recording that the viewer has not had, and then each as it comes; it says nothing."""
+        """Send the viewer the pieces of the recording that it lacks, and then each new one."""
         await viewer.accept()
         had = viewer.query_params.get("from", "0")
         more, sent = asyncio.Event(), int(had) if had.isdecimal() else 0
@@ -105,7 +105,7 @@ class LiveApp:
             more.set()
 
     async def _tell_all(self, message: dict[str, Any]) -> None:
-        """Tell every window; one that has gone is forgotten, and the others hear it all the same."""
+        """Send a message to every window, and forget windows that are gone."""
         text = json.dumps(message)
         for window in list(self._windows):
             try:

@@ -1,4 +1,4 @@
-"""The keys of a terminal, one by one, without waiting for Enter."""
+"""Reads the keys of a terminal one by one, without waiting for Enter."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from contextlib import contextmanager
 from calibnet.errors import ConfigError
 
 END = ""
-"""What is read when no more keys can come."""
+"""Key that stands for the end of input."""
 Read = Callable[[float], list[str]]
-"""The keys that were pressed since, after waiting so many seconds at most for the first."""
+"""Returns the keys pressed since the last call, after waiting at most the given seconds for the first."""
 
 
 @contextmanager
 def keyboard(descriptor: int | None = None) -> Iterator[Read]:
-    """Read keys while this lasts; the terminal is left as it was found. What is no terminal is read as keys too.
+    """A context that reads keys, from a terminal or any other input, and restores the terminal at its end.
 
     Args:
-        descriptor: of the terminal; standard input, if not given.
+        descriptor: file descriptor of the terminal; None for standard input.
 
     Raises:
-        ConfigError: this system has no such terminals.
+        ConfigError: this system's terminals are not supported.
     """
     if sys.platform == "win32":
         raise ConfigError("--native reads its keys from a terminal of Linux or macOS; leave it out for the page.")
@@ -56,5 +56,5 @@ F5; a key of the keypad; a key with Alt; any other character."""
 
 
 def split_keys(text: str) -> list[str]:
-    """What a terminal sends, in one piece for each key."""
+    """Split what a terminal sends into one text per key."""
     return _KEY.findall(text)

@@ -1,7 +1,7 @@
-"""The tab in front beside the page: where every stage searched for one point of the scan, and where it found it.
+"""The first tab beside the page: where every stage searched for one point of the scan, and where it found it.
 
-A click on a point moves all of these windows, so they stand side by side. They are few, since a viewer without a
-graphics card takes long for every view.
+A click on a point moves all of these windows, so they are shown side by side. They are few, since a viewer without a
+graphics card takes long for each.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ NAME = "Why there?"
 LEGEND = "legend/matches"
 LEGEND_SHARE = 0.12
 TITLE = "title"
-"""Name of a stage's window, above it: a title bar of Rerun's has no room for it beside its buttons."""
+"""Entity with the name of a stage's window above it; Rerun's title bar has no room for it beside its buttons."""
 TITLE_CELLS = 0.8
-"""Cells from a window to its title."""
+"""Distance from a window to its title, in cells."""
 TITLE_COLOR: colors.Rgb = (90, 155, 240)
-"""To be read on the labels of both themes."""
+"""Colour of titles that is readable on the labels of both themes."""
 
 
 def wanted(layout: Layout) -> bool:
-    """Where there are cost volumes."""
+    """Whether there are cost volumes."""
     return cost_volumes.wanted(layout)
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log the titles of the windows, which *Cost volumes* logs, and what their marks stand for."""
+    """Log the titles of the windows, which *Cost volumes* logs, and the legend of their marks."""
     names = {"where the point was": colors.INITIAL, "where it was found": colors.FOUND}
     log_names(rec, LEGEND, names | ({"where it belongs": colors.REFERENCE} if layout.has_reference else {}))
     for stage in layout.stages_with_volumes:
@@ -51,11 +51,11 @@ def log_once(rec: Subtree, layout: Layout) -> None:
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log nothing: *Cost volumes* does."""
+    """Log nothing, since *Cost volumes* logs it."""
 
 
 def view(layout: Layout) -> View:
-    """The windows of the finest cells of all stages in a row."""
+    """The windows at the finest scale of all stages, in a row."""
     windows = [_window(stage.number, _finest(stage)) for stage in layout.stages_with_volumes]
     marks = legend("Marks in the windows", LEGEND)
     return rrb.Vertical(rrb.Horizontal(*windows), marks, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=NAME)

@@ -1,4 +1,4 @@
-"""What the page needs of a frame to draw it itself, so that points follow the hand without asking anybody."""
+"""The data of a frame with which the page draws it by itself, so that points follow the sliders without a request."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from inspector.record.pictures.painting import depth_edges
 
 JPEG_QUALITY = 90
 MOST_POINTS = 150_000
-"""A page draws these within a few milliseconds."""
+"""Largest number of points, which a page draws within a few milliseconds."""
 
 
 def picture_jpeg(frame: Frame) -> bytes:
-    """The rectified picture, whose camera is a pinhole."""
+    """The rectified image, whose camera is a pinhole."""
     done, encoded = cv2.imencode(".jpg", frame.image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     assert done, "a picture that was read can be encoded"
     return encoded.tobytes()
 
 
 def points_bytes(frame: Frame) -> bytes:
-    """The scan: ``N`` as uint32, then ``[N, 3]`` float32 metres, then of each point uint8 intensity, then uint8 edge.
+    """The scan: ``N`` as uint32, then ``[N, 3]`` float32 metres, then ``[N]`` uint8 intensity, then ``[N]`` uint8 edge.
 
     Intensity is stretched to 0..255 between robust limits; edge is 1 at depth edges.
     """
@@ -33,7 +33,7 @@ def points_bytes(frame: Frame) -> bytes:
 
 
 def shown(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
-    """Positions, intensities and edges of every point, or of every n-th of a huge cloud."""
+    """Positions, intensities and edges of every point, or of every n-th point of a huge cloud."""
     every = -(-len(frame.points) // MOST_POINTS)
     points = frame.points[::every]
     low, high = colors.robust_limits(points[:, 3])
@@ -42,7 +42,7 @@ def shown(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray
 
 
 def palettes() -> dict[str, object]:
-    """The colours that recordings use, for the page to use the same."""
+    """The colours of recordings, for the page to use as well."""
     return {
         "turbo": colors.TURBO.ravel().tolist(),
         "viridis": colors.VIRIDIS.ravel().tolist(),

@@ -1,4 +1,4 @@
-"""Six numbers for a person: how far an extrinsic is turned and moved from the guess that one began with."""
+"""An extrinsic as six numbers: how far it is rotated and moved from the initial guess."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ class Pose(NamedTuple):
     z: float = 0.0
 
     def applied_to(self, guess: Extrinsic) -> Extrinsic:
-        """The ``camera_from_lidar`` that this change makes of the guess."""
+        """The ``camera_from_lidar`` after this change of the guess."""
         return miscalibration(self[:3], self[3:]) @ guess
 
     @classmethod
     def between(cls, extrinsic: Extrinsic, guess: Extrinsic) -> Pose:
-        """The change that makes the extrinsic of the guess."""
+        """The change that leads from the guess to the extrinsic."""
         change = extrinsic @ invert(guess)
         pitch, yaw, roll = np.degrees(euler_xyz(change[:3, :3]))
         return cls(float(roll), float(pitch), float(yaw), *map(float, change[:3, 3]))
 
     def is_finite(self) -> bool:
-        """Whether all six are numbers of a sensible size."""
+        """Whether all six numbers are finite and of plausible size."""
         return bool(np.isfinite(self).all() and np.abs(self[:3]).max() <= 180 and np.abs(self[3:]).max() <= 100)

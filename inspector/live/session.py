@@ -1,4 +1,4 @@
-"""What a page can ask for: each message is a dictionary with ``do``, and the answers go to all windows."""
+"""The requests of a page: each message is a dictionary with ``do``, and answers go to all windows."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class LiveSession:
     """Acts on messages; everything but `Job.compute` runs in the server's thread.
 
     Attributes:
-        workspace: what is tried.
-        stream: the recording of it.
+        workspace: state of the session.
+        stream: recording of the tries.
     """
 
     def __init__(
@@ -41,15 +41,15 @@ class LiveSession:
         stream: TryRecording | None = None,
         known: str = "",
     ) -> None:
-        """Begin without a try.
+        """Start without a try.
 
         Args:
-            workspace: with its first frame.
-            method: that answers: the cascade, or another one.
-            target: where an accepted calibration goes.
-            range_: of the sliders, and of random poses.
-            stream: that tries are recorded in; `TryStream`, if not given.
-            known: what the method knows of the pose that it starts from, in words.
+            workspace: state with the first frame.
+            method: method that answers: the cascade, or another one.
+            target: file for an accepted calibration.
+            range_: range of the sliders and of random poses.
+            stream: recording of the tries; None for a `TryStream`.
+            known: what is known of the initial extrinsic, in words.
         """
         self.workspace, self.stream = workspace, stream or TryStream()
         self._target, self._range, self._known = target, range_, known
@@ -74,7 +74,7 @@ class LiveSession:
         }
 
     async def act(self, message: dict[str, Any]) -> dict[str, Any] | None:
-        """Do what a message asks for; what cannot be done is told in a sentence.
+        """Act on a message; failures are reported to the windows in a sentence.
 
         Returns:
             A question for whoever sent the message, and nobody else; None for most messages.
@@ -87,11 +87,11 @@ class LiveSession:
         except CalibnetError as error:
             await self._tell_problem(str(error))
         except (KeyError, TypeError, ValueError, IndexError):
-            await self._tell_problem(f"The page sent {message!r}, which cannot be read; reload it.")
+            await self._tell_problem(f"Request {message!r} is not valid; reload the page.")
         return None
 
     def hello(self) -> dict[str, Any]:
-        """What a window needs that opens."""
+        """The first message to a window."""
         return {
             "is": "hello",
             "name": self.workspace.name,
@@ -106,11 +106,11 @@ class LiveSession:
         }
 
     def opened(self) -> None:
-        """Somebody looks: get ready for the first question."""
+        """Get ready for the first request, since a window has opened."""
         self._answers.get_ready()
 
     def state(self) -> dict[str, Any]:
-        """What changes with every message."""
+        """The state, which changes with every message."""
         workspace, camera = self.workspace, self.workspace.frame.camera
         reference = workspace.reference
         return {
@@ -132,7 +132,7 @@ class LiveSession:
         }
 
     def on_recorded(self, grown: Callable[[], Awaitable[None]]) -> None:
-        """Say who is told when something was added to `stream`."""
+        """Set the function that is called when something was added to `stream`."""
         self._answers.recorded = grown
 
     async def idle(self) -> None:
@@ -150,7 +150,7 @@ class LiveSession:
         roll, pitch, yaw, x, y, z = map(float, message["pose"])
         pose = Pose(roll, pitch, yaw, x, y, z)
         if not pose.is_finite():
-            raise ConfigError("Angles are within ±180° and offsets within ±100 m.")
+            raise ConfigError("Angles must be within ±180° and offsets within ±100 m.")
         self.workspace.move(pose)
         await self._moved(message)
 
@@ -168,7 +168,7 @@ class LiveSession:
 
     async def _to_reference(self, message: dict[str, Any]) -> None:
         if self.workspace.reference is None:
-            raise ConfigError("No reference is known for these frames.")
+            raise ConfigError("These frames have no reference.")
         self.workspace.move_to(self.workspace.reference)
         await self._moved(message)
 
@@ -177,7 +177,7 @@ class LiveSession:
         await self._moved(message)
 
     async def _take(self, message: dict[str, Any]) -> None:
-        """Make a step of a try the pose; nothing runs from it by itself."""
+        """Set the pose to a step of a try, without running anything."""
         self.workspace.move_to(self._step(message))
         await self._tell_state()
 
@@ -213,7 +213,7 @@ class LiveSession:
         self._answers.worst(shown)
 
     async def _look(self, message: dict[str, Any]) -> None:
-        """Move the search windows of the newest try to the point at a pixel of the picture under a step of it."""
+        """Move the search windows of the newest try to the point at a pixel of the image, under one of its steps."""
         under = np.array(message["under"], float).reshape(4, 4) if "under" in message else self._step(message)
         pixel = float(message["pixel"][0]), float(message["pixel"][1])
 
@@ -225,7 +225,7 @@ class LiveSession:
     # ---- keeping ------------------------------------------------------------------------------------------------
 
     async def _accept(self, message: dict[str, Any]) -> dict[str, Any] | None:
-        """Write an extrinsic as calibration; one that is not accepted only when that is confirmed."""
+        """Write an extrinsic as a calibration; one that is not accepted needs a confirmation."""
         by_hand = message.get("try") is None
         extrinsic = self.workspace.extrinsic if by_hand else self._step(message)
         verdict = verdict_on(extrinsic, self.workspace.tries)

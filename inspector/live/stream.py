@@ -1,7 +1,7 @@
-"""Every try as data for the viewer, on one timeline, ``try``: ``number * 8 + stage``, as `entities.STEP` has frames.
+"""Records every try for the viewer on one timeline, ``try``: ``number * 8 + stage``, as `entities.STEP` does frames.
 
-What the page's viewer gets are pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection:
-no other port is open. All of them are kept in a file, for windows that are opened later.
+The page's viewer gets pieces of an ``.rrd``, each complete in itself, over the page's own guarded connection, so that
+no other port is open. All pieces are kept in a file for windows that open later.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from inspector.record.tabs.registry import Tab
 TIMELINE = "try"
 APPLICATION_ID = "calib-inspect-live"
 TABS: tuple[Tab, ...] = (matches, cost_volumes, cascade, exhibits, scene, hourglass)
-"""Tabs of the viewer beside the page, which has the overview itself; first the one that answers a click."""
+"""Tabs of the viewer beside the page, which has its own overview; the first one answers a click."""
 CONTENTS = Contents(frozenset({Part.OVERLAYS, Part.VOLUMES, Part.HOURGLASS, Part.SCENE}), dense=True)
 
 
 class TrySubtree(Subtree):
-    """Logs a frame at its try instead of its own number."""
+    """Logs a frame at the number of its try instead of its own."""
 
     number = 0
 
@@ -42,28 +42,30 @@ class TrySubtree(Subtree):
         self.set_step(index, 0)
 
     def set_step(self, index: int, stage: int) -> None:
-        """Set it to a stage of the try; 0 is before the first."""
+        """Set the timeline to a stage of the try; 0 is before the first."""
         self._stream.set_time(TIMELINE, sequence=self.number * entities.STEPS_PER_FRAME + stage)
 
 
 class TryRecording:
-    """The recording of a live session; where it goes is for those to say that derive from it."""
+    """The recording of a live session; subclasses decide where it goes."""
 
     def __init__(self, tabs: tuple[Tab, ...] = TABS) -> None:
-        """Open it; nothing is in it before the first try.
+        """Open an empty recording.
 
         Args:
-            tabs: that are shown where there is data for them.
+            tabs: tabs to show if there is data for them.
         """
         rr.set_strict_mode(True)
-        whole = rr.ChunkBatcherConfig(flush_tick=timedelta(days=1))  # few chunks: a viewer takes some a picture
+        whole = rr.ChunkBatcherConfig(
+            flush_tick=timedelta(days=1)
+        )  # few chunks, since a viewer takes only some per picture
         self._stream = rr.RecordingStream(APPLICATION_ID, recording_id=uuid.uuid4().hex, batcher_config=whole)
         self._stream.set_log_time_enabled(False)
         self._rec = TrySubtree(self._stream)
         self._all_tabs, self._tabs = tabs, list[Tab]()
 
     def answer(self, made: Try, observation: Observation) -> None:
-        """Show at once what a try came to, before its details; nothing where a page does."""
+        """Show the result of a try before its details; does nothing where a page shows it."""
 
     def log(self, made: Try, observation: Observation) -> None:
         """Log a try on one frame with its details."""
@@ -84,26 +86,26 @@ class TryRecording:
 
     def _open(self, layout: Layout) -> None:
         self._tabs = [tab for tab in self._all_tabs if tab.wanted(layout)]
-        # first of all: a slow viewer shows what it has, which would be every legend in a view of its own
+        # first of all, or a slow viewer would show every legend in a view of its own
         self._stream.send_blueprint(make_blueprint(layout, self._tabs, timeline=TIMELINE, following=True))
         self._stream.send_recording_name("live")
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
 
     def _keep(self) -> None:
-        """Hand on what was logged."""
+        """Pass on what was logged."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """Forget everything."""
+        """Delete the recording."""
         self._stream.disconnect()
 
 
 class TryStream(TryRecording):
-    """The recording piece by piece, for the page."""
+    """A recording in pieces, for the page."""
 
     def __init__(self) -> None:
-        """Open it; nothing is in it before the first try."""
+        """Open an empty recording."""
         super().__init__()
         self._bytes = rr.binary_stream(self._stream)
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the stream
@@ -121,14 +123,14 @@ class TryStream(TryRecording):
         return len(self._pieces)
 
     def piece(self, number: int) -> bytes:
-        """One of the pieces, in their order."""
+        """The piece of a number."""
         with self._lock:
             start, length = self._pieces[number]
             self._file.seek(start)
             return self._file.read(length)
 
     def close(self) -> None:
-        """Forget everything."""
-        self._bytes.read()  # Rerun would warn of data that nobody took
+        """Delete the recording."""
+        self._bytes.read()  # Rerun would warn of unread data
         super().close()
         self._file.close()

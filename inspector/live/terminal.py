@@ -1,4 +1,4 @@
-"""A live session by the keys of a terminal, beside Rerun's own window."""
+"""A live session that is controlled by the keys of a terminal, beside Rerun's own window."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from inspector.live.window import WindowRecording
 from inspector.markdown import markdown_table
 
 AXES = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z"}
-"""The keys that turn or move up and down, as in OpenCalib's manual tool."""
+"""Pairs of keys that increase and decrease a number of the pose, as in OpenCalib's manual tool."""
 STEPS = {"coarse": (0.25, 0.02), "fine": (0.02, 0.002)}
-"""Degrees and metres that a key moves by; with Shift a tenth."""
+"""Degrees and metres per key press; with Shift, a tenth of it."""
 RELEASE_S = 0.3
-"""Pause after the last key from which on it counts as released."""
+"""Pause after the last key press after which the key counts as released, in seconds."""
 POLL_S = 0.05
 LEFT, RIGHT, ESCAPE = ("\x1b[D", "\x1bOD"), ("\x1b[C", "\x1bOC"), "\x1b"
 MESSAGES: dict[str, dict[str, Any]] = {
@@ -39,35 +39,35 @@ HELP = {
     "Shift": "a tenth of the step",
     "v": "coarse or fine steps",
     "Enter": "run all stages",
-    "1 to 5": "run that stage alone",
+    "1 to 5": "run only that stage",
     "m": "solve the drive from all frames",
     "z, Z": "undo, redo",
-    "0, 9, i": "to the guess, to the reference, random",
-    "l": "take the last answer as the pose",
+    "0, 9, i": "go to the guess, to the reference, to a random pose",
+    "l": "set the pose to the last answer",
     "n, p, arrows": "next, previous frame",
-    "x": "the worst frame from here",
-    "k": "keep the last answer as calibration",
-    "o": "run on release, or only with Enter",
-    "?": "these keys",
+    "x": "go to the worst frame",
+    "k": "save the last answer as a calibration",
+    "o": "run on release, or only on Enter",
+    "?": "list these keys",
     "Esc, Ctrl-C": "end",
 }
 
 
 def help_text() -> str:
-    """What the keys do, as Markdown."""
+    """The list of keys, as Markdown."""
     return "\n".join(markdown_table(["key", "does"], HELP.items()))
 
 
 class Terminal:
-    """Turns keys into messages to a session, and what it tells into lines."""
+    """Turns keys into messages to a session, and its messages into lines."""
 
     def __init__(self, session: LiveSession, window: WindowRecording, say: Callable[[str], None]) -> None:
         """Connect a session with its window.
 
         Args:
-            session: that acts, and records to the window.
-            window: that follows the pose.
-            say: prints a line.
+            session: session that acts, and records to the window.
+            window: window that follows the pose.
+            say: function that prints a line.
         """
         self._session, self._window, self._say = session, window, say
         self._workspace = session.workspace
@@ -79,7 +79,7 @@ class Terminal:
         session.tell = self._hear
 
     async def run(self, read: Read, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Act on keys until they end, one of them says so, or ``stopped`` does."""
+        """Act on keys until the end of input, the key that ends, or ``stopped``."""
         await self._hold()
         self._session.opened()
         while not stopped():
@@ -99,7 +99,7 @@ class Terminal:
             if key == "y":
                 await self._act(again)
             else:
-                self._say("Left as it is.")
+                self._say("Nothing was written.")
         elif (pose := self._turned(key)) is not None:
             await self._session.act({"do": "pose", "pose": list(pose)})
             self._moved_at = time.monotonic()
@@ -115,16 +115,16 @@ class Terminal:
         elif key == "v":
             self._steps = "fine" if self._steps == "coarse" else "coarse"
             degrees, metres = STEPS[self._steps]
-            self._say(f"Steps of {degrees:g}° and {100 * metres:g} cm.")
+            self._say(f"Step size: {degrees:g}° and {100 * metres:g} cm.")
         elif key == "o":
             self._on_release = not self._on_release
-            self._say("Runs when keys are let go." if self._on_release else "Runs with Enter only.")
+            self._say("Runs when keys are released." if self._on_release else "Runs on Enter only.")
         elif key == "?":
             for name, does in HELP.items():
                 self._say(f"{name:>14}  {does}")
 
     def _turned(self, key: str) -> Pose | None:
-        """The pose after a key that moves it; None where the key does something else."""
+        """The pose after a key that changes it; None for other keys."""
         for keys, axis in AXES.items():
             if key.lower() in (*keys,):
                 step = STEPS[self._steps][axis in ("x", "y", "z")] * (0.1 if key.isupper() else 1.0)
@@ -138,7 +138,7 @@ class Terminal:
             await self._session.act({"do": "run"})
 
     async def _last(self, what: str) -> None:
-        """Take or keep the last answer; without one, what is kept is the pose."""
+        """Take or save the last answer; without one, the pose is saved."""
         if self._workspace.tries:
             made = self._workspace.tries[-1]
             await self._act({"do": what, "try": made.number, "step": len(made.steps) - 1})
@@ -146,13 +146,13 @@ class Terminal:
             await self._act({"do": what})
 
     async def _act(self, message: dict[str, Any]) -> None:
-        """Ask for something that may be answered with a question."""
+        """Send a request, and ask the user to confirm if the session asks."""
         answer = await self._session.act(message)
         if answer is not None:
             await self._hear(answer)
 
     async def _hold(self) -> None:
-        """Let the window follow, where the pose or the frame is another one."""
+        """Update the window if the pose or the frame has changed."""
         workspace = self._workspace
         now = (workspace.frame, workspace.pose)
         if self._held is None or now != self._held:
@@ -170,7 +170,7 @@ class Terminal:
             self._say(message["text"])
         elif kind == "sure?":
             self._asked = message["again"]
-            self._say(f"{message['text']} Write it all the same? y / n")
+            self._say(f"{message['text']} Write it anyway? y / n")
         elif kind == "state" and message["busy"] != self._busy:
             self._busy = message["busy"]
             if self._busy and not self._busy.startswith(("recording", "getting")):
@@ -178,7 +178,7 @@ class Terminal:
 
 
 def try_lines(made: dict[str, Any]) -> list[str]:
-    """What a try came to, from `inspector.live.tries.Try.as_dict`."""
+    """The result of a try in lines, from `inspector.live.tries.Try.as_dict`."""
     verdict, sigma = made["verdict"], made["sigma"]
     word = "no verdict" if verdict is None else verdict["word"]
     head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {word.upper()}."
@@ -186,7 +186,7 @@ def try_lines(made: dict[str, Any]) -> list[str]:
     sure = [] if sigma is None else [f"±{sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
     rows = []
     for position, step in enumerate(made["steps"]):
-        name = f"after {step['name']}" if position else "from"
+        name = f"after {step['name']}" if position else "start"
         error, moved = (
             None if one is None else f"{one[0]:.2f}°, {one[1]:.1f} cm" for one in (step["error"], step["moved"])
         )

@@ -1,4 +1,4 @@
-"""What one try came to: the extrinsics it went through, and what may be said of the last."""
+"""One try: its extrinsics from the pose to the result, and the verdict on the result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from inspector.verdicts import explained
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """An extrinsic on the way, and what it is called: ``mine``, ``stage 3``, ``drive``."""
+    """An intermediate extrinsic and its name, for instance ``mine``, ``stage 3`` or ``drive``."""
 
     name: str
     camera_from_lidar: Extrinsic = field(repr=False)
@@ -22,17 +22,17 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Try:
-    """What was found from one pose.
+    """The result from one pose.
 
     Attributes:
-        number: 0 and up, its place on the timeline ``try``.
-        frame: index of the frame.
-        title: what ran.
-        steps: from the pose to the result.
-        verdict: on the result.
-        milliseconds: that it took.
-        trace: of the cascade, where it ran on one frame.
-        fit_px: error that the last stage expects of its matches, in pixels of its image; None of a drive.
+        number: number from 0, its place on the timeline ``try``.
+        frame: number of the frame.
+        title: name of what ran.
+        steps: extrinsics from the pose to the result.
+        verdict: verdict on the result.
+        milliseconds: computing time.
+        trace: trace of the cascade, where it ran on one frame.
+        fit_px: match error that the last stage expects, in pixels of its image; None for a drive.
     """
 
     number: int
@@ -46,12 +46,12 @@ class Try:
 
     @property
     def found(self) -> Extrinsic:
-        """``camera_from_lidar`` that was arrived at, whether or not it is believed."""
+        """The resulting ``camera_from_lidar``, accepted or not."""
         return self.steps[-1].camera_from_lidar
 
     @classmethod
     def of_trace(cls, number: int, frame: int, trace: CascadeTrace, milliseconds: float) -> Try:
-        """A run of stages on one frame."""
+        """The try of a run of stages on one frame."""
         steps = [Step("mine", trace.initial)]
         steps += [Step(f"stage {stage.number}", stage.after) for stage in trace.stages]
         ran = [stage.number for stage in trace.stages]
@@ -61,12 +61,12 @@ class Try:
 
     @classmethod
     def of_drive(cls, number: int, frame: int, mine: Extrinsic, estimate: DriveEstimate, milliseconds: float) -> Try:
-        """All frames solved as one."""
+        """The try of a drive, with all frames solved as one."""
         steps = (Step("mine", mine), Step("drive", estimate.camera_from_lidar))
         return cls(number, frame, f"drive of {estimate.frames} frames", steps, estimate.verdict, milliseconds)
 
     def as_dict(self, reference: Extrinsic | None) -> dict[str, Any]:
-        """For the page; errors in degrees and centimetres where the reference is known."""
+        """The message for the page, with errors in degrees and centimetres if the reference is known."""
         verdict = self.verdict
         return {
             "number": self.number,
@@ -90,7 +90,7 @@ class Try:
 
 
 def figures(extrinsic: Extrinsic, other: Extrinsic | None) -> list[float] | None:
-    """Degrees and centimetres between two extrinsics; None where one is not known."""
+    """Degrees and centimetres between two extrinsics; None if one is unknown."""
     if other is None:
         return None
     error = pose_error(extrinsic, other)

@@ -1,4 +1,4 @@
-"""The recording of a session with Rerun's own window: the large picture follows the pose, and every try its details."""
+"""Records a session for Rerun's own window: a large image that follows the pose, and the details of every try."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.views import View, overlay_view, point_legend, with_legend
 
 AT_ONCE = Contents(frozenset({Part.OVERLAYS}), dense=True)
-"""What is shown of an answer before its details."""
+"""Parts of an answer that are shown before its details."""
 NO_ANSWER = (
-    "# No answer yet\n\nFrame {}. Turn it with the keys and let go, or press Enter: the answer comes from there."
+    "# No answer yet\n\nFrame {}. Move the pose with the keys; release them, or press Enter, to run the cascade."
 )
 KEYS = "keys"
-"""What the keys of the terminal do, as text."""
+"""Entity of the list of keys."""
 
 
 class Picture:
-    """The tab in front: the points under the pose, on the last step of a try its result, and in words what came of it.
+    """The first tab: points under the pose or, on the last step of a try, under its result, and the result in words.
 
     Attributes:
-        NAME: its title.
+        NAME: title of the tab.
     """
 
     NAME = "Try"
 
     def __init__(self, keys: str) -> None:
-        """Say in Markdown what the keys do."""
+        """Set the list of keys, as Markdown."""
         self._keys = keys
 
     def wanted(self, layout: Layout) -> bool:
@@ -50,20 +50,18 @@ class Picture:
         return True
 
     def log_once(self, rec: Subtree, layout: Layout) -> None:
-        """Log what the points' colours stand for, and the keys."""
+        """Log the legend of the points' colours, and the keys."""
         log_point_legend(rec, layout.contents.color)
         rec.log_once(KEYS, rr.TextDocument(self._keys, media_type=rr.MediaType.MARKDOWN))
 
     def log(self, rec: Subtree, observation: Observation, contents: Contents) -> None:
-        """Log nothing: what it shows is there before the details."""
+        """Log nothing, since what it shows is logged before the details."""
 
     def view(self, layout: Layout) -> View:
-        """The large picture, and beside it the words."""
-        picture = overlay_view(
-            "The pose, then each stage, the truth and the result", entities.OVERLAY_CURRENT, layout.image
-        )
+        """The large image, and the text beside it."""
+        picture = overlay_view("Pose, each stage, reference and result", entities.OVERLAY_CURRENT, layout.image)
         words = rrb.Vertical(
-            rrb.TextDocumentView(origin=entities.TABLE, name="The newest answer"),
+            rrb.TextDocumentView(origin=entities.TABLE, name="Newest answer"),
             rrb.TextDocumentView(origin=KEYS, name="Keys of the terminal"),
         )
         return rrb.Horizontal(
@@ -72,30 +70,30 @@ class Picture:
 
 
 class WindowRecording(TryRecording):
-    """Sends everything to a viewer that runs."""
+    """Sends everything to a running viewer."""
 
     def __init__(self, sink: Any, keys: str) -> None:
-        """Connect; the window shows something with the first `hold`.
+        """Connect; the window is empty until the first `hold`.
 
         Args:
-            sink: of Rerun, the viewer's address or a file.
-            keys: what they do, as Markdown.
+            sink: Rerun's sink for the viewer's address or a file.
+            keys: list of keys, as Markdown.
         """
         picture = Picture(keys)
         super().__init__((picture, *TABS))
         self._stream.set_sinks(sink)
         self._picture = picture
-        self._hand = TrySubtree(self._stream)  # its own, as the hand moves on while a try is recorded beside it
+        self._hand = TrySubtree(self._stream)  # a separate one, since the pose changes while a try is recorded
         self._shown: Frame | None = None
 
     def hold(self, number: int, frame: Frame, extrinsic: Extrinsic, reference: Extrinsic | None) -> None:
-        """Show the points of a frame under the pose under the hand.
+        """Show the points of a frame under the current pose.
 
         Args:
-            number: that the next try will have.
-            frame: at hand.
+            number: number of the next try.
+            frame: the current frame.
             extrinsic: ``camera_from_lidar`` of the pose.
-            reference: the true one, where it is known.
+            reference: the true ``camera_from_lidar``; None if unknown.
         """
         observation = Observation(frame, CascadeTrace(extrinsic, ()), reference)
         self._hand.number = number
@@ -114,7 +112,7 @@ class WindowRecording(TryRecording):
         self._keep()
 
     def answer(self, made: Try, observation: Observation) -> None:
-        """Show the overlays of a try and its table; they take a tenth of what the details take."""
+        """Show the overlays and the table of a try, which take a tenth of the time of the details."""
         self._rec.number = made.number
         log_frame(self._rec, observation, AT_ONCE)
         cascade.log(self._rec, observation, AT_ONCE)

@@ -1,4 +1,4 @@
-"""Work beside the page: one job at a time, of those that somebody waits for only the newest, and the rest when idle."""
+"""Runs jobs beside the page, one at a time: the newest that somebody waits for, and the others when idle."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from typing import Any
 from calibnet.errors import CalibnetError
 
 GRACE_S, GRACE_STEPS = 0.6, 12
-"""Seconds that what may wait is put off after every answer: somebody who moves a slider on is answered first."""
+"""Seconds by which jobs that can wait are put off after every answer, so that a slider that moves on is served
+first."""
 
 
 class StoppedError(Exception):
-    """The job was to end."""
+    """The job was told to stop."""
 
 
 class YieldedError(Exception):
-    """The job made room for one that somebody waits for."""
+    """The job makes room for one that somebody waits for."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """Something to compute.
+    """A job to compute.
 
     Attributes:
-        name: for people.
-        compute: runs beside the server; it may call its argument with (done, in all), which raises
-            `StoppedError` when the job is to end, and `YieldedError` when it can wait and somebody waits for another.
-        finish: runs in the server's thread with the result.
+        name: name to show.
+        compute: runs in the worker's thread; it may call its argument with (done, total), which raises `StoppedError`
+            when the job is to stop, and `YieldedError` when it can wait and somebody waits for another.
+        finish: runs in the server's thread, with the result.
     """
 
     name: str
@@ -44,17 +45,17 @@ class Worker:
 
     Attributes:
         busy: name of the running job; empty when idle.
-        progress: how much of it is done, of how much; None where it does not say.
+        progress: done and total of the running job; None if unknown.
     """
 
     def __init__(
         self, changed: Callable[[], Coroutine[Any, Any, None]], failed: Callable[[str], Awaitable[None]]
     ) -> None:
-        """Say who is told.
+        """Start idle.
 
         Args:
             changed: called when `busy` or `progress` has changed.
-            failed: called with one sentence when a job cannot be done.
+            failed: called with one sentence when a job fails.
         """
         self._changed, self._failed = changed, failed
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="live")
@@ -66,17 +67,17 @@ class Worker:
         self.progress: tuple[int, int] | None = None
 
     def ask(self, job: Job) -> None:
-        """Run a job as soon as the running one ends; what waited before is forgotten."""
+        """Run a job as soon as the running one ends; jobs that waited before are dropped."""
         self._next = job
         self._wake()
 
     def ask_later(self, job: Job) -> None:
-        """Run a job when nothing else waits, the newest first; it runs again after it made room for another."""
+        """Run a job when nothing else waits, the newest first; it restarts after making room for another."""
         self._later.append(job)
         self._wake()
 
     def stop(self) -> None:
-        """End the running job where it says how far it is, and forget what waits."""
+        """Stop the running job at its next report of progress, and drop those that wait."""
         self._next = None
         self._stop.set()
 
@@ -90,7 +91,7 @@ class Worker:
             await self._task
 
     def close(self) -> None:
-        """End for good."""
+        """Stop the worker."""
         self._next, self._later = None, []
         self._stop.set()
         self._thread.shutdown(wait=True, cancel_futures=True)
@@ -125,7 +126,7 @@ class Worker:
                 await self._failed(f"Stopped: {job.name}.")
             except CalibnetError as error:
                 await self._failed(str(error))
-            except Exception as error:  # a fault of ours: the page goes on, and says it
+            except Exception as error:  # an internal error, which the page reports and survives
                 await self._failed(
                     f"Internal error in calib-inspect ({type(error).__name__}: {error}). Please report it."
                 )

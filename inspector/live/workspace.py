@@ -1,6 +1,6 @@
-"""The state of a live session: the frame, the guess it began with, the pose that is tried, and earlier tries.
+"""The state of a live session: the frame, the initial guess, the pose, and earlier tries.
 
-Only the server's own thread touches it; what takes long gets its input from here and brings its result back.
+Only the server's own thread changes it; long computations take their input from here and return their result to it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from inspector.live.tries import Try
 from inspector.run.start import Start
 
 MOST_UNDONE = 1000
-"""Poses that can be gone back through."""
+"""Largest number of poses that can be undone."""
 
 
 @runtime_checkable
@@ -35,19 +35,19 @@ class StagedCalibrator(DriveCalibrator, Protocol):
         ...
 
     def only(self, number: int) -> DriveCalibrator:
-        """The same with this stage alone."""
+        """The same method with only this stage."""
         ...
 
 
 class ReadByOne(PickedFrames):
-    """Frames that one thread reads at a time: the server and the worker share the file of a bag."""
+    """Frames that only one thread reads at a time, since the server and the worker share the file of a bag."""
 
     def __init__(self, sequence: Sequence, positions: Positions[int]) -> None:
         super().__init__(sequence, positions)
         self._reading = threading.Lock()
 
     def __getitem__(self, position: int) -> Frame:
-        """Read a frame when no other is being read."""
+        """Read a frame once no other is being read."""
         with self._reading:
             return super().__getitem__(position)
 
@@ -56,22 +56,22 @@ class Workspace:
     """The state of a live session.
 
     Attributes:
-        name: of the sequence.
-        frames: the chosen frames.
-        frame: at hand.
-        position: of it among the chosen frames.
-        pose: that is tried, relative to `guess`.
-        tries: what came of every try, in their order.
+        name: name of the sequence.
+        frames: the selected frames.
+        frame: the current frame.
+        position: position of the current frame among the selected ones.
+        pose: the pose to try, relative to `guess`.
+        tries: all tries, in order.
     """
 
     def __init__(self, sequence: Sequence, positions: Positions[int], start: Start, seed: int = 0) -> None:
-        """Begin with the first frame.
+        """Start with the first frame.
 
         Args:
-            sequence: where frames come from.
-            positions: which of them, in order.
-            start: gives the guess of each frame and, where it is known, the reference.
-            seed: of random poses.
+            sequence: the sequence of frames.
+            positions: positions of the selected frames, in order.
+            start: gives the guess of each frame and, if known, the reference.
+            seed: seed of random poses.
         """
         self._start = start
         self.name, self.frames = sequence.name, ReadByOne(sequence, list(positions))
@@ -83,72 +83,72 @@ class Workspace:
         self.show(0, self.frames[0])
 
     def show(self, position: int, frame: Frame) -> None:
-        """Put another frame on the workspace; the pose stays, for the mount is the same."""
+        """Change the current frame; the pose stays, since the mount is the same."""
         self.position, self.frame = position, frame
 
     def guess_of(self, frame: Frame) -> Extrinsic:
-        """``camera_from_lidar`` that a run would start from on a frame."""
+        """Initial ``camera_from_lidar`` of a run on a frame."""
         return self._start.initial(frame)
 
     def reference_of(self, frame: Frame) -> Extrinsic | None:
-        """The true one of a frame, where it is known."""
+        """The true ``camera_from_lidar`` of a frame; None if unknown."""
         return self._start.reference(frame)
 
     @property
     def guess(self) -> Extrinsic:
-        """That of the frame at hand."""
+        """The guess of the current frame."""
         return self.guess_of(self.frame)
 
     @property
     def reference(self) -> Extrinsic | None:
-        """That of the frame at hand."""
+        """The reference of the current frame; None if unknown."""
         return self.reference_of(self.frame)
 
     @property
     def extrinsic(self) -> Extrinsic:
-        """``camera_from_lidar`` of the pose that is tried."""
+        """``camera_from_lidar`` of the pose."""
         return self.pose.applied_to(self.guess)
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a pose to go back to."""
+        """Whether a move can be undone."""
         return bool(self._done)
 
     @property
     def can_redo(self) -> bool:
-        """Whether going back can be taken back."""
+        """Whether an undone move can be redone."""
         return bool(self._undone)
 
     def move(self, pose: Pose) -> None:
-        """Try another pose; that of before can be gone back to."""
+        """Set the pose; the previous one can be restored by `undo`."""
         if pose != self.pose:
             self._done = [*self._done, self.pose][-MOST_UNDONE:]
             self._undone.clear()
             self.pose = pose
 
     def undo(self) -> None:
-        """Go back to the pose of before, if there is one."""
+        """Go back to the previous pose, if any."""
         if self._done:
             self._undone.append(self.pose)
             self.pose = self._done.pop()
 
     def redo(self) -> None:
-        """Take back the last `undo`."""
+        """Revert the last `undo`."""
         if self._undone:
             self._done.append(self.pose)
             self.pose = self._undone.pop()
 
     def move_to(self, extrinsic: Extrinsic) -> None:
-        """Try an extrinsic."""
+        """Set the pose to an extrinsic."""
         self.move(Pose.between(extrinsic, self.guess))
 
     def move_randomly(self, range_: MiscalibrationRange) -> None:
-        """Try a miscalibration of the reference or, where there is none, of the guess."""
+        """Set the pose to a random miscalibration of the reference or, without one, of the guess."""
         around = self.guess if self.reference is None else self.reference
         self.move_to(sample_miscalibration(range_, self._random) @ around)
 
     def keep(self, make: Callable[[int], Try]) -> Try:
-        """Take in what a try came to, under the next number."""
+        """Keep a try under the next number."""
         made = make(len(self.tries))
         self.tries.append(made)
         return made

@@ -1,4 +1,4 @@
-// What the cascade answered: the verdict, the stages of the shown try, and every try so far.
+// The answers of the cascade: the verdict, the stages of the shown try, and all tries so far.
 import { at, live, shownTry } from "./workspace.js";
 import { redraw } from "./picture.js";
 import { figures } from "./poses.js";
@@ -62,16 +62,16 @@ export function showSteps() {
     if (one.error) row.insertCell().textContent = figures(one.error);
     row.insertCell().textContent = i ? figures(one.moved) : "–";
   }
-  // a verdict is on what a try found: beside a pose that nothing has judged it must not look like one on that
+  // the verdict belongs to the try's result: beside another pose it must not look like a verdict on that
   at("answer").classList.toggle("past", Boolean(answer) && !judged);
   at("take").disabled = !(answer && judged);
 }
 
-// The buttons above the picture: which extrinsic it is drawn under.
+// The buttons above the image that choose the extrinsic to draw.
 function showChoices(answer) {
   const choices = [[0, "Mine"], ...(answer ? answer.steps.slice(1).map((one, i) => [i + 1, `After ${one.name}`]) : [])];
   if (live.state.frame.reference) choices.push(["reference", "Reference"]);
-  // buttons stay while their names do: one that is replaced between press and release never hears the click
+  // buttons with unchanged names are kept: one that is replaced between press and release would miss the click
   const names = choices.map(([, name]) => name), buttons = at("shown").children;
   if (names.join() !== Array.from(buttons, (button) => button.textContent).join())
     at("shown").replaceChildren(...names.map((name) => {

@@ -1,4 +1,4 @@
-// What colours points have, and the legend that says so.
+// The colours of points, and their legend.
 const rgba = (r, g, b) => (255 << 24) | (b << 16) | (g << 8) | r;
 
 // A function from a point (its row, depth and pixel) to its colour.
@@ -23,7 +23,7 @@ export function legend({ turbo, viridis, near, far, edge, rest, worst }, kind) {
   return {
     depth: bar(ramp(turbo, 245, 10), `${near} m`, `${far} m`),
     intensity: bar(ramp(viridis, 0, 255), "weak return", "strong"),
-    edge: `<i style="background:rgb(${edge.join()})"></i>depth edges: they must lie on outlines <i style="background:rgb(${rest.join()})"></i>others`,
+    edge: `<i style="background:rgb(${edge.join()})"></i>depth edges, which should lie on outlines <i style="background:rgb(${rest.join()})"></i>others`,
     error: bar(ramp(turbo, 25, 240), "in place", `${worst} px off or more`),
   }[kind];
 }

@@ -1,4 +1,4 @@
-// The page of `calib-inspect live`: what its buttons and keys ask for, and what is done with the answers, which come
+// The page of `calib-inspect live`: requests of its buttons and keys, and what is done with the answers, which come
 // over a websocket.
 import { show, showSteps, walk } from "./answer.js";
 import { at, live, shownTry } from "./workspace.js";
@@ -8,7 +8,7 @@ import { extrinsicOf } from "./poses.js";
 import { answered, makeSliders, release, showPose, turned } from "./sliders.js";
 import { connect, say, send } from "./wire.js";
 
-// ---- what is heard ------------------------------------------------------------------------------------------------
+// ---- answers ------------------------------------------------------------------------------------------------------
 
 const heard = {
   hello(message) {
@@ -78,7 +78,7 @@ function stageButton(number) {
 
 const showLegend = () => (at("legend").innerHTML = legend(live.hello.palettes, at("color").value));
 
-// ---- what is asked for --------------------------------------------------------------------------------------------
+// ---- requests -----------------------------------------------------------------------------------------------------
 
 const run = () => at("auto").checked;
 const to = (by) => send({ do: "frame", position: live.state.frame.position + by, run: run() });
@@ -117,7 +117,7 @@ document.addEventListener("keydown", (event) => {
 
 at("canvas").addEventListener("click", (event) => {
   const { current, state, step, pose } = live;
-  if (current < 0) return say("Run the cascade first: then a click shows why a point was matched where it was.");
+  if (current < 0) return say("Run the cascade first; then a click on a point shows why it was matched where it was.");
   const under = step === "reference" ? { under: state.frame.reference } : step === 0 ? { under: extrinsicOf(pose, state.frame.guess) } : { step };
   send({ do: "look", try: current, pixel: pixelUnder(event), ...under });
 });
@@ -139,8 +139,8 @@ function clickInViewer(event) {
   }
 }
 
-// Under this machine's other name the viewer is another site, so that the browser gives it a process of its own: without
-// a graphics card it takes seconds a picture, and the points would wait for it.
+// Under another name of this machine, the viewer is another site, so the browser gives it a process of its own: without
+// a graphics card it takes seconds per picture, and the points would wait for it.
 const viewer = new URL("viewer/", location.href);
 viewer.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
 viewer.searchParams.set("page", location.origin);

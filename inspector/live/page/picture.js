@@ -1,15 +1,15 @@
-// The picture with the points of the scan over it, drawn here so that they follow the hand at once.
+// The image with the points of the scan over it, drawn here so that they follow the sliders at once.
 import { at, live, shownTry } from "./workspace.js";
 import { colours } from "./colours.js";
 import { extrinsicOf, figures, off } from "./poses.js";
 
 const NEAREST = 0.1; // metres before the camera
-const RETRY_MILLISECONDS = 2000; // until a picture that did not come is asked for again
+const RETRY_MILLISECONDS = 2000; // milliseconds until an image that did not arrive is requested again
 const canvas = at("canvas"), context = canvas.getContext("2d");
 let scan = null, image = null, loaded = -1;
 let buffer = null, pixels = null, depths = null, layer = null, due = false;
 
-// Fetch the frame at hand, unless it is there.
+// Fetch the current frame, unless it is loaded.
 export async function showFrame() {
   const { position, reference, camera } = live.state.frame;
   if (loaded === position) return redraw();
@@ -62,7 +62,7 @@ function unpack(bytes) {
   };
 }
 
-// Make the canvas as large as there is room for.
+// Make the canvas as large as possible.
 export function fit() {
   const [width, height] = live.state.frame.size;
   const room = at("picture").clientWidth, high = Math.max(160, innerHeight * 0.5);

@@ -5,7 +5,7 @@ function multiply(a, b) {
   return c;
 }
 
-// Of a pose of the sliders, turned and moved from a guess.
+// The extrinsic of a pose of the sliders, relative to a guess.
 export function extrinsicOf([roll, pitch, yaw, x, y, z], guess) {
   const [a, b, c] = [pitch, yaw, roll].map((angle) => (angle * Math.PI) / 180);
   const [ca, sa, cb, sb, cc, sc] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b), Math.cos(c), Math.sin(c)];
@@ -18,7 +18,7 @@ export function extrinsicOf([roll, pitch, yaw, x, y, z], guess) {
   return multiply(change, guess);
 }
 
-// Degrees and centimetres from one to the other; null where the other is not known.
+// Degrees and centimetres between two extrinsics; null if one is unknown.
 export function off(one, other) {
   if (!other) return null;
   let trace = 0;

@@ -13,7 +13,7 @@ const AXES = [
   { name: "z", unit: "m", keys: "yh", digits: 4, hint: "ahead" },
 ];
 const STEPS = { coarse: [0.25, 0.02], fine: [0.02, 0.002] }; // degrees, metres; with Shift a tenth
-const RELEASE_MILLISECONDS = 300; // as long as keys come faster, nobody has let go
+const RELEASE_MILLISECONDS = 300; // milliseconds without a key press after which keys count as released
 let asked = null;
 
 export function makeSliders([degrees, metres]) {
@@ -58,17 +58,17 @@ function poseMessage() {
 }
 
 export function release() {
-  forgetLater(); // the pose of keys is the pose as well
+  forgetLater(); // a pose set by keys counts as well
   send(poseMessage());
 }
 
-// An answer is here: note how long it took, if it was to letting go.
+// On an answer: note how long it took since the release of a slider, if that caused it.
 export function answered() {
   if (asked !== null) live.timing.answer = performance.now() - asked;
   asked = null;
 }
 
-// Whether a key was one of the sliders', which have moved then.
+// Act on a key of the sliders; returns whether it was one.
 export function turned(key, fine) {
   const axis = AXES.findIndex(({ keys }) => keys.includes(key));
   if (axis < 0) return false;

@@ -19,7 +19,7 @@ async function start() {
   });
   await viewer.start(canvas);
   viewer.open_channel(CHANNEL, "live");
-  hint.textContent = "Your first try is shown here: every stage's cost volumes, the scene in 3D, and more.";
+  hint.textContent = "Your first try will appear here, with every stage's cost volumes, the scene in 3D, and more.";
 }
 
 function heard(event) {
@@ -27,9 +27,9 @@ function heard(event) {
   parent.postMessage({ viewer: event }, page);
 }
 
-// The viewer takes in a little with every picture that it draws, of the first try for a hundred pictures long. Without a
-// graphics card a large one costs a second, so its canvas is small and unseen until it has said a time, which it does
-// when it knows what to show, and has had nothing to do for some pictures.
+// The viewer loads a little with every picture that it draws, and needs a hundred pictures for the first try. Without a
+// graphics card a large one costs a second, so its canvas is small and hidden until it has reported a time, which it does
+// when it knows what to show, and until it has been idle for some pictures.
 const IDLE_MILLISECONDS = 4, IDLE_PICTURES = 4;
 const soon = requestAnimationFrame;
 let timed = false, idle = 0;
@@ -46,14 +46,14 @@ window.requestAnimationFrame = (draw) => soon((time) => {
 
 const waiting = [];
 const started = start().then(() => true, (error) => {
-  hint.textContent = `The viewer does not start here (${error}). The picture and the answer above work without it.`;
+  hint.textContent = `The viewer cannot start in this browser (${error}). The image and the answers work without it.`;
   return false;
 });
 
 async function take(piece) {
   waiting.push(new Uint8Array(piece));
   if (!(await started)) return;
-  if (!window.pieces) hint.textContent = "Taking in your first try.";
+  if (!window.pieces) hint.textContent = "Loading your first try …";
   while (waiting.length) viewer.send_rrd_to_channel(CHANNEL, waiting.shift());
   window.pieces += 1;
 }

@@ -1,12 +1,12 @@
-// Talking with calib-inspect, and telling people.
+// Messages to and from calib-inspect, and messages to the user.
 import { at } from "./workspace.js";
 
-const SOON = 2000; // milliseconds until a lost connection is tried again
+const SOON = 2000; // milliseconds until a lost connection is retried
 let socket = null;
 
 let later = null, timer = 0;
 
-// Send a message, after the one that was left for later: what is asked for now is asked of the pose that is seen.
+// Send a message, after any delayed one, so that the request applies to the pose that is shown.
 export function send(message) {
   const waiting = later;
   forgetLater();
@@ -14,7 +14,7 @@ export function send(message) {
   transmit(message);
 }
 
-// Send what `make` gives once nothing else was asked for in so many milliseconds.
+// Send the message that `make` returns after the given milliseconds, unless another one is sent first.
 export function sendLater(make, milliseconds) {
   forgetLater();
   later = make;
@@ -28,7 +28,7 @@ export function forgetLater() {
 
 function transmit(message) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-  else say("Not connected to calib-inspect, so nothing was done; trying to connect again.", true);
+  else say("Not connected to calib-inspect: nothing was done. Reconnecting …", true);
 }
 
 // Messages go to the function of their name in `heard`.
@@ -39,7 +39,7 @@ export function connect(heard) {
     heard[message.is](message);
   };
   socket.onclose = () => {
-    say("The connection to calib-inspect is gone; trying again. Does it still run?", true);
+    say("The connection to calib-inspect was lost. Reconnecting … Check that it is still running.", true);
     setTimeout(() => connect(heard), SOON);
   };
 }

@@ -1,11 +1,11 @@
-// What the page knows, in one place for all its parts.
+// The state of the page, shared by all its parts.
 export const at = (id) => document.getElementById(id);
 
 export const live = {
-  hello: null, state: null, // as the server told them
+  hello: null, state: null, // as sent by the server
   pose: [0, 0, 0, 0, 0, 0], // of the sliders, from the guess: degrees, metres
-  held: null, // the pose under the hand, until the server has it: its other messages must not move the sliders
-  tries: [], current: -1, // what the cascade answered, and which of it is shown
+  held: null, // the pose being set, until the server has it: other messages must not move the sliders
+  tries: [], current: -1, // the tries, and the one that is shown
   step: 0, // of the shown try: 0 the pose of the sliders, then after each stage; or "reference"
   timing: { draws: 0, draw: 0, answer: 0 }, // milliseconds of the last draw and the last answer
   get shown() { return [this.current, this.step]; },

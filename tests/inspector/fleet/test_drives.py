@@ -91,12 +91,12 @@ def test_a_camera_of_nuscenes_may_stand_in_the_name_of_the_sequence(tmp_path: Pa
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "names no drive"),
-        ("path\n", "names no drive"),
+        ("", "lists no drives"),
+        ("path\n", "lists no drives"),
         ("car\nblue\n", r"row 1 \(line 2\): path is missing"),
-        ("path,colour\nx,blue\n", "row 1 .*colour is unknown"),
-        ("path,car\nx\ny,b,c\n", "row 2 .*more fields than the first line names"),
-        ("path,dataset\nx,waymo\n", "row 1 .*dataset 'waymo' is unknown"),
+        ("path,colour\nx,blue\n", "row 1 .*colour is not known"),
+        ("path,car\nx\ny,b,c\n", "row 2 .*more fields than the first line"),
+        ("path,dataset\nx,waymo\n", "row 1 .*dataset 'waymo' is not known"),
         ("path,dataset\nx,kitti-raw\n", "row 1 .*sequence is missing"),
         ("path,dataset,sequence\nx,kitti-odometry,04 --save=/etc/x\n", "row 1 .*is not SEQUENCE, for instance 04"),
         ("path,dataset,sequence\nx,kitti-odometry,--save=x\n", "row 1 .*must not begin with a dash"),

@@ -111,7 +111,7 @@ def test_the_command_ends_with_what_moved() -> None:
     moved = [unsure(f"d{at}", REFERENCE if at < 4 else MOVED, car=f"c{car}") for car in range(12) for at in range(1, 7)]
     still = [row(f"d{at}", car="still") for at in range(1, 4)]
     together, first, *others, rest = news(judged_by_cars([*moved, *still]))
-    assert together == "72 of them by what all drives of the car say together."
+    assert together == "72 of these verdicts come from all drives of the car together."
     assert first.startswith("c0: The mount moved between d3 and d4, by 2.00°")
     assert len(others) == 9
     assert rest == "2 more mounts moved."
@@ -123,7 +123,7 @@ def test_the_last_drive_alone_only_seems_to_have_moved() -> None:
     (move,) = history.moves
     assert (move.before.drive, move.after.drive, move.certain) == ("d5", "d6", False)
     assert "seems to have moved between d5 and d6, by 2.00°" in history.sentence
-    assert "too few drives yet" in history.sentence
+    assert "more drives are needed" in history.sentence
     assert [one.by_car for one in history.judged] == ["accepted"] * 5 + ["apart"]
 
 
@@ -131,11 +131,11 @@ def test_one_drive_in_the_middle_stands_apart() -> None:
     rows = [unsure(f"d{at}", MOVED if at == 3 else REFERENCE) for at in range(1, 7)]
     (history,) = histories(rows)
     assert history.moves == ()
-    assert "d3 stands apart from the others." in history.sentence
+    assert "d3 is an outlier." in history.sentence
     judged = list(history.judged)
     assert [one.word for one in judged].count("accepted") == 5
     assert judged[2].word == "apart"
-    assert judged[2].by_car_reason == "It stands apart: 5 other drives find the mount 2.00° / 1 cm elsewhere."
+    assert judged[2].by_car_reason == "It is an outlier: 5 other drives find the mount 2.00° / 1 cm away."
 
 
 def test_a_drive_whose_frames_do_not_agree_stands_apart() -> None:
@@ -144,7 +144,7 @@ def test_a_drive_whose_frames_do_not_agree_stands_apart() -> None:
     judged = judged_by_cars(rows)
     assert [one.by_car for one in judged] == ["accepted", "accepted", "apart", "accepted", "accepted"]
     assert judged[2].by_car_reason.startswith(
-        "Its frames agree 4 times less than those of the other drives: the mount may have moved"
+        "Its frames scatter 4 times as much as those of the other drives: the mount may have moved"
     )
     few = judged_by_cars([*rows[:2], replace(torn, frames=1), *(replace(one, frames=4) for one in rows[3:])])
     assert few[2].by_car != "apart", "fewer frames leave more open by themselves"

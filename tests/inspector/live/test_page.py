@@ -164,7 +164,7 @@ def test_the_page_and_its_viewer_keep_to_the_policy(
     page.keyboard.press("Enter")
     says(page, "#word", "Accepted")
     hint = page.frame_locator("#viewer").locator("#hint")
-    expect(hint).to_have_text("Taking in your first try.", timeout=PATIENCE)
+    expect(hint).to_have_text("Loading your first try …", timeout=PATIENCE)
     assert not [text for text in complaints if "Content Security Policy" in text]
     page.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'slipped = 1'}))")
     assert page.evaluate("typeof slipped") == "undefined"
@@ -246,7 +246,7 @@ def test_a_pose_that_was_set_without_a_connection_is_sent_when_there_is_one(
     page.wait_for_function("document.getElementById('caption').textContent !== ''")
     page.locator("#auto").uncheck()
     sockets[0].close()
-    says(page, "#said", re.compile("connection to calib-inspect is gone"))
+    says(page, "#said", re.compile("connection to calib-inspect was lost"))
     page.locator("#number-z").fill("0.123")
     page.keyboard.press("Tab")
     says(page, "#said", re.compile("Not connected"))
@@ -354,7 +354,7 @@ def test_what_is_rejected_is_asked_about_before_it_is_written(
     answered(page)
     says(page, "#word", "Rejected")
     file = tmp_path / "out" / "calibration.corrected.yaml"
-    for choice in ("Leave it", "Write it all the same"):
+    for choice in ("Cancel", "Write it anyway"):
         page.get_by_role("button", name="Accept as calibration").click()
         says(page, "#sure-text", re.compile("^Rejected"))
         assert not file.exists()

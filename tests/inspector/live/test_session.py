@@ -120,7 +120,7 @@ def test_a_click_moves_the_windows_to_that_point(make: Make, heard_after: HeardA
     assert told(heard, "said")[0]["text"] == f"Search windows moved to a point {distance:.1f} m away."
     assert len(session.stream) == 2
     heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": [-500, -500]})
-    assert "No point of the scan lies there" in told(heard, "problem")[0]["text"]
+    assert "There is no point of the scan here" in told(heard, "problem")[0]["text"]
     heard = heard_after(session, {"do": "frame", "position": 1}, {"do": "look", "try": 0, "step": 3, "pixel": pixel})
     assert "Only the newest try on this frame" in told(heard, "problem")[0]["text"]
 
@@ -171,8 +171,8 @@ def test_a_click_on_a_try_that_is_not_recorded_yet_says_so(make: Make) -> None:
     [
         (FakeCascade(doubted=(4,)), {"try": 0, "step": 3}, "Rejected: "),
         (FakeCascade(unsure=(4,)), {"try": 0, "step": 3}, "Cannot tell: "),
-        (FakeCascade(), {"try": 0, "step": 2}, "Set by hand: nothing has judged it"),
-        (FakeCascade(), {}, "Set by hand: nothing has judged it"),
+        (FakeCascade(), {"try": 0, "step": 2}, "Set by hand, without a verdict"),
+        (FakeCascade(), {}, "Set by hand, without a verdict"),
     ],
 )
 def test_what_is_not_accepted_is_asked_about_first(
@@ -201,11 +201,11 @@ def test_another_file_is_not_replaced(make: Make, heard_after: HeardAfter, tmp_p
     [
         ({"do": "fly"}, "Unknown request 'fly'; reload the page"),
         ({}, "Unknown request None"),
-        ({"do": "pose", "pose": [0, 0, 0]}, "cannot be read"),
-        ({"do": "pose", "pose": "abcdef"}, "cannot be read"),
+        ({"do": "pose", "pose": [0, 0, 0]}, "is not valid"),
+        ({"do": "pose", "pose": "abcdef"}, "is not valid"),
         ({"do": "pose", "pose": [float("nan")] * 6}, "within ±180°"),
-        ({"do": "take", "try": 7, "step": 0}, "cannot be read"),
-        ({"do": "look", "try": 0, "pixel": None}, "cannot be read"),
+        ({"do": "take", "try": 7, "step": 0}, "is not valid"),
+        ({"do": "look", "try": 0, "pixel": None}, "is not valid"),
         ({"do": "random", "range": "much"}, "not of the form"),
         ({"do": "run", "stage": 9}, "stage"),
     ],
@@ -244,7 +244,7 @@ def test_without_reference_there_are_no_errors(make: Make, heard_after: HeardAft
     session = make(as_is=True)
     heard = heard_after(session, MOVE, {"do": "reference"})
     assert all(step["error"] is None for step in told(heard, "try")[0]["steps"])
-    assert told(heard, "problem")[0]["text"] == "No reference is known for these frames."
+    assert told(heard, "problem")[0]["text"] == "These frames have no reference."
     np.testing.assert_allclose(session.workspace.guess, REFERENCE)
 
 

@@ -81,7 +81,7 @@ def test_keys_turn_and_move_and_letting_go_asks(window: Callable[..., Window]) -
     assert any(f"{error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off" in line for line in said)
     said = one.press("v", "e", "z", "Z", "o", "d")
     assert one.workspace.pose.yaw == pytest.approx(0.0)
-    assert "Steps of 0.02° and 0.2 cm." in said and "Runs with Enter only." in said
+    assert "Step size: 0.02° and 0.2 cm." in said and "Runs on Enter only." in said
 
 
 def test_single_stages_frames_and_the_drive(window: Callable[..., Window]) -> None:
@@ -98,7 +98,7 @@ def test_what_is_kept_is_asked_about_where_it_is_rejected(window: Callable[..., 
     one, file = window(cascade=FakeCascade(doubted=(4,))), tmp_path / "out" / "calibration.corrected.yaml"
     said = one.press("\n", "k", "n")
     assert any(line.startswith("Rejected: ") and line.endswith("y / n") for line in said)
-    assert said[-1] == "Left as it is." and not file.exists()
+    assert said[-1] == "Nothing was written." and not file.exists()
     assert one.press("k", "y")[-1] == f"Wrote {file}."
     assert "rejected" in file.read_text()
 
