@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,6 @@ Word = Literal["accepted", "rejected", "cannot tell"]
 ACCEPTED: Word = "accepted"
 REJECTED: Word = "rejected"
 CANNOT_TELL: Word = "cannot tell"
-FRAME_LIMITS, DRIVE_LIMITS = (1.0, 25.0), (0.3, 8.0)
-"""Degrees and centimetres beyond which the extrinsic of a frame, and of a drive, is wrong."""
 WORDS: tuple[Word, ...] = (ACCEPTED, REJECTED, CANNOT_TELL)
 
 CAUSES = (
@@ -36,6 +34,24 @@ CAUSES = (
     "picture-size",
 )
 """Names of what can be wrong with input, as JSON has them."""
+
+
+class Tolerance(NamedTuple):
+    """The largest error of a good extrinsic."""
+
+    rotation_deg: float
+    translation_cm: float
+
+    def __str__(self) -> str:
+        return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"
+
+
+FRAME_TOLERANCES = (Tolerance(1.0, 25.0), Tolerance(1.5, 40.0))
+DRIVE_TOLERANCES = (Tolerance(0.3, 8.0), Tolerance(0.5, 15.0))
+"""What the extrinsic of a frame, and of a drive, must be within to be accepted; and a coarser tolerance, of which a
+result can often be certain where it cannot be of the first."""
+FRAME_LIMITS, DRIVE_LIMITS = FRAME_TOLERANCES[0], DRIVE_TOLERANCES[0]
+"""Beyond these the extrinsic of a frame, and of a drive, is wrong."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +99,8 @@ class Verdict:
         covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, None where there is nothing to state it from.
         used: number of frames judged.
         skipped: frames that were left out.
+        within: the finest tolerance that the extrinsic is certain enough to be within; None if there is none. That of
+            an accepted one is the first of `FRAME_TOLERANCES` or `DRIVE_TOLERANCES`.
     """
 
     word: Word
@@ -93,6 +111,7 @@ class Verdict:
     covariance: Matrix6 | None = field(default=None, repr=False)
     used: int = 1
     skipped: tuple[BadFrame, ...] = ()
+    within: Tolerance | None = None
 
     def rotated(self, rotation: Rotation) -> Verdict:
         """The same on the extrinsic of a camera turned by ``rotation [3, 3]``."""
@@ -125,6 +144,7 @@ class Verdict:
             "camera_from_lidar": self.camera_from_lidar.tolist(),
             "moved": {"rotation_deg": self.moved[0], "translation_cm": self.moved[1]},
             "sigma": sigma,
+            "within": None if self.within is None else self.within._asdict(),
             "frames": {"used": self.used, "skipped": [vars(skipped) for skipped in self.skipped]},
         }
 

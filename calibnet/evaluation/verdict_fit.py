@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Floats
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.covariance import CovarianceModel
-from calibnet.verdict import DRIVE_LIMITS, FRAME_LIMITS
+from calibnet.verdict import DRIVE_TOLERANCES, FRAME_TOLERANCES, Tolerance
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """The ranges of the last stage and of the first one, which is searched around the guess."""
@@ -51,9 +52,10 @@ class FitFigures:
         acceptance_of_good: share of the good plain runs that are accepted.
         wrong_rejected: share of the wrong runs that are rejected.
         nees: normalised estimation error squared per degree of freedom, 1 if the covariance is right; of the plain
-            runs that are not rejected or, for drives, of the accepted ones.
+            runs that are not rejected or, for drives, of those certain enough to be within the coarser tolerance.
         curve: acceptance of good plain runs at given shares of false accepts, of all runs and without those that end
             near a limit (`NEAR`).
+        coarser: the same for the coarser tolerance; None if it was not fitted.
     """
 
     runs: int
@@ -65,6 +67,14 @@ class FitFigures:
     wrong_rejected: float
     nees: float
     curve: list[dict[str, float]] = field(default_factory=list)
+    coarser: FitFigures | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """What the file of coefficients holds; without what is not known, for TOML has no null."""
+        content = asdict(replace(self, coarser=None))
+        if self.coarser is not None:
+            content["coarser"] = self.coarser.as_dict()
+        return {name: value for name, value in content.items() if value is not None and value == value}
 
 
 def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, CovarianceModel, FitFigures]:
@@ -77,9 +87,12 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, 
     Raises:
         CalibrationError: too few runs end right, or wrong.
     """
-    classifier, figures, kept = fit_classifier(runs, FRAME_LIMITS, FALSE_ACCEPTS)
+    finest, coarser = FRAME_TOLERANCES
+    classifier, figures, kept = fit_classifier(runs, finest, FALSE_ACCEPTS)
+    coarse, coarse_figures, _ = fit_classifier(graded(runs, coarser), coarser, FALSE_ACCEPTS)
     model = fit_covariance(kept, ranges)
-    return classifier, model, replace(figures, nees=nees_of(kept, ranges, model))
+    nees = nees_of(kept, ranges, model)
+    return replace(classifier, coarser=coarse), model, replace(figures, nees=nees, coarser=coarse_figures)
 
 
 def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigures]:
@@ -88,15 +101,22 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     Raises:
         CalibrationError: too few runs end right, or wrong.
     """
-    classifier, figures, kept = fit_classifier(
-        runs, DRIVE_LIMITS, FALSE_ACCEPTS_OF_DRIVES, FEWEST_DRIVES, near_counts=False
-    )
-    # only accepted runs count: a few gross errors would inflate the covariance of all
-    accepted = [run for run in kept if error_probability(run, classifier) < classifier.accepted_below]
+    finest, coarser = DRIVE_TOLERANCES
+    share, fewest = FALSE_ACCEPTS_OF_DRIVES, FEWEST_DRIVES
+    classifier, figures, _ = fit_classifier(runs, finest, share, fewest, near_counts=False)
+    coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, share, fewest)
+    # only runs that are vouched for count: a few gross errors would inflate the covariance of all
+    accepted = [run for run in kept if error_probability(run, coarse) < coarse.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
     nees = float(np.mean(squares)) if squares else float("nan")
     inflation = rounded(max(nees, 1.0)) if squares else 1.0
-    return classifier, inflation, replace(figures, nees=nees / inflation)
+    figures = replace(figures, nees=nees / inflation, coarser=coarse_figures)
+    return replace(classifier, coarser=coarse), inflation, figures
+
+
+def graded(runs: Sequence[VerdictRun], tolerance: Tolerance) -> list[VerdictRun]:
+    """The runs, each good if it ends within a tolerance."""
+    return [replace(run, good=severity(run, tolerance) <= 1) for run in runs]
 
 
 def error_probability(run: VerdictRun, classifier: Classifier) -> float:
@@ -196,8 +216,12 @@ def counted(runs: Sequence[VerdictRun], limits: tuple[float, float], near_counts
 
 def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:
     """Whether a run ends near a limit, on either side."""
-    severity = max(run.rotation_deg / limits[0], run.translation_cm / limits[1])
-    return 1 / NEAR < severity < NEAR
+    return 1 / NEAR < severity(run, limits) < NEAR
+
+
+def severity(run: VerdictRun, limits: tuple[float, float]) -> float:
+    """The error of a run relative to limits; at most 1 within them."""
+    return max(run.rotation_deg / limits[0], run.translation_cm / limits[1])
 
 
 def _acceptance(accepted: NDArray[np.bool_], runs: Sequence[VerdictRun]) -> float:

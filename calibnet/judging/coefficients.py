@@ -7,7 +7,7 @@ belong to by fingerprints. With weights that have no coefficients, nothing is ac
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,13 +85,20 @@ class Coefficients:
         assert self.frame is not None
         content = {
             "weights": {str(range_): of for range_, of in self.weights.items()},
-            "frame": asdict(self.frame),
+            "frame": _content(self.frame),
             "covariance": asdict(self.covariance),
             **({} if self.lens is None else {"lens": asdict(self.lens)}),
-            **({} if self.drive is None else {"drive": asdict(self.drive) | {"inflation": self.inflation}}),
+            **({} if self.drive is None else {"drive": _content(self.drive) | {"inflation": self.inflation}}),
             "fitted": dict(self.fitted),
         }
         write_whole(path, (HEAD + tomli_w.dumps(content)).encode())
+
+
+def _content(classifier: Classifier) -> dict[str, Any]:
+    """A classifier and its coarser ones as TOML has them, which knows no null."""
+    content = asdict(replace(classifier, coarser=None))
+    del content["coarser"]
+    return content if classifier.coarser is None else content | {"coarser": _content(classifier.coarser)}
 
 
 def coefficients_path(preset: str, folder: Path | None = None) -> Path:
@@ -147,12 +154,12 @@ def _read(path: Path) -> Coefficients:
     try:
         content = parse_toml(read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy))
         read = validated(_File, content, origin, WeightsError, remedy)
-        _require_known(read.frame.weights, Predictors)
+        _require_known(read.frame, Predictors)
         if read.lens is not None:
             _require_faults(read.lens)
         drive = None
         if read.drive is not None:
-            _require_known(read.drive.weights, DrivePredictors)
+            _require_known(read.drive, DrivePredictors)
             drive = Classifier(**{one.name: getattr(read.drive, one.name) for one in fields(Classifier)})
         weights = {MiscalibrationRange.parse(range_): mark for range_, mark in read.weights.items()}
     except (ValueError, ConfigError) as error:
@@ -165,9 +172,15 @@ def _require_faults(odds: LensOdds) -> None:
     if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
         raise ValueError(f"faults of the lens are {', '.join(FAULTS)}")
     for weights in odds.weights.values():
-        _require_known(weights, LensPredictors)
+        _require_predictors(weights, LensPredictors)
 
 
-def _require_known(weights: Mapping[str, float], predictors: type[DataclassInstance]) -> None:
+def _require_known(classifier: Classifier, predictors: type[DataclassInstance]) -> None:
+    _require_predictors(classifier.weights, predictors)
+    if classifier.coarser is not None:
+        _require_known(classifier.coarser, predictors)
+
+
+def _require_predictors(weights: Mapping[str, float], predictors: type[DataclassInstance]) -> None:
     if unknown := weights.keys() - {field.name for field in fields(predictors)}:
         raise ValueError(f"there is no predictor {', '.join(sorted(unknown))}")

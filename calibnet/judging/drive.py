@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
@@ -10,7 +11,17 @@ from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive_predictors import aligned_cm, drive_predictors, halves_cm
 from calibnet.judging.predictors import reach
 from calibnet.trace import MARGIN, DriveEstimate
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, REJECTED, Verdict, Word, moved
+from calibnet.verdict import (
+    ACCEPTED,
+    CANNOT_TELL,
+    DRIVE_LIMITS,
+    DRIVE_TOLERANCES,
+    REJECTED,
+    Tolerance,
+    Verdict,
+    Word,
+    moved,
+)
 
 LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 """Largest standard deviations, over all axes, of a drive that is judged."""
@@ -33,52 +44,67 @@ def judge_drive(
         searched: range that was to be searched around the initial extrinsic.
         classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
     """
-    word, reason = _word(estimate, initial, searched, classifier)
+    word, reason, within = _word(estimate, initial, searched, classifier)
     there = estimate.camera_from_lidar
     return Verdict(
-        word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped
+        word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped, within
     )
+
+
+class _Said(NamedTuple):
+    """The word of a verdict, the reason, and the tolerance that the result is within."""
+
+    word: Word
+    reason: str
+    within: Tolerance | None = None
 
 
 def _word(
     estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
-) -> tuple[Word, str]:
+) -> _Said:
     used, skipped = estimate.frames, len(estimate.skipped)
     if 2 * skipped >= used + skipped:
-        return REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}"
+        return _Said(REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}")
     turned, shifted = moved(initial, estimate.camera_from_lidar)
     if reach(initial, estimate.camera_from_lidar, searched).share > MARGIN:
-        return REJECTED, (
+        return _Said(
+            REJECTED,
             f"The result lies {turned:.2g}° and {shifted:.0f} cm from the start, outside the range searched "
             f"({searched.label}). A wrong lens or a time lag can cause this. If the start may be that far off, run all "
-            "stages (--stages 1-5)."
+            "stages (--stages 1-5).",
         )
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
-        return CANNOT_TELL, (
+        return _Said(
+            CANNOT_TELL,
             f"The frames determine the extrinsic only to {estimate.rotation_deg:.2g}° and "
-            f"{estimate.translation_cm:.0f} cm (one standard deviation); add frames of other places."
+            f"{estimate.translation_cm:.0f} cm (one standard deviation); add frames of other places.",
         )
     if isinstance(classifier, str):
-        return CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}"
+        return _Said(CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}")
     moments = min(used, len({look.position for look in estimate.looks}) or used)
     if moments < FEWEST_JUDGED:
         needed = f"a drive needs {FEWEST_JUDGED} to be accepted, preferably of different places"
         of_them = "" if moments == used else f" of {moments} moments"
-        return CANNOT_TELL, f"{used} frames{of_them} agree, but {needed}."
+        return _Said(CANNOT_TELL, f"{used} frames{of_them} agree, but {needed}.")
     predictors = drive_predictors(estimate)
     if predictors is None:
-        return CANNOT_TELL, "Its frames hold too little information to judge the drive."
+        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.")
+    within = classifier.finest(predictors, DRIVE_TOLERANCES)
+    if within == DRIVE_LIMITS:
+        return _Said(ACCEPTED, f"{used} frames agree.", within)
     wrong = classifier(predictors)
-    if wrong < classifier.accepted_below:
-        return ACCEPTED, f"{used} frames agree."
     if math.isnan(wrong):
-        return CANNOT_TELL, "Its frames hold too little information to judge the drive."
+        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.")
     halves, aligned = halves_cm(estimate.looks), aligned_cm(estimate)
     why = [f"the halves of the drive differ by {halves:.0f} cm"] if halves > HALVES_CM else []
     if aligned > ALIGNED_CM:
         why.append(f"edges and networks differ by {aligned:.0f} cm, and either may be right")
-    return CANNOT_TELL, (  # not rejected: many drives beyond the limits are only a little beyond them
-        f"{used} frames agree, but less well than in drives with a correct result (probability of being more than "
-        f"{DRIVE_LIMITS[0]:g}° or {DRIVE_LIMITS[1]:g} cm off: {wrong:.0%})"
-        f"{''.join(f'; {one}' for one in why)}."
+    agree = "agree, but less well than in drives with a correct result"
+    if within is not None:
+        agree = f"agree, and the result is within {within}, but perhaps not within {DRIVE_LIMITS}"
+    return _Said(
+        CANNOT_TELL,  # not rejected: many drives beyond the limits are only a little beyond them
+        f"{used} frames {agree} (probability of an error of more than {DRIVE_LIMITS}: {wrong:.0%})"
+        f"{''.join(f'; {one}' for one in why)}.",
+        within,
     )

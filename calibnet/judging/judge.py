@@ -13,7 +13,18 @@ from calibnet.judging.covariance import covariance
 from calibnet.judging.lens_causes import lens_causes
 from calibnet.judging.predictors import predictors, reach
 from calibnet.trace import MARGIN, CascadeTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict, Word, moved
+from calibnet.verdict import (
+    ACCEPTED,
+    CANNOT_TELL,
+    FRAME_LIMITS,
+    FRAME_TOLERANCES,
+    REJECTED,
+    Cause,
+    Tolerance,
+    Verdict,
+    Word,
+    moved,
+)
 
 FARTHEST_REACH = 1.6
 """Reach beyond which a run is certainly wrong; between `MARGIN` and this it may have started outside the range."""
@@ -71,11 +82,9 @@ def judge(
 
     last = trace.stages[-1]
 
-    def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
-        going = moved(trace.initial, last.after)
-        return Verdict(
-            word, _because(reason, causes), last.after, going, causes, covariance(trace, coefficients.covariance)
-        )
+    def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = (), within: Tolerance | None = None) -> Verdict:
+        going, spread = moved(trace.initial, last.after), covariance(trace, coefficients.covariance)
+        return Verdict(word, _because(reason, causes), last.after, going, causes, spread, within=within)
 
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)
@@ -112,17 +121,23 @@ def judge(
             f"Picture and scan fit together, but how reliable that is cannot be judged. {classifier}",
             suspects,
         )
-    wrong = classifier(predictors(trace))
-    if wrong < classifier.accepted_below:
-        return verdict(ACCEPTED, f"Picture and scan fit together (match error {last.match_error_px:.1f} px).")
+    known = predictors(trace)
+    wrong, within = classifier(known), classifier.finest(known, FRAME_TOLERANCES)
+    if within == FRAME_LIMITS:
+        reason = f"Picture and scan fit together (match error {last.match_error_px:.1f} px)."
+        return verdict(ACCEPTED, reason, within=within)
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
     fit = "Picture and scan fit together, but less well than in runs with a correct result"
+    if within is not None:
+        fit = f"Picture and scan fit together, and the result is within {within}, but perhaps not within {FRAME_LIMITS}"
     reason = f"{fit} (probability of an error: {wrong:.0%})."
     if prior:
         reason = f"{fit} (probability of an error: {wrong:.0%} without prior knowledge, less with {prior})."
-        return verdict(CANNOT_TELL, reason, why_lens())
-    return verdict(REJECTED if wrong > classifier.rejected_above else CANNOT_TELL, reason, why_lens())
+        return verdict(CANNOT_TELL, reason, why_lens(), within)
+    if within is None and wrong > classifier.rejected_above:
+        return verdict(REJECTED, reason, why_lens())
+    return verdict(CANNOT_TELL, reason, why_lens(), within)
 
 
 def _suspect(remark: Implausible) -> Cause:

@@ -6,12 +6,24 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
 from calibnet.judging.drive import FEWEST_JUDGED
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Cause, Verdict, Word, moved
+from calibnet.verdict import (
+    ACCEPTED,
+    CANNOT_TELL,
+    DRIVE_TOLERANCES,
+    FRAME_TOLERANCES,
+    REJECTED,
+    Cause,
+    Tolerance,
+    Verdict,
+    Word,
+    moved,
+)
 
 SIGNIFICANT = 16.27
 """99.9 % quantile of chi-square with three degrees of freedom, for the rotation or the translation."""
@@ -28,23 +40,11 @@ SHIFTS = {"x_cm": "x (right)", "y_cm": "y (down)", "z_cm": "z (ahead)"}
 
 
 @dataclass(frozen=True)
-class Tolerance:
-    """The largest error of a calibration that counts as good."""
-
-    rotation_deg: float
-    translation_cm: float
-
-    def __str__(self) -> str:
-        return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"
-
-
-@dataclass(frozen=True)
 class Standard:
     """The tolerances that the calibration of a frame, or of a drive, is compared with.
 
     Attributes:
-        tolerances: finest first: the limits of the verdict, which are used if the result is certain enough, and coarser
-            ones for other results.
+        tolerances: finest first; those that the result is not certain enough to be within itself are not used.
         farthest: largest error of a result of several frames that is not certain enough to be accepted; None if that is
             unknown.
     """
@@ -53,8 +53,7 @@ class Standard:
     farthest: Tolerance | None = None
 
 
-FRAME = Standard((Tolerance(*FRAME_LIMITS), Tolerance(1.5, 40.0)))
-DRIVE = Standard((Tolerance(*DRIVE_LIMITS), Tolerance(0.5, 15.0)), Tolerance(1.6, 40.0))
+FRAME, DRIVE = Standard(FRAME_TOLERANCES), Standard(DRIVE_TOLERANCES, Tolerance(1.6, 40.0))
 """Standards of a single frame, whose ``farthest`` is unknown, and of a drive, for which it is one and a half times the
 largest error among the drives that the verdict was fitted to (1.1°, 26 cm)."""
 
@@ -62,15 +61,17 @@ largest error among the drives that the verdict was fitted to (1.1°, 26 cm)."""
 def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     """Compare a calibration with the result of a run that started from it.
 
-    If the result is accepted, the calibration is
+    If the result is accepted, or certain enough to be within a coarser tolerance (`Verdict.within`), the calibration is
 
     - rejected if its rotation or translation is significantly off (chi-square, 99.9 %) by more than the finest
-      tolerance that the covariance of the result can resolve,
+      tolerance that the result can resolve,
     - accepted if it is within one of the tolerances with a probability of 95 %; the finest such tolerance is named,
     - *cannot tell* otherwise.
 
-    If the result is not accepted, the calibration is rejected if a cause is known, because the input is wrong then, or
-    if it lies farther from the result than the result can lie from the truth; otherwise it is *cannot tell*.
+    These probabilities follow from the covariance of the result, and from the coarsest tolerance, which it is certainly
+    within. If the result is certain of nothing, the calibration is rejected if a cause is known, because the input is
+    wrong then, or if it lies farther from the result than the result can lie from the truth; otherwise it is
+    *cannot tell*.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.
@@ -78,17 +79,18 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         standard: `FRAME` or `DRIVE`.
 
     Returns:
-        A verdict on ``given``. Its ``camera_from_lidar`` is the result, and ``moved`` is its distance from ``given``.
+        A verdict on ``given``. Its ``camera_from_lidar`` is the result, ``moved`` is its distance from ``given``, and
+        ``within`` is the tolerance that ``given`` is within.
     """
     estimate = found.camera_from_lidar
 
-    def verdict(word: Word, reason: str) -> Verdict:
-        return replace(found, word=word, reason=reason, moved=moved(given, estimate))
+    def verdict(word: Word, reason: str, within: Tolerance | None = None) -> Verdict:
+        return replace(found, word=word, reason=reason, moved=moved(given, estimate), within=within)
 
     error = pose_error(given, estimate)
     skipped, tried = len(found.skipped), found.used + len(found.skipped)
     few = f"{skipped} of {tried} frames do not fit or cannot be read." if 2 * skipped >= tried else None
-    if found.word != ACCEPTED:
+    if found.word != ACCEPTED and found.within is None:
         if found.word == REJECTED and found.causes:
             return verdict(REJECTED, found.reason)
         apart = f"{error.rotation_deg:.1f}° and {error.translation_cm:.0f} cm"
@@ -108,17 +110,19 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         )
     offset = pose_vector(given @ invert(estimate))
     off = _said(error, offset, found.covariance)
+    tolerances = [one for one in standard.tolerances if found.within is None or one >= found.within]
+    certain = None if found.within is None else tolerances[-1]
     still = np.zeros(6)
     told = next(
-        (one for one in standard.tolerances if probability_within(still, found.covariance, one) >= PROBABLE),
-        standard.tolerances[-1],
+        (one for one in tolerances if probability_within(still, found.covariance, one, certain) >= PROBABLE),
+        tolerances[-1],
     )
     if _is_beyond(error, offset, found.covariance, told):
         return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {told}.")
-    for tolerance in standard.tolerances:
-        share = probability_within(offset, found.covariance, tolerance)
+    for tolerance in tolerances:
+        share = probability_within(offset, found.covariance, tolerance, certain)
         if share >= PROBABLE:
-            return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: {off}.")
+            return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: {off}.", tolerance)
     return verdict(
         CANNOT_TELL, f"The calibration is off by {off}; the probability that it is within {tolerance} is {share:.0%}."
     )
@@ -148,19 +152,29 @@ def named_cause(error: BaseException | None) -> tuple[Cause, ...]:
     return ()
 
 
-def probability_within(offset: Vector6, covariance: Matrix6, tolerance: Tolerance) -> float:
-    """Probability that rotation and translation are both within a tolerance.
+def probability_within(
+    offset: Vector6, covariance: Matrix6, tolerance: Tolerance, certain: Tolerance | None = None
+) -> float:
+    """Probability that a calibration's rotation and translation are both within a tolerance.
 
     Args:
         offset: ``(translation m, rotation rad)`` of the calibration against the estimate.
-        covariance: ``[6, 6]`` of it.
+        covariance: ``[6, 6]`` of the estimate.
         tolerance: the largest error that counts as good.
+        certain: the tolerance that the estimate itself is certainly within, if one is known.
     """
     variances, axes = np.linalg.eigh(covariance)
-    draws = offset[:, None] + (axes * np.sqrt(np.maximum(variances, 0.0))) @ _draws()
-    turned, shifted = ((draws[rows] ** 2).sum(axis=0) for rows in (ROTATION, TRANSLATION))
-    within = turned <= np.radians(tolerance.rotation_deg) ** 2
-    return float((within & (shifted <= (tolerance.translation_cm / 100) ** 2)).mean())
+    errors = (axes * np.sqrt(np.maximum(variances, 0.0))) @ _draws()
+    if certain is not None:
+        errors = errors[:, _within(errors, certain)]
+    return float(_within(offset[:, None] + errors, tolerance).mean()) if errors.size else 0.0
+
+
+def _within(vectors: Floats, tolerance: Tolerance) -> NDArray[np.bool_]:
+    """Which of the vectors ``[6, N]`` are within a tolerance."""
+    turned, shifted = ((vectors[rows] ** 2).sum(axis=0) for rows in (ROTATION, TRANSLATION))
+    within = shifted <= (tolerance.translation_cm / 100) ** 2
+    return np.asarray(within & (turned <= np.radians(tolerance.rotation_deg) ** 2))
 
 
 @cache

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from calibnet.runtime.threads import cores
+from calibnet.verdict import DRIVE_TOLERANCES, FRAME_TOLERANCES
 from inspector.cli.options import FOLDER, SEED, STAGES, NumberRange
 from inspector.cli.output import make_console, say
 
@@ -140,7 +141,7 @@ def fit_verdict(
         "data": [short(spec) for spec in of_drive.data],
         "synthetic": synthetic,
         "seed": seed,
-        "frames": asdict(figures),
+        "frames": figures.as_dict(),
     }
     coefficients = Coefficients(classifier, covariance, weights=marks, missing="", fitted=fitted)
     for line in told(figures):
@@ -161,7 +162,7 @@ def fit_verdict(
     except CalibrationError as error:
         console.print(f"Drives will not be accepted. {error}", style="yellow", soft_wrap=True)
     else:
-        fitted = {**fitted, "drives": asdict(figures)}
+        fitted = {**fitted, "drives": figures.as_dict()}
         coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)
         for line in told(figures, "drives"):
             console.print(line, soft_wrap=True)
@@ -177,6 +178,7 @@ def short(spec: str) -> str:
 
 def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
     """The figures of the fit, as lines of text."""
+    tolerance = (DRIVE_TOLERANCES if of == "drives" else FRAME_TOLERANCES)[1]
     yield f"{figures.runs} runs of {of} on {figures.sequences} sequences."
     yield f"{figures.plain} of them have no fault; {figures.good} of those end with a right result."
     yield "Cross-validated, leaving out one sequence at a time:"
@@ -187,6 +189,9 @@ def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
         points = (f"{point[name]:.0%} at {point['false_accepts']:.2%}" for point in figures.curve)
         yield f"  accepted of the right results at other rates of false accepts{kept}: {', '.join(points)}"
     yield f"  normalised squared error (NEES) per degree of freedom: {figures.nees:.2f}"
+    if figures.coarser is not None:
+        yield f"  certain to be within {tolerance}: {figures.coarser.acceptance_of_good:.0%} of the results that are"
+        yield f"  certain to be within {tolerance} though wrong: {figures.coarser.false_accept_rate:.1%} of all runs"
 
 
 def told_of_lenses(figures: LensFigures) -> Iterator[str]:

@@ -13,7 +13,7 @@ from annotated_types import Interval, Len
 
 from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.schema import validated
-from calibnet.verdict import ACCEPTED, REJECTED, BadFrame, Cause, Verdict, Word, moved
+from calibnet.verdict import ACCEPTED, REJECTED, BadFrame, Cause, Tolerance, Verdict, Word, moved
 from inspector.read.understood import RecordingError, extrinsic_of
 
 Count = Annotated[int, Interval(ge=0, le=10**9)]
@@ -48,6 +48,7 @@ class _Said:
     moved: _Moved
     sigma: _Sigma | None
     frames: _Frames
+    within: Tolerance | None = None
 
 
 def read_verdict(text: str, path: Path) -> Verdict:
@@ -68,6 +69,7 @@ def read_verdict(text: str, path: Path) -> Verdict:
         covariance=covariance if covariance is not None and np.isfinite(covariance).all() else None,
         used=said.frames.used,
         skipped=said.frames.skipped,
+        within=said.within,
     )
 
 

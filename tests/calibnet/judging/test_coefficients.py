@@ -18,9 +18,9 @@ from calibnet.weights.fingerprint import fingerprints
 from calibnet.weights.manifest import PACKAGE, Manifest, StageEntry, StageSettings, load_manifest
 
 MANIFEST = Manifest("mine", stages=(StageEntry(RANGES[3], "four"), StageEntry(RANGES[4], "five")))
-CLASSIFIER = Classifier(-1.5, {"match_error": 2.0, "misfit": 0.25}, 0.25, 0.75)
-
-DRIVE = Classifier(0.5, {"aligned": 1.5}, 0.1, 0.9)
+COARSER = Classifier(-2.5, {"match_error": 1.0}, 0.25, 0.75)
+CLASSIFIER = Classifier(-1.5, {"match_error": 2.0, "misfit": 0.25}, 0.25, 0.75, COARSER)
+DRIVE = Classifier(0.5, {"aligned": 1.5}, 0.1, 0.9, Classifier(0.25, {"aligned": 1.0}, 0.2, 0.9))
 LENS = LensOdds(0.7, dict.fromkeys(FAULTS, -1.0), {name: {"fine_focal_gain": 2.5} for name in FAULTS})
 
 

@@ -12,7 +12,7 @@ from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.drive_predictors import apart, drive_predictors, halves_cm
 from calibnet.trace import MARGIN, DriveEstimate, DriveLook
-from calibnet.verdict import BadFrame
+from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame
 from tests.support.boxes import REFERENCE
 
 CLASSIFIER = Classifier(-1.0, {"match_error": 2.0}, 0.6, 0.8)
@@ -49,7 +49,7 @@ def estimate(
         (estimate(degrees=0.2), "cannot tell", "only to 0.35° and 5 cm"),  # 0.2 on each of three axes
         (estimate(centimetres=8.0), "cannot tell", "only to 0.17° and 14 cm"),
         (estimate(error=2.5), "cannot tell", "10 frames agree, but less well than in drives with a correct result"),
-        (estimate(error=4.0), "cannot tell", "(probability of being more than 0.3° or 8 cm off: 85%)."),
+        (estimate(error=4.0), "cannot tell", "(probability of an error of more than 0.3° / 8 cm: 85%)."),
         (estimate(error=2.5, halves=40), "cannot tell", "%); the halves of the drive differ by 40 cm."),
         (estimate(bad=4), "accepted", "6 frames agree."),
         (estimate(bad=5), "rejected", "Only 5 of 10 frames could be used. It is cut short."),
@@ -61,6 +61,15 @@ def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -
     assert verdict.used == drive.frames and verdict.skipped == drive.skipped
     np.testing.assert_array_equal(verdict.camera_from_lidar, drive.camera_from_lidar)
     np.testing.assert_array_equal(verdict.covariance, drive.covariance)
+
+
+def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
+    coarser = replace(CLASSIFIER, coarser=replace(CLASSIFIER, intercept=-2.0))  # accepts up to 3.3 px
+    verdicts = [judge_drive(estimate(error=of), REFERENCE, RANGES[2], coarser) for of in (1.5, 2.5, 4.0)]
+    assert [verdict.within for verdict in verdicts] == [DRIVE_LIMITS, DRIVE_TOLERANCES[1], None]
+    assert [verdict.word for verdict in verdicts] == ["accepted", "cannot tell", "cannot tell"]
+    assert "and the result is within 0.5° / 15 cm, but perhaps not within 0.3° / 8 cm" in verdicts[1].reason
+    assert judge_drive(estimate(error=1.5, degrees=0.2), REFERENCE, RANGES[2], coarser).within is None
 
 
 def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:

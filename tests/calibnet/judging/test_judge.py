@@ -13,7 +13,7 @@ from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import CovarianceModel, covariance
 from calibnet.judging.judge import judge
 from calibnet.trace import CascadeTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, FRAME_LIMITS, FRAME_TOLERANCES, REJECTED
 from tests.support.boxes import REFERENCE, boxes
 from tests.support.matches import LENS_ODDS, matches, run
 
@@ -43,6 +43,15 @@ def test_what_fits_is_accepted_with_what_was_found() -> None:
 def test_what_fits_less_well_cannot_be_told_and_then_is_rejected() -> None:
     words = [judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), CLASSIFIER).word for error in (1.4, 2.0, 4.2)]
     assert words == [ACCEPTED, CANNOT_TELL, REJECTED]
+
+
+def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
+    finest = Classifier(0.0, {"match_error": 1.0}, accepted_below=0.6, rejected_above=0.65)
+    both = fitted(replace(finest, coarser=replace(finest, intercept=-0.5)))
+    verdicts = [judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), both) for error in (1.4, 2.0, 3.0)]
+    assert [verdict.within for verdict in verdicts] == [FRAME_LIMITS, FRAME_TOLERANCES[1], None]
+    assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, REJECTED]
+    assert "the result is within 1.5° / 40 cm, but perhaps not within 1° / 25 cm" in verdicts[1].reason
 
 
 def test_what_is_known_beforehand_is_never_rejected_by_the_classifier_alone() -> None:

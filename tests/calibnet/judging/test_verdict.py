@@ -10,7 +10,7 @@ from calibnet.geometry import RANGES, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import load_coefficients
 from calibnet.judging.predictors import Predictors, misfits, predictors, reach
-from calibnet.verdict import BadFrame, Cause, Verdict, moved
+from calibnet.verdict import BadFrame, Cause, Tolerance, Verdict, moved
 from calibnet.weights.manifest import load_manifest
 from tests.support.drive import REFERENCE
 from tests.support.matches import matches, run
@@ -33,7 +33,10 @@ def test_json_of_a_verdict() -> None:
         "moved": {"rotation_deg": 2.0, "translation_cm": 5.0},
         "sigma": {"covariance": covariance.tolist()},
         "frames": {"used": 3, "skipped": [{"frame": 7, "why": "damaged"}]},
+        "within": None,
     }
+    coarse = replace(verdict, within=Tolerance(0.5, 15.0)).as_dict()["within"]
+    assert coarse == {"rotation_deg": 0.5, "translation_cm": 15.0}
     assert Verdict("accepted", "", REFERENCE).as_dict()["sigma"] is None
 
 

@@ -11,8 +11,8 @@ from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
-from calibnet.judging.verify import DRIVE, FRAME, Standard, Tolerance, named_cause, probability_within, unfit, verify
-from calibnet.verdict import BadFrame, Cause, Verdict
+from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, probability_within, unfit, verify
+from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
 
 MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
@@ -73,6 +73,33 @@ def test_the_probability_is_that_of_the_normal_distribution() -> None:
     assert inside == pytest.approx(0.7385, abs=0.005)
     offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
     assert probability_within(offset, covariance(0.001, 0.01), TIGHT.tolerances[0]) == pytest.approx(0.5, abs=0.01)
+
+
+def test_what_is_certain_takes_the_tails_from_the_probability() -> None:
+    """Three axes of 8 cm: within 15 cm with 67.9 %, within 8 cm with 19.9 %."""
+    fine, coarse = DRIVE_TOLERANCES
+    shares = [probability_within(np.zeros(6), covariance(0.001, 8.0), one, coarse) for one in (fine, coarse)]
+    assert shares == pytest.approx([0.199 / 0.679, 1.0], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "word", "end"),
+    [
+        (off(), "accepted", "no more than 0.5° / 15 cm: 0.00°"),
+        (off(yaw=0.1, z=0.02), "accepted", "no more than 0.5° / 15 cm: 0.10°"),
+        (off(z=0.1), "cannot tell", "within 0.5° / 15 cm is 73%."),
+        (off(yaw=1.0), "rejected", "the tolerance is 0.5° / 15 cm."),
+    ],
+)
+def test_a_result_that_is_certain_of_a_coarser_tolerance_judges_by_that_one(
+    given: np.ndarray, word: str, end: str
+) -> None:
+    unsure = replace(found(0.1, 5.0), word="cannot tell", within=DRIVE_TOLERANCES[1])
+    verdict = verify(given, unsure, DRIVE)
+    assert verdict.word == word and end in verdict.reason
+    assert verdict.within == (DRIVE_TOLERANCES[1] if word == "accepted" else None)
+    sure = verify(given, replace(unsure, within=DRIVE_LIMITS), DRIVE)  # its covariance resolves no finer one
+    assert sure.word == word and sure.within == verdict.within
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
