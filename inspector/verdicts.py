@@ -32,6 +32,12 @@ def further_causes(verdict: Verdict) -> list[str]:
     return [text for text in texts if text not in verdict.reason]
 
 
+def title(verdict: Verdict) -> str:
+    """The word, and the tolerance that the extrinsic is within, where one is certain."""
+    word = verdict.word.capitalize()
+    return word if verdict.within is None else f"{word} · within {verdict.within}"
+
+
 def certainty(verdict: Verdict) -> str:
     """Uncertainty of the result in degrees and centimetres; empty where none is stated."""
     if verdict.covariance is None:
@@ -46,7 +52,7 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
         verdict: the verdict.
         of: what it is a verdict on, where that is not the result of the run.
     """
-    heading = f"{of}: {verdict.word}" if of else verdict.word.capitalize()
+    heading = f"{of}: {title(verdict).lower()}" if of else title(verdict)
     lines = [f"# {heading}", "", verdict.reason, ""]
     lines += [f"- **{cause.name}**: {_once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
     lines += [""] if verdict.causes else []

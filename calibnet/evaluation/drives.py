@@ -12,10 +12,11 @@ import numpy as np
 from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets import Sequence
 from calibnet.errors import CalibrationError
+from calibnet.evaluation.claims import Claims
 from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibration
-from calibnet.verdict import REJECTED
+from calibnet.verdict import DRIVE_TOLERANCES, REJECTED, Tolerance
 
 FEWEST_FRAMES = 2
 """One frame is no drive."""
@@ -31,12 +32,14 @@ class DriveMetrics:
             would be the same.
         coverage: how the stated covariances of those that are not rejected compare with their errors.
         verdicts: how many have each verdict.
+        claims: how many are certain to be within the coarser tolerance.
     """
 
     estimate: Metrics
     networks: Metrics | None
     coverage: Coverage | None = None
     verdicts: dict[str, int] = field(default_factory=dict)
+    claims: Claims | None = None
 
 
 def evaluate_drives(
@@ -61,13 +64,15 @@ def evaluate_drives(
         None where no sequence is a drive.
     """
     errors, of_networks, squares, words, aligned = [], [], [], Counter[str](), False
+    claimed = list[Tolerance | None]()
     for number, sequence in enumerate(sequences):
         if not shares_mount(sequence):
             continue
         reference = sequence[0].camera_from_lidar
         for repeat in range(repeats):
             delta = sample_miscalibration(range_, np.random.default_rng([seed, number, repeat, 1]))
-            estimate = networks = delta @ reference
+            estimate, within = delta @ reference, None
+            networks = estimate
 
             def told(read: int, total: int, name: str = sequence.name) -> None:
                 if observer is not None:
@@ -79,14 +84,17 @@ def evaluate_drives(
                 aligned = aligned or solved.networks is not None
                 if solved.verdict is not None:
                     words[solved.verdict.word] += 1
+                    within = solved.verdict.within
                     if solved.verdict.word != REJECTED:
                         squares.append(squared_error(estimate, reference, solved.covariance))
             errors.append(pose_error(estimate, reference))
+            claimed.append(within)
             of_networks.append(pose_error(networks, reference))
     if not errors:
         return None
     networks_alone = Metrics.of(of_networks) if aligned else None
-    return DriveMetrics(Metrics.of(errors), networks_alone, Coverage.of(squares), dict(words))
+    claims = Claims.of(DRIVE_TOLERANCES[-1], zip(claimed, errors, strict=True))
+    return DriveMetrics(Metrics.of(errors), networks_alone, Coverage.of(squares), dict(words), claims)
 
 
 def shares_mount(sequence: Sequence) -> bool:

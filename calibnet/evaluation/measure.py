@@ -136,6 +136,7 @@ class _Measurement:
             drives_networks=solved.networks,
             drives_coverage=solved.coverage,
             drives_verdicts=solved.verdicts,
+            drives_claims=solved.claims,
         )
 
     def with_audit(

@@ -12,11 +12,12 @@ import numpy as np
 from calibnet.calibrator import Calibrator
 from calibnet.datasets import Sequence as FrameSequence
 from calibnet.errors import CalibrationError, DatasetError
+from calibnet.evaluation.claims import Claims
 from calibnet.evaluation.coverage import Coverage, squared_error
 from calibnet.evaluation.metrics import Metrics
 from calibnet.geometry import MiscalibrationRange, PoseError, pose_error, sample_miscalibration
 from calibnet.geometry.types import Transform
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, WORDS
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, FRAME_TOLERANCES, WORDS, Tolerance
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Run:
         applied: error of the result as it is applied: the initial one, where what was found is rejected.
         verdict: accepted, rejected or cannot tell; empty where there is none.
         squared_error: of the result by its stated covariance, see `calibnet.evaluation.coverage`; not a number without.
+        within: the tolerance that the verdict is certain of; None without.
     """
 
     sequence: str
@@ -43,6 +45,7 @@ class Run:
     applied: PoseError
     verdict: str = ""
     squared_error: float = math.nan
+    within: Tolerance | None = None
 
 
 Observer = Callable[[Run], None]
@@ -77,6 +80,7 @@ class Evaluation:
         drives_networks: likewise of what the networks alone made of them, before edges were aligned.
         drives_coverage: how their stated covariances compare with their errors; None where none is stated.
         drives_verdicts: how many of them have each verdict.
+        drives_claims: how many are certain to be within the coarser tolerance of drives; None where none was measured.
         references: errors of other methods on the same single frames, by name: no correction, a classical refinement.
         audit: errors with altered frames, by name, see `calibnet.evaluation.audit`: of the results as applied.
         audit_arrived: the same before the verdict, after the last stage.
@@ -98,6 +102,7 @@ class Evaluation:
     drives_networks: Metrics | None = None
     drives_coverage: Coverage | None = None
     drives_verdicts: dict[str, int] = field(default_factory=dict)
+    drives_claims: Claims | None = None
     references: dict[str, Metrics] = field(default_factory=dict)
     audit: dict[str, Metrics] = field(default_factory=dict)
     audit_arrived: dict[str, Metrics] = field(default_factory=dict)
@@ -108,6 +113,11 @@ class Evaluation:
     def verdicts(self) -> dict[str, int]:
         """How many runs have each verdict."""
         return {word: sum(run.verdict == word for run in self.runs) for word in WORDS}
+
+    @property
+    def claims(self) -> Claims:
+        """How many runs are certain to be within the coarser tolerance of frames."""
+        return Claims.of(FRAME_TOLERANCES[-1], [(run.within, run.applied) for run in self.runs])
 
     @property
     def accepted(self) -> Metrics | None:
@@ -146,6 +156,7 @@ class Evaluation:
             "frames": self.frames,
             "failed": self.failed,
             "verdicts": {word.replace(" ", "_"): count for word, count in self.verdicts.items()},
+            "claims": self.claims.as_dict(),
             "accepted": None if self.accepted is None else self.accepted.as_dict(),
             "initial": self.initial.as_dict(),
             "stages": [
@@ -156,6 +167,7 @@ class Evaluation:
             "coverage_accepted": None if self.coverage_accepted is None else self.coverage_accepted.as_dict(),
             "coverage_sequence": None if self.drives_coverage is None else self.drives_coverage.as_dict(),
             "verdicts_sequence": {word.replace(" ", "_"): count for word, count in self.drives_verdicts.items()},
+            "claims_sequence": None if self.drives_claims is None else self.drives_claims.as_dict(),
             "sequence_networks": None if self.drives_networks is None else self.drives_networks.as_dict(),
             "references": {name: metrics.as_dict() for name, metrics in self.references.items()},
         }
@@ -203,19 +215,19 @@ def evaluate_frames(
             for repeat in range(repeats):
                 initial = draw_miscalibration(range_, seed, frame.index, repeat) @ reference
                 errors: dict[int, PoseError] = {}
-                applied, verdict, square = initial, "", math.nan
+                applied, verdict, square, within = initial, "", math.nan, None
                 try:
                     trace = calibrator.calibrate(frame, initial)
                     for stage in trace.stages:
                         ranges[stage.number] = stage.range
                         errors[stage.number] = pose_error(stage.after, reference)
                     applied, verdict = trace.corrected, trace.verdict.word if trace.verdict else ""
-                    stated = trace.verdict.covariance if trace.verdict else None
+                    stated, within = (trace.verdict.covariance, trace.verdict.within) if trace.verdict else (None, None)
                     square = squared_error(trace.arrived, reference, stated)
                 except CalibrationError as error:
                     failure = error
                 before, after = (pose_error(extrinsic, reference) for extrinsic in (initial, applied))
-                runs.append(Run(sequence.name, frame.index, repeat, before, errors, after, verdict, square))
+                runs.append(Run(sequence.name, frame.index, repeat, before, errors, after, verdict, square, within))
                 if observer is not None:
                     observer(runs[-1])
     if not runs:

@@ -80,7 +80,8 @@ def coverage_sentences(evaluation: Evaluation) -> Iterator[str]:
         if coverage is not None:
             yield f"Stated covariances of {of}: {coverage}."
     if evaluation.drives_verdicts:
-        yield f"Drives: {', '.join(f'{count} {word}' for word, count in evaluation.drives_verdicts.items())}."
+        words = ", ".join(f"{count} {word}" for word, count in evaluation.drives_verdicts.items())
+        yield f"Drives: {words}; {evaluation.drives_claims}."
 
 
 def audit_sentence(evaluation: Evaluation) -> str:
@@ -96,7 +97,8 @@ def verdict_sentence(evaluation: Evaluation) -> str:
     """The number of runs with each verdict, and how many of the audit's runs were rejected."""
     counts = ", ".join(f"{count} {word}" for word, count in evaluation.verdicts.items())
     with_audit = ", ".join(f"{count} with the audit's {name}" for name, count in evaluation.audit_rejected.items())
-    return f"Of {len(evaluation.runs)} runs: {counts}." + (f" Also rejected: {with_audit}." if with_audit else "")
+    said = f"Of {len(evaluation.runs)} runs: {counts}; {evaluation.claims}."
+    return f"{said} Also rejected: {with_audit}." if with_audit else said
 
 
 def error_table(title: str, rows: list[tuple[str, dict[str, float]]], decimals: int) -> Table:

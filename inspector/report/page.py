@@ -15,6 +15,7 @@ from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.tables import axes_table, stages_table
 from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
 from inspector.report.verdict import ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
+from inspector.verdicts import title
 
 SETTING_NAMES = {
     "sequence": "data",
@@ -96,6 +97,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         title=f"{name}: calibration report",
         kind="Camera–LiDAR calibration report",
         word=run.verdict.word,
+        verdict=title(run.verdict),
         reasons=_items(verdict(run)),
         headline=headline(figures),
         findings=f'{warning}<ul class="verdict">\n{_items(findings(figures))}\n</ul>',

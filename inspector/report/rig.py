@@ -66,6 +66,7 @@ def _page(rig: RecordedRig, figures: list[str], recording_bytes: int) -> str:
         title=f"{rig.title}: calibration report",
         kind="Camera–LiDAR calibration report of a rig",
         word=solved.word,
+        verdict=solved.word.capitalize(),
         reasons="\n".join(_reasons(solved.cameras)),
         headline=solved.headline,
         findings="",

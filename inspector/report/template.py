@@ -23,7 +23,8 @@ class Head(NamedTuple):
     Attributes:
         title: of the page.
         kind: of report.
-        word: of the verdict.
+        word: of the verdict, which it is coloured by.
+        verdict: the word, and what the result is certain to be within.
         reasons: of it, as HTML items.
         headline: what was found, in a sentence.
         findings: what else is to be known at once, as HTML.
@@ -34,6 +35,7 @@ class Head(NamedTuple):
     title: str
     kind: str
     word: Word
+    verdict: str
     reasons: str
     headline: str
     findings: str
@@ -61,7 +63,7 @@ def report_page(head: Head, sections: str, recording: str, recording_bytes: int,
     """
     header = template("report.html").substitute(
         grade=GRADES[head.word],
-        word=head.word.capitalize(),
+        word=escape(head.verdict),
         reasons=head.reasons,
         headline=escape(head.headline),
         findings=head.findings,
