@@ -25,8 +25,6 @@ TITLE = "title"
 """Entity with the name of a stage's window above it; Rerun's title bar has no room for it beside its buttons."""
 TITLE_CELLS = 0.8
 """Distance from a window to its title, in cells."""
-TITLE_COLOR: colors.Rgb = (90, 155, 240)
-"""Colour of titles that is readable on the labels of both themes."""
 
 
 def wanted(layout: Layout) -> bool:
@@ -43,7 +41,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
         title = rr.Points2D(
             [(grid.window / 2, -TITLE_CELLS)],
             labels=[f"stage {stage.number}, {scale_name(grid)}"],
-            colors=TITLE_COLOR,
+            colors=colors.LETTERS,
             radii=0.0,
             show_labels=True,
         )

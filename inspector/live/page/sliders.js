@@ -47,8 +47,11 @@ function move(axis, value) {
 
 export function showPose() {
   for (const [i, axis] of AXES.entries()) {
-    at(`range-${axis.name}`).value = live.pose[i];
-    at(`number-${axis.name}`).value = live.pose[i].toFixed(axis.digits);
+    const slider = at(`range-${axis.name}`);
+    slider.max = Math.max(slider.max, Math.abs(live.pose[i])); // a random pose lies about the truth, not about the guess
+    slider.min = -slider.max;
+    slider.value = live.pose[i];
+    at(`number-${axis.name}`).value = live.pose[i].toFixed(axis.digits).replace(/^-(?=[0.]*$)/, "");
   }
 }
 

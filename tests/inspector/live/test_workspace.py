@@ -71,6 +71,13 @@ def test_random_poses_lie_around_the_truth_or_the_guess(as_is: bool) -> None:
     assert len(set(found)) == 5
 
 
+def test_the_first_random_pose_is_not_the_guess_that_was_drawn_alike() -> None:
+    range_ = MiscalibrationRange(5, 0.5)
+    one = Workspace(FakeSequence(2), [0, 1], Start(range_, 3), seed=3)
+    one.move_randomly(range_)
+    assert pose_error(one.extrinsic, one.guess).rotation_deg > 0.1
+
+
 def test_another_frame_keeps_the_pose() -> None:
     one = workspace()
     one.move(Pose(roll=1.0))
