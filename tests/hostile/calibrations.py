@@ -41,6 +41,11 @@ OTHERS = (
     "<D>0 0 0 0 0</D></opencv_storage>",
     "<robot><joint type='fixed'><parent link='velodyne'/><child link='cam_optical'/><origin xyz='0.2 0 -0.1' "
     "rpy='-1.57 0 -1.57'/></joint></robot>",
+    "<launch><node pkg='tf' type='static_transform_publisher' args='0.2 0 -0.1 -1.57 0 -1.57 velodyne cam_optical 9'/>"
+    "</launch>",
+    "launch:\n- node: {exec: static_transform_publisher, args: '--x 0.2 --qx -0.5 --qy 0.5 --qz -0.5 --qw 0.5 "
+    "--frame-id velodyne --child-frame-id cam_optical'}\n",
+    "P2: 232 0 200 0 0 232 60 0 0 0 1 0\nTr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n",
 )
 """Whole calibrations as other tools write them."""
 VALUES = {
