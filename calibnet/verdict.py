@@ -16,6 +16,8 @@ ACCEPTED: Word = "accepted"
 REJECTED: Word = "rejected"
 CANNOT_TELL: Word = "cannot tell"
 WORDS: tuple[Word, ...] = (ACCEPTED, REJECTED, CANNOT_TELL)
+APART: Literal["apart"] = "apart"
+"""Word for a drive whose result differs from that of its car's other drives."""
 
 CAUSES = (
     "focal-length",
@@ -147,6 +149,17 @@ class Verdict:
             "within": None if self.within is None else self.within._asdict(),
             "frames": {"used": self.used, "skipped": [vars(skipped) for skipped in self.skipped]},
         }
+
+
+def with_its_car(alone: str, by_car: str) -> str:
+    """The word for a drive: its own, or that of all drives of its car where that is more certain or worse.
+
+    Args:
+        alone: of the drive by itself.
+        by_car: of all drives of its car together, `APART`, or empty where they say nothing.
+    """
+    heard: dict[str, tuple[str, ...]] = {CANNOT_TELL: (ACCEPTED, REJECTED, APART), ACCEPTED: (REJECTED, APART)}
+    return by_car if by_car in heard.get(alone, ()) else alone
 
 
 def moved(initial: Extrinsic, final: Extrinsic) -> tuple[float, float]:

@@ -14,12 +14,12 @@ from calibnet.errors import DatasetError
 from calibnet.runtime.reading import require_file
 from calibnet.runtime.schema import validated
 from calibnet.runtime.text import one_line
-from calibnet.verdict import ACCEPTED
+from calibnet.verdict import ACCEPTED, with_its_car
 
 LIST = "list"
 """What ``--data list:FILE`` begins with."""
 LARGEST = 1 << 30
-COLUMNS = ("car", "drive", "dataset", "path", "sequence", "camera", "selection", "options", "verdict")
+COLUMNS = ("car", "drive", "dataset", "path", "sequence", "camera", "selection", "options", "verdict", "by_car")
 REMEDY = "give the fleet.parquet of `calib-inspect fleet`, or rows of it"
 
 
@@ -36,10 +36,16 @@ class ListedDrive:
     selection: str
     options: str
     verdict: str
+    by_car: str = ""
+
+    @property
+    def word(self) -> str:
+        """What is known of its calibration, by itself and by the other drives of its car."""
+        return with_its_car(self.verdict, self.by_car)
 
 
 def open_list(file: Path, verdicts: str = "") -> Iterator[Sequence]:
-    """The drives of a list whose calibration has a verdict, accepted if nothing else is asked for.
+    """The drives of a list whose calibration is accepted, by themselves or by their car, or what else is asked for.
 
     Args:
         file: a Parquet table with `COLUMNS`, more do not matter.
@@ -50,7 +56,7 @@ def open_list(file: Path, verdicts: str = "") -> Iterator[Sequence]:
     """
     wanted = {word.strip() for word in verdicts.split(",")} if verdicts else {ACCEPTED}
     for drive in read_list(file):
-        if drive.verdict in wanted:
+        if drive.word in wanted:
             yield _opened(drive, file)
 
 

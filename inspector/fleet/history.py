@@ -17,8 +17,8 @@ import numpy as np
 from calibnet.geometry.types import Floats
 from calibnet.judging.mount import FEWEST, Finding, Mount, Stay, difference, excess_of, mount_over
 from calibnet.judging.verify import DRIVE, verify
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict
-from inspector.fleet.table import APART, FAILED, ByCar, Row
+from calibnet.verdict import ACCEPTED, APART, CANNOT_TELL, REJECTED, Verdict
+from inspector.fleet.table import FAILED, ByCar, Row
 
 SCATTERED = 3.0
 """Largest scatter of a drive's frames, relative to that of the car's other drives."""

@@ -11,9 +11,10 @@ from urllib.parse import quote
 
 from calibnet.runtime.text import number_of, one_line
 from calibnet.runtime.writing import Kind, write_whole
+from calibnet.verdict import APART
 from inspector.fleet.history import History, histories
 from inspector.fleet.ledger import counted, told_together
-from inspector.fleet.table import APART, FAILED, ORDER, TABLE, Row, off, worst_first
+from inspector.fleet.table import FAILED, ORDER, TABLE, Row, off, worst_first
 from inspector.report.files import PAGE, result_picture
 from inspector.report.template import html_page, stylesheet
 

@@ -18,15 +18,13 @@ from calibnet.runtime.reading import require_file
 from calibnet.runtime.schema import validated
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
-from calibnet.verdict import CAUSES, Verdict
+from calibnet.verdict import APART, CAUSES, Verdict, with_its_car
 from inspector.fleet.drives import Drive
 
 TABLE = "fleet.parquet"
 FAILED = "failed"
 """Word for a drive that could not be read or calibrated."""
 ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
-APART: ByCar = "apart"
-"""Word for a drive whose result differs from that of its car's other drives."""
 ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
 """All words for a drive, worst first."""
 LARGEST = 1 << 30
@@ -98,8 +96,7 @@ class Row:
     @property
     def word(self) -> str:
         """The drive's final word: its own verdict, or that of its car's drives where that is more certain or worse."""
-        heard = {"cannot tell": ("accepted", "rejected", APART), "accepted": ("rejected", APART)}
-        return self.by_car if self.by_car in heard.get(self.verdict, ()) else self.verdict
+        return with_its_car(self.verdict, self.by_car)
 
     @property
     def given(self) -> Extrinsic | None:

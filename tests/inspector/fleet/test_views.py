@@ -288,3 +288,20 @@ def test_a_list_gives_training_the_drives_with_a_good_calibration(invoke: Invoke
     assert bad.name == "folder/tuesday"
     with pytest.raises(DatasetError, match="lists no drive that is failed"):
         open_data(f"list:{file}:failed")
+
+
+def test_a_list_hears_what_the_car_of_a_drive_says(cars: Path, tmp_path: Path) -> None:
+    drive = Drive("a", "monday", "folder", str(cars / "monday"))
+    for alone, by_car, accepted in [
+        ("accepted", "apart", False),
+        ("accepted", "rejected", False),
+        ("cannot tell", "accepted", True),
+        ("cannot tell", "", False),
+        ("rejected", "accepted", False),
+    ]:
+        write_table([row_of(drive, verdict=alone, by_car=by_car)], tmp_path / TABLE)
+        if accepted:
+            assert [one.name for one in open_data(f"list:{tmp_path / TABLE}")] == ["folder/monday"]
+        else:
+            with pytest.raises(DatasetError, match="lists no drive that is accepted"):
+                open_data(f"list:{tmp_path / TABLE}")
