@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from calibnet.geometry import pose_error, transform
+from calibnet.geometry import PoseError, pose_error, transform
 from calibnet.geometry.se3 import rotated
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation
 
@@ -43,6 +43,10 @@ class Tolerance(NamedTuple):
 
     rotation_deg: float
     translation_cm: float
+
+    def holds(self, error: PoseError) -> bool:
+        """Whether an error is within it."""
+        return error.rotation_deg <= self.rotation_deg and error.translation_cm <= self.translation_cm
 
     def __str__(self) -> str:
         return f"{self.rotation_deg:g}° / {self.translation_cm:g} cm"

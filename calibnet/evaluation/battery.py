@@ -26,7 +26,7 @@ from calibnet.judging.causes import Search
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.judging.lag import lags
 from calibnet.trace import CascadeTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_LIMITS, FRAME_LIMITS, REJECTED, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_TOLERANCES, FRAME_TOLERANCES, REJECTED, Tolerance, Verdict
 
 PLAIN = Corruption("none", "", None, unaltered, middle=False)
 """Input as it should be."""
@@ -49,19 +49,26 @@ class BatteryRun:
         error: of the extrinsic that was judged.
         word: of the verdict.
         causes: names of the causes that it gives.
-        limits: degrees and centimetres within which the extrinsic is right.
+        tolerances: that the extrinsic is right within, and a coarser one.
+        within: which of them the verdict is certain of; None without.
     """
 
     corruption: Corruption
     error: PoseError
     word: str
     causes: tuple[str, ...] = ()
-    limits: tuple[float, float] = FRAME_LIMITS
+    tolerances: tuple[Tolerance, ...] = FRAME_TOLERANCES
+    within: Tolerance | None = None
 
     @property
     def is_right(self) -> bool:
         """Whether the extrinsic is within the limits."""
-        return self.error.rotation_deg <= self.limits[0] and self.error.translation_cm <= self.limits[1]
+        return self.tolerances[0].holds(self.error)
+
+    @property
+    def is_overclaimed(self) -> bool:
+        """Whether the verdict is certain of a tolerance though the extrinsic is not even within the coarser one."""
+        return self.within is not None and not self.tolerances[-1].holds(self.error)
 
 
 @dataclass(frozen=True)
@@ -128,6 +135,11 @@ class Battery:
         return float(np.mean(wrong)) if wrong else float("nan")
 
     @property
+    def false_claim_rate(self) -> float:
+        """Share of all runs that are certain to be within the coarser tolerance and are not."""
+        return float(np.mean([run.is_overclaimed for run in self.runs])) if self.runs else float("nan")
+
+    @property
     def acceptance_of_good(self) -> float:
         """Share that is accepted of the runs without fault that end right; not a number without such runs."""
         good = [run for run in self.runs if run.corruption.name == PLAIN.name and run.is_right]
@@ -135,10 +147,11 @@ class Battery:
 
     def as_dict(self) -> dict[str, Any]:
         """The form that JSON files hold; a rate of nothing is null."""
+        names = ("false_accept_rate", "false_claim_rate", "acceptance_of_good")
+        rates = {name: getattr(self, name) for name in names}
         return {
             "rows": [vars(row) for row in self.rows],
-            "false_accept_rate": None if np.isnan(self.false_accept_rate) else self.false_accept_rate,
-            "acceptance_of_good": None if np.isnan(self.acceptance_of_good) else self.acceptance_of_good,
+            **{name: None if np.isnan(rate) else rate for name, rate in rates.items()},
         }
 
 
@@ -182,7 +195,7 @@ def run_battery(
                     verdict = judged(cascade, judge, altered, guess, late)
                     error = pose_error(verdict.camera_from_lidar, altered.camera_from_lidar)
                     names = tuple(cause.name for cause in verdict.causes)
-                    runs.append(BatteryRun(corruption, error, verdict.word, names))
+                    runs.append(BatteryRun(corruption, error, verdict.word, names, within=verdict.within))
                     if observer is not None:
                         observer(runs[-1])
     return Battery(tuple(runs))
@@ -256,7 +269,7 @@ def two_mount_runs(
                     verdict = Verdict(REJECTED, str(failed), guess)
                 assert verdict is not None, "the cascade judges what it finds"
                 error = farthest(verdict.camera_from_lidar, drive)
-                runs.append(BatteryRun(fault or ONE_MOUNT, error, verdict.word, (), DRIVE_LIMITS))
+                runs.append(BatteryRun(fault or ONE_MOUNT, error, verdict.word, (), DRIVE_TOLERANCES, verdict.within))
                 if observer is not None:
                     observer(runs[-1])
     return runs

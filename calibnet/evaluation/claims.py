@@ -36,10 +36,7 @@ class Claims:
             tolerance: the coarser one.
             results: what each claims to be within, and its error.
         """
-        found = [
-            (claim, error.rotation_deg <= tolerance.rotation_deg and error.translation_cm <= tolerance.translation_cm)
-            for claim, error in results
-        ]
+        found = [(claim, tolerance.holds(error)) for claim, error in results]
         claimed = [right for claim, right in found if claim is not None]
         return cls(tolerance, len(found), sum(right for _, right in found), len(claimed), claimed.count(False))
 

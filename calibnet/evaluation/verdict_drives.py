@@ -16,7 +16,7 @@ from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
 from calibnet.evaluation.drives import shares_mount
 from calibnet.evaluation.faulty import Faulty, farthest, readable
-from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking, within
+from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking
 from calibnet.evaluation.virtual import Virtual
 from calibnet.geometry import invert, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
@@ -108,7 +108,7 @@ def measured(
         fault.strength,
         error.rotation_deg,
         error.translation_cm,
-        within(error, DRIVE_LIMITS),
+        DRIVE_LIMITS.holds(error),
         asdict(found) if asked and found is not None else None,
         pose_vector(there @ invert(next(readable(drive)).camera_from_lidar)).tolist(),
         np.linalg.inv(estimate.covariance).tolist(),

@@ -21,7 +21,7 @@ from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import CalibnetError
 from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions
-from calibnet.geometry import MiscalibrationRange, PoseError, invert, pose_error, sample_miscalibration
+from calibnet.geometry import MiscalibrationRange, invert, pose_error, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.classifier import Classifier
@@ -175,17 +175,12 @@ def measured(
         drawn.fault.strength,
         error.rotation_deg,
         error.translation_cm,
-        within(error, FRAME_LIMITS),
+        FRAME_LIMITS.holds(error),
         told(trace),
         pose_vector(last.after @ invert(truth)).tolist(),
         None if last.information is None else last.information.tolist(),
         last.match_error_px,
     )
-
-
-def within(error: PoseError, limits: tuple[float, float]) -> bool:
-    """Whether an error is within limits of degrees and centimetres."""
-    return error.rotation_deg <= limits[0] and error.translation_cm <= limits[1]
 
 
 def asking(cascade: Cascade) -> Cascade:

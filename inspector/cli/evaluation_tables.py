@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from calibnet.verdict import ACCEPTED, DRIVE_LIMITS, FRAME_LIMITS
+from calibnet.verdict import ACCEPTED, DRIVE_TOLERANCES, FRAME_TOLERANCES
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,11 +62,12 @@ def print_battery(battery: Battery, console: Console) -> None:
         counts = (row.runs, row.accepted_right, row.accepted_wrong, row.rejected, row.cannot_tell, row.cause_right)
         table.add_row(f"{row.corruption} {row.strength}".strip(), *map(str, counts))
     console.print(table)
-    (degrees, cm), (of_drive, cm_of_drive) = FRAME_LIMITS, DRIVE_LIMITS
+    frame, drive = FRAME_TOLERANCES, DRIVE_TOLERANCES
+    claims = f"certain to be within {frame[1]} ({drive[1]}) though not: {battery.false_claim_rate:.1%}"
     console.print(
-        f"Accepted though more than {degrees:g}° or {cm:g} cm off (drives, the rows of one and of two mounts: "
-        f"{of_drive:g}° or {cm_of_drive:g} cm): {battery.false_accept_rate:.1%} of {len(battery.runs)} runs. "
-        f"Accepted of the frames without fault that end within that: {battery.acceptance_of_good:.0%}."
+        f"Accepted though not within {frame[0]} (drives, the rows of one and of two mounts: {drive[0]}): "
+        f"{battery.false_accept_rate:.1%} of {len(battery.runs)} runs; {claims}. "
+        f"Accepted of the frames without fault that end right: {battery.acceptance_of_good:.0%}."
     )
 
 

@@ -17,7 +17,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import Search
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.trace import CascadeTrace, StageTrace
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Cause, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_TOLERANCES, REJECTED, Cause, Verdict
 from tests.support.drive import CAMERA, REFERENCE, Drive
 from tests.support.scene import Scenes
 
@@ -46,14 +46,19 @@ def test_rows_count_what_was_said_by_fault_and_strength() -> None:
     assert (mirrored.runs, mirrored.accepted_wrong, mirrored.rejected, mirrored.cause_right) == (3, 1, 2, 1)
     assert battery.false_accept_rate == pytest.approx(2 / 6)
     assert battery.acceptance_of_good == pytest.approx(1 / 2)
-    drive = BatteryRun(PLAIN, off(0.2, 24.9), CANNOT_TELL, (), (0.3, 8.0))
+    drive = BatteryRun(PLAIN, off(0.2, 24.9), CANNOT_TELL, (), DRIVE_TOLERANCES, DRIVE_TOLERANCES[1])
     assert not drive.is_right and runs[1].is_right
+    assert drive.is_overclaimed and not replace(drive, within=None).is_overclaimed
+    assert Battery((drive, *runs)).false_claim_rate == pytest.approx(1 / 7)
+    assert not replace(drive, error=off(0.4, 14.9)).is_overclaimed
     assert battery.as_dict()["rows"][0] == vars(plain)
 
 
 def test_rates_of_nothing_are_null() -> None:
     assert math.isnan(Battery(()).false_accept_rate)
-    assert Battery(()).as_dict() == {"rows": [], "false_accept_rate": None, "acceptance_of_good": None}
+    assert Battery(()).as_dict() == {
+        "rows": [], "false_accept_rate": None, "false_claim_rate": None, "acceptance_of_good": None,
+    }  # fmt: skip
 
 
 class HalfWay:

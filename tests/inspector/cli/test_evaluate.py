@@ -177,7 +177,7 @@ def test_the_battery_is_a_table_and_its_json_the_object_of_its_rows(rig: Path, t
     arguments = ["--dataset", "folder", "--root", str(rig), "--range", "5/0.5", "--frames", "0:2", "--battery"]
     code = run(cli, ["evaluate", *arguments, "--json", str(file)])
     content = json.loads(file.read_text())
-    assert code == 0 and content.keys() == {"rows", "false_accept_rate", "acceptance_of_good"}
+    assert code == 0 and content.keys() == {"rows", "false_accept_rate", "false_claim_rate", "acceptance_of_good"}
     rows = {(row["corruption"], row["strength"]): row for row in content["rows"]}
     assert {"none", "mirrored", "focal-length", "late-scan", "units"} <= {name for name, _ in rows}
     assert rows["mirrored", ""]["runs"] == rows["mirrored", ""]["rejected"] == rows["mirrored", ""]["cause_right"] == 2
