@@ -38,7 +38,7 @@ wasm_bindgen.WebHandle = class {
 };
 """
 Open = Callable[[LiveSession], str]
-PATIENCE = 30_000
+PATIENCE = 120_000
 """Milliseconds that a busy machine may take for what a quiet one does at once."""
 
 
@@ -67,7 +67,13 @@ def serve(tmp_path: Path) -> Iterator[Open]:
 
 def fresh(browser: Browser) -> Page:
     """A window in which Playwright may wait by evaluating, which the page's policy forbids."""
-    return browser.new_page(viewport={"width": 1366, "height": 768}, bypass_csp=True)
+    return patient(browser.new_page(viewport={"width": 1366, "height": 768}, bypass_csp=True))
+
+
+def patient(page: Page) -> Page:
+    """A page whose every wait, that for its loading among them, has `PATIENCE`."""
+    page.set_default_timeout(PATIENCE)
+    return page
 
 
 def opened(browser: Browser, address: str) -> Page:
@@ -156,7 +162,7 @@ def test_the_page_and_its_viewer_keep_to_the_policy(
 ) -> None:
     from playwright.sync_api import expect
 
-    page = browser.new_page(viewport={"width": 1366, "height": 768})
+    page = patient(browser.new_page(viewport={"width": 1366, "height": 768}))
     complaints: list[str] = []
     page.on("console", lambda said: complaints.append(said.text))
     page.goto(serve(make()))
