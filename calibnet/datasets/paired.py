@@ -33,6 +33,10 @@ SCANS_LOOKED_AT = 4
 """Scans of a drive that are read to find the scale of its intensity."""
 
 
+NOTES = ".txt"
+"""Ending of files that are scans only where nothing else is: beside others they are labels, or notes."""
+
+
 class Both(NamedTuple):
     """An image and the scan taken with it."""
 
@@ -169,9 +173,11 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
         DatasetError: there is none, or two share a stem.
     """
     files: dict[str, Path] = {}
-    for path in sorted(folder.iterdir(), key=_in_order):
-        suffix = ending(path, suffixes)
-        if not suffix or path.name.startswith(".") or path.name == TIMES:
+    found = [(path, ending(path, suffixes)) for path in sorted(folder.iterdir(), key=_in_order) if path.name != TIMES]
+    found = [(path, suffix) for path, suffix in found if suffix and not path.name.startswith(".")]
+    are_notes = any(suffix != NOTES for _, suffix in found)
+    for path, suffix in found:
+        if suffix == NOTES and are_notes:
             continue
         stem = unicodedata.normalize("NFC", path.name[: -len(suffix)])  # macOS takes letters and accents apart
         if stem in files:

@@ -288,7 +288,7 @@ NAMED = {
     "comma": "x,y,z,intensity\n{,}",
     "CloudCompare's comment": "//X Y Z Intensity\n{ }",
     "another comment": "# made today\n\n# x  y  z  i\n{ }",
-    "units, semicolons, a mark of order, Windows's ends": "\ufeffX (m);Y [m];z_m;Reflectivity\r\n{;}",
+    "units, semicolons, a mark of order": "\ufeffX (m);Y [m];z_m;Reflectivity\n{;}",
     "VeloView's": '"Points_m_XYZ:0","Points_m_XYZ:1","Points_m_XYZ:2","intensity"\n{,}',
     "none, blanks": "{ }",
     "none, tabs": "{\t}",
@@ -300,12 +300,15 @@ NAMED = {
 @pytest.mark.parametrize("way", NAMED)
 @pytest.mark.parametrize("suffix", [".csv", ".xyz", ".txt"])
 def test_clouds_of_text(write_layout, way, suffix):
-    def write(path: Path, rows: np.ndarray) -> None:
-        head, separator = re.fullmatch(r"(.*)\{(.+)\}", NAMED[way], re.DOTALL).groups()
-        lines = [separator.join(map(repr, row)) for row in rows.astype(np.float64).tolist()]
-        path.write_bytes((head + ("\r\n" if "\r" in head else "\n").join(lines) + "\n").encode())
-
-    assert_array_equal(in_folder(write_layout("folder"), f"0001{suffix}", write), scan()[:, :4])
+    layout = write_layout("folder")
+    head, separator = re.fullmatch(r"(.*)\{(.+)\}", NAMED[way], re.DOTALL).groups()
+    lines = [separator.join(map(repr, row)) for row in scan()[:, :4].astype(np.float64).tolist()]
+    for path in layout.scans:
+        path.unlink()
+        path.with_suffix(suffix).write_text(
+            head + "\n".join(lines) + "\n", newline="\r\n" if separator == ";" else "\n"
+        )
+    assert_array_equal(layout.open()[1].points, scan()[:, :4])
 
 
 def test_columns_of_text_are_found_by_name_among_words_and_dropouts():
@@ -336,6 +339,13 @@ def test_times_beside_the_scans_are_none(write_layout):
     layout = write_layout("folder")
     (layout.scans[0].parent / "timestamps.txt").write_text("0.0\n0.1\n0.2\n")
     assert len(layout.open()) == 3
+
+
+def test_texts_beside_the_scans_are_labels(write_layout):
+    layout = write_layout("folder")
+    for name in ("0000.txt", "README.txt"):
+        (layout.scans[0].parent / name).write_text("Car 0.00 0 -1.57\n")
+    assert [one.scan.suffix for one in layout.open().files] == [".bin"] * 3
 
 
 def test_a_viewpoint_of_a_pcd_is_refused_unless_it_is_none():
