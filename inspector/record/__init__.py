@@ -1,1 +1,1 @@
-"""What a run leaves behind: a Rerun recording of every frame and stage, and the layout that shows it."""
+"""Records a run with Rerun: every frame and stage, and the layout that shows them."""

@@ -1,4 +1,4 @@
-"""What a recording is to contain: which parts of each frame, how densely, and what colours its points."""
+"""The contents of a recording: parts of each frame, their density, and the colouring of points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from calibnet.trace import ScaleTrace, StageDetail
 
 
 class Detail(StrEnum):
-    """How much of each frame is logged: a light set of views, everything, or the parts that are named."""
+    """How much of each frame to log: a light set of views, everything, or selected parts."""
 
     OVERVIEW = "overview"
     FULL = "full"
@@ -17,7 +17,7 @@ class Detail(StrEnum):
 
 
 class Part(StrEnum):
-    """What can be left out; image, overlays of start and result, extrinsics and table are always there."""
+    """Optional parts of a frame; image, overlays of start and result, extrinsics and table are always logged."""
 
     CURVES = "curves"
     OVERLAYS = "overlays"
@@ -28,7 +28,7 @@ class Part(StrEnum):
 
 
 class Coloring(StrEnum):
-    """What the colour of an overlay's points stands for."""
+    """Quantity that colours the points of an overlay."""
 
     DEPTH = "depth"
     INTENSITY = "intensity"
@@ -38,13 +38,13 @@ class Coloring(StrEnum):
 
 @dataclass(frozen=True)
 class Contents:
-    """What is logged of each frame.
+    """What to log of each frame.
 
     Attributes:
-        parts: which parts.
-        dense: many points, at a quarter of a pixel, and the cost volumes of every scale; otherwise few points and
-            the finest scale, for a megabyte a frame at most.
-        color: of the overlays' points; ``error`` needs a reference.
+        parts: parts to log.
+        dense: whether to log many points, rounded to a quarter of a pixel, and the cost volumes of every scale;
+            otherwise few points and the finest scale, for at most a megabyte per frame.
+        color: colouring of the overlays' points; ``error`` needs a reference.
     """
 
     parts: frozenset[Part]
@@ -60,11 +60,11 @@ class Contents:
 
     @property
     def inside(self) -> bool:
-        """Whether anything is logged that only the network's intermediate results show."""
+        """Whether anything is logged that needs the network's intermediate results."""
         return bool(self.parts & {Part.VOLUMES, Part.HOURGLASS, Part.TENSORS})
 
     def scales(self, results: StageDetail | None) -> tuple[ScaleTrace, ...]:
-        """The cost volumes that are shown, fine to coarse; none where the run kept none."""
+        """The cost volumes to show, fine to coarse; none where the run kept none."""
         if results is None or not self.inside:
             return ()
         return results.scales if self.dense else results.scales[:1]

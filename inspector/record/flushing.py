@@ -1,4 +1,4 @@
-"""Handing everything that was logged to the files and viewers, which may have ceased to take it."""
+"""Flushes a recording to its files and viewers, which may no longer accept it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ FLUSH_TIMEOUT_S = 60.0
 
 
 class RecordingLostError(CalibnetError):
-    """Nothing can be written any more; Rerun would wait for it for ever, even when the process ends."""
+    """The recording can no longer be written; Rerun would wait for ever, even at the end of the process."""
 
 
 def flush(rec: rr.RecordingStream) -> None:
-    """Hand all rows to the sinks.
+    """Flush all rows to the sinks.
 
     Raises:
-        RecordingLostError: the file's writer has given up, for instance on a quota.
-        RuntimeError: a viewer has gone.
+        RecordingLostError: the file's writer has failed, for instance because of a quota.
+        RuntimeError: a viewer has closed.
     """
     try:
         rec.flush(timeout_sec=FLUSH_TIMEOUT_S)

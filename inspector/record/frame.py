@@ -1,4 +1,4 @@
-"""What is recorded of every frame, whichever tabs are shown: image, table, verdict, extrinsics and camera."""
+"""Logs what every recording has of a frame, whatever its tabs: image, table, verdict, extrinsics and camera."""
 
 from __future__ import annotations
 
@@ -36,22 +36,22 @@ def log_frame(rec: Subtree, observation: Observation, contents: Contents) -> Non
 
 
 def log_image(rec: Subtree, frame: Frame) -> None:
-    """The picture as the camera took it."""
+    """Log the image as the camera took it."""
     rec.log(entities.IMAGE, image_of(frame))
 
 
 def image_of(frame: Frame) -> rr.EncodedImage | rr.Image:
-    """The picture as the camera took it, for an entity."""
+    """The image as the camera took it, as a component."""
     return rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY)
 
 
 def verdict_values(verdict: Verdict) -> rr.AnyValues:
-    """A verdict as the text that `inspector.read.verdict.read_verdict` reads."""
+    """A verdict as text, which `inspector.read.verdict.read_verdict` reads."""
     return rr.AnyValues(verdict_json=json.dumps(verdict.as_dict()))
 
 
 def _log_extrinsics(rec: Subtree, observation: Observation) -> None:
-    """Every extrinsic as numbers in full precision, which reports and exports read."""
+    """Log every extrinsic in full precision, for reports and exports."""
     trace = observation.trace
     extrinsics = {entities.EXTRINSIC_INITIAL: trace.initial, entities.EXTRINSIC_CORRECTED: trace.corrected}
     extrinsics |= {entities.extrinsic_stage(stage.number): stage.after for stage in trace.stages}
@@ -62,7 +62,7 @@ def _log_extrinsics(rec: Subtree, observation: Observation) -> None:
 
 
 def _log_camera(rec: Subtree, observation: Observation) -> None:
-    """The camera as it is, lens included, and the image's file name without its folder."""
+    """Log the camera, lens included, and the image's file name without its folder."""
     camera = observation.frame.as_taken.camera
     values = rr.AnyValues(
         width=camera.width,

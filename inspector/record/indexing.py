@@ -1,9 +1,9 @@
-"""The end of a recording: written anew in few large chunks, with the footer that lists them.
+"""Indexes a finished recording: rewrites it in few large chunks, with the footer that lists them.
 
-While a run goes on, every frame is handed to the file at once, in a chunk an entity, so that a kill loses only the
-frame in work. Those are too many chunks for good: each costs 3 kB of file, and Rerun's file sink keeps 11 kB of memory
-of each for the footer. So a growing recording has no footer, and memory does not grow with it; this module makes it
-one afterwards. How chunks are cut depends on what is recorded alone, not on the pace of the run.
+During a run, every frame is written to the file at once, in one chunk per entity, so that a kill loses only the current
+frame. These chunks are too many to keep: each costs 3 kB of file, and Rerun's file sink keeps 11 kB of memory of each
+for the footer. A growing recording therefore has no footer, and memory does not grow with it; this module adds the
+footer afterwards. How chunks are cut depends only on the data, not on the pace of the run.
 """
 
 from __future__ import annotations
@@ -26,45 +26,46 @@ if TYPE_CHECKING:
     from rerun.chunk import LazyChunkStream
 
 CHUNK_BYTES = 2 << 20
-"""Size of a chunk, as Rerun's own `rrd optimize` cuts them; at most so much of every entity is held in memory."""
+"""Size of a chunk, as in Rerun's own `rrd optimize`; at most this much of every entity is held in memory."""
 MOST_BATCHES = 32
-"""Most batches of an entity's rows that are held at the same time."""
+"""Largest number of batches of an entity's rows that are held at the same time."""
 ROUND_BYTES, ROUND_SHARE = 8 << 20, 2
-"""What comes between two rounds, in which chunks end whatever their size: so many bytes at least, and half of what was
-written before. So the front part of a file, as of a copy that is not complete, is of use, and chunks remain few."""
+"""Bytes between two rounds at which all chunks end whatever their size: at least the first, and a half (by the second)
+of what was written before. The front part of an incomplete copy is then of use, and chunks remain few."""
 SORTED = b"rerun:is_sorted"
-"""Metadata of a column that was found to be sorted; Rerun finds that out anew where it is not said."""
+"""Metadata of a column that is known to be sorted; without it, Rerun checks again."""
 
 
 class NotIndexedError(CalibnetError):
-    """The recording keeps its data but gets no index: there is no room for a second copy, or it was not waited for."""
+    """The recording is complete but has no index, for lack of disk space or because of an interruption."""
 
     def __init__(self, file: Path, why: str, remedy: str) -> None:
-        """Say why, and when to do what."""
+        """Make the sentence from the reason and the remedy."""
         super().__init__(
-            f"{file} has no index, {why}, and is read like one that was cut off; {remedy}: "
-            f"rerun rrd optimize {file} -o NEW.rrd."
+            f"{file} has no index, {why}, and opens more slowly; {remedy}: rerun rrd optimize {file} -o NEW.rrd."
         )
 
 
 def index(
     file: Path, opened: Callable[[Path], rr.RecordingStream], advance: Callable[[int, int], bool] | None = None
 ) -> None:
-    """Write a recording anew with its footer; what it was before stays until that is complete.
+    """Rewrite a recording with its footer; the original is kept until the new file is complete.
 
     Args:
-        file: a recording without a footer, which nothing writes to any more.
-        opened: makes the stream of the same recording to another file, with its blueprint.
-        advance: called again and again with the bytes written and about how many there will be; says whether to go on.
+        file: a recording without a footer that is no longer being written.
+        opened: opens a stream of the same recording to another file, with its blueprint.
+        advance: called repeatedly with the bytes written and the approximate total; returns whether to go on.
 
     Raises:
-        NotIndexedError: the disk has no room for it, or ``advance`` said no; the recording stays as it is.
-        RecordingLostError: it can no longer be written, for instance because of a quota; likewise.
+        NotIndexedError: the disk has no room, or ``advance`` returned false; the recording is unchanged.
+        RecordingLostError: the new file cannot be written, for instance because of a quota; likewise.
         OSError: the file cannot be replaced.
     """
     size = file.stat().st_size
     if shutil.disk_usage(file.parent).free < size:
-        raise NotIndexedError(file, f"for which the disk lacks {size / 1e6:.0f} MB", "with more room")
+        raise NotIndexedError(
+            file, f"since the disk lacks {size / 1e6:.0f} MB for it", "to add it, free some space and run"
+        )
 
     def write(partial: Path) -> None:
         stream = opened(partial)
@@ -73,14 +74,14 @@ def index(
             flush(stream)
             if advance is not None and not advance(partial.stat().st_size, size):
                 stream.disconnect()
-                raise NotIndexedError(file, "as its making was interrupted", "to make it")
+                raise NotIndexedError(file, "since indexing was interrupted", "to add it, run")
         stream.disconnect()
 
     write_whole(file, write, Kind.RECORDING)
 
 
 def merged(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
-    """The same in fewer chunks, of `CHUNK_BYTES` where there is so much of an entity."""
+    """The same data in fewer chunks, of `CHUNK_BYTES` where an entity has that much."""
     held: dict[tuple[str, bool, tuple[str, ...]], _Rows] = {}
     before = now = 0
     for chunk in chunks:
@@ -101,30 +102,30 @@ def merged(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
 
 
 def _in_order(held: dict[tuple[str, bool, tuple[str, ...]], _Rows]) -> Iterator[Chunk]:
-    """Every entity's chunk, by its name: Rerun hands them over in an order of its own."""
+    """The chunk of every entity, sorted by name, since Rerun's order varies."""
     yield from (held[key].chunk(key[1]) for key in sorted(held))
 
 
 class _Rows:
-    """Rows of an entity that will be one chunk."""
+    """Rows of an entity that will form one chunk."""
 
     def __init__(self) -> None:
         self.size = 0
         self._batches: list[pa.RecordBatch] = []
 
     def fits(self, batch: pa.RecordBatch) -> bool:
-        """Whether other rows are of the same types."""
+        """Whether the rows have the same types."""
         return bool(self._batches[0].schema.equals(batch.schema))
 
     def add(self, batch: pa.RecordBatch) -> None:
-        """Take more rows in; many small batches would take far more memory than what they hold."""
+        """Add rows; batches are joined, since many small ones take far more memory than their content."""
         self.size += batch.nbytes
         self._batches.append(batch)
         if len(self._batches) >= MOST_BATCHES:
             self._batches = [self._joined()]
 
     def chunk(self, is_static: bool) -> Chunk:
-        """All rows; of what holds at all times the last one, which the others gave way to."""
+        """A chunk of all rows or, for static data, of the last row, which overrides the others."""
         rows = self._joined()
         last = rows.slice(rows.num_rows - 1)
         alone = is_static and not any(column.null_count for column in last.columns)
@@ -142,5 +143,5 @@ class _Rows:
 
 def _chunks(file: Path) -> LazyChunkStream:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that there is no footer
+        warnings.simplefilter("ignore")  # the missing footer
         return RrdReader(file).stream()

@@ -1,4 +1,4 @@
-"""One calibrated frame as the inspector sees it, and what a whole recording contains."""
+"""One calibrated frame as the inspector records it, and the layout of a recording."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ class Skipped(Protocol):
 
     @property
     def number(self) -> int:
-        """1 to 5."""
+        """Number of the stage, 1 to 5."""
         ...
 
     @property
     def reason(self) -> str:
-        """One sentence that names the stage."""
+        """Reason in one sentence that names the stage."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """A frame, what the cascade did to it and, where known, the truth.
+    """A frame, the cascade's trace of it and, if known, the reference.
 
     Attributes:
-        frame: what was calibrated.
-        trace: the run of the cascade on it.
-        reference: the true ``camera_from_lidar``, or None where nobody knows it.
-        skipped: stages that were asked for and have no weights.
-        given: the verdict on the extrinsic that the run started from, where this frame alone is to verify it.
+        frame: the calibrated frame.
+        trace: trace of the cascade on the frame.
+        reference: the true ``camera_from_lidar``; None if unknown.
+        skipped: requested stages that have no weights.
+        given: verdict on the extrinsic that the run started from, if this frame alone is to verify it.
     """
 
     frame: Frame
@@ -56,11 +56,11 @@ class Observation:
 
     @property
     def start(self) -> str:
-        """What the extrinsic before the first stage is called in captions and tables."""
+        """Name of the initial extrinsic in captions and tables."""
         return "as given" if self.reference is None else "miscalibrated"
 
     def projected(self, camera_from_lidar: Extrinsic) -> Projection:
-        """The scan in the picture as it was taken, rows far to near; each extrinsic of the run is projected once."""
+        """The scan projected into the image as taken, rows far to near; computed once per extrinsic of the run."""
         key = camera_from_lidar.tobytes()
         if key not in self._projections:
             camera = self.frame.as_taken.camera
@@ -74,9 +74,9 @@ class Observation:
 
     @cached_property
     def _in_front(self) -> NDArray[np.intp]:
-        """Rows of the scan before the camera under any extrinsic of the run: half of what a scanner sees.
+        """Rows of the scan in front of the camera under any extrinsic of the run, about half of a scan.
 
-        All of them for a lens that may see to the side.
+        All rows for a lens that may see sideways.
         """
         if not self.frame.as_taken.camera.is_pinhole:
             return np.arange(len(self.frame.points))
@@ -90,7 +90,7 @@ class Observation:
         """A length in a stage's input image as one in the frame's own."""
         if stage.upright is None:
             return pixels * self.frame.camera.width / stage.camera.width
-        return pixels * self.frame.camera.focal[0] / stage.camera.focal[0]  # it was cut as well
+        return pixels * self.frame.camera.focal[0] / stage.camera.focal[0]  # the image may be cropped as well
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""
@@ -98,7 +98,7 @@ class Observation:
 
     @property
     def worse(self) -> bool:
-        """Whether the result is known to be farther off than the start, in angle or place."""
+        """Whether the result is known to be worse than the start, in rotation or translation."""
         before, after = self.error(self.trace.initial), self.error(self.trace.corrected)
         if before is None or after is None:
             return False
@@ -106,10 +106,9 @@ class Observation:
 
     @property
     def badness(self) -> float:
-        """What makes a frame the worst of a run: degrees and decimetres that it ended off the reference.
+        """Figure by which the worst frame of a run is found: the error of its result in degrees plus decimetres.
 
-        Without a reference, the pixels by which its last stage expects its matches to be off; -inf where it expects
-        nothing.
+        Without a reference, the match error that its last stage expects, in pixels; -inf where there is none.
         """
         error = self.error(self.trace.corrected)
         if error is not None:
@@ -130,7 +129,7 @@ class Grid(NamedTuple):
 
     @classmethod
     def of(cls, scale: ScaleTrace) -> Grid:
-        """Those of a scale of a stage."""
+        """The grid of one scale of a stage."""
         _, window, height, width = scale.volume.shape
         return cls(scale.stride, height, width, window)
 
@@ -140,11 +139,11 @@ class StageLayout:
     """A stage that appears in the recording.
 
     Attributes:
-        number: 1 to 5.
-        range: for instance ``"5/0.5"``.
+        number: number of the stage, 1 to 5.
+        range: range of the stage, for instance ``"5/0.5"``.
         grids: stride, height and width in cells of each cost volume that is shown, fine to coarse.
-        exhibits: names of what a method shows of it, in pictures.
-        curves: and in curves.
+        exhibits: names of a method's pictures of the stage.
+        curves: names of a method's curves of the stage.
     """
 
     number: int
@@ -155,29 +154,29 @@ class StageLayout:
 
     @property
     def short(self) -> str:
-        """For legends and tabs."""
+        """Name for legends and tabs."""
         return f"Stage {self.number}"
 
     @property
     def title(self) -> str:
-        """For view names, for instance ``"Stage 3 (±5°/0.5 m)"``."""
+        """Name for views, for instance ``"Stage 3 (±5°/0.5 m)"``."""
         return f"Stage {self.number} ({MiscalibrationRange.parse(self.range).label})"
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What a recording contains, known after its first frame; the blueprint shows exactly this.
+    """The content of a recording, known after its first frame, which the blueprint shows.
 
     Attributes:
-        stages: those that ran.
-        has_reference: whether errors and a reference overlay exist.
-        contents: what is logged of each frame.
+        stages: the stages that ran.
+        has_reference: whether there are errors and an overlay of the reference.
+        contents: what to log of each frame.
         image: width and height of the first frame's image, in pixels.
-        position: of the camera in the LiDAR frame, metres.
-        forward: its viewing direction there, of unit length.
+        position: position of the camera in the LiDAR frame, in metres.
+        forward: viewing direction of the camera there, of unit length.
         with_drive: whether an estimate from the whole drive follows the frames.
-        with_watch: whether it also tells if the mount moved meanwhile.
-        with_fit: whether its stages say what error they expect of their matches.
+        with_watch: whether it is also watched for moves of the mount.
+        with_fit: whether its stages expect a match error.
         method: name of the method that ran; empty for the cascade.
         frames: numbers of the first and the last frame; None where the last is not known yet.
     """
@@ -196,22 +195,22 @@ class Layout:
 
     @property
     def start(self) -> str:
-        """What the extrinsic before the first stage is called in names of views."""
+        """Name of the initial extrinsic in names of views."""
         return "Miscalibrated" if self.has_reference else "As given"
 
     @property
     def several(self) -> bool:
-        """Whether several frames are known to follow one another."""
+        """Whether the recording is known to have several frames."""
         return self.frames is not None and self.frames[0] != self.frames[1]
 
     @property
     def with_worst(self) -> bool:
-        """Whether one of its frames is known to be the worst."""
+        """Whether a worst frame is shown."""
         return self.several and (self.has_reference or self.with_fit)
 
     @property
     def stages_with_volumes(self) -> tuple[StageLayout, ...]:
-        """The stages whose cost volumes are shown: all, or none where the run kept no details."""
+        """The stages whose cost volumes are shown: all, or none if the run kept no details."""
         return tuple(stage for stage in self.stages if stage.grids)
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What came of a run as properties of its recording: columns that a catalogue of recordings sorts and filters by."""
+"""The outcome of a run as properties of its recording, by which a catalogue of recordings sorts and filters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from calibnet.verdict import Verdict
 
 
 def outcome_values(verdict: Verdict, reference: Extrinsic | None = None) -> rr.AnyValues:
-    """The columns: word, causes, degrees and centimetres moved, sigma and error where they are known, frames."""
+    """The columns: word, causes, correction in degrees and centimetres, sigma and error if known, number of frames."""
     sigma = (verdict.sigma_rotation_deg, verdict.sigma_translation_cm)
     error = (None, None) if reference is None else _error(verdict.camera_from_lidar, reference)
     values: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, a viewer on this machine, a web viewer, or one that runs elsewhere."""
+"""Outputs of a recording: a file, a viewer on this machine, a web viewer, or a running viewer elsewhere."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from calibnet.runtime.writing import Kind
 from inspector.programs import LOCALHOST, SWITCHED_OFF, listening, open_window
 
 RESERVE_BYTES = 32 * 1024 * 1024
-"""Free disk space below which recording stops, while what is at hand can still be written."""
+"""Free disk space below which recording stops, so that the current data can still be written."""
 
 
 @dataclass
 class Outputs:
-    """The sinks of one recording, and the servers and processes they need.
+    """The sinks of one recording, and the servers and processes that they need.
 
     Attributes:
-        file: ``.rrd`` to write; an earlier one is put aside when the first frame is there, and removed by `complete`.
-        viewer: open the viewer in a window.
-        serve: offer the web viewer, behind the guard of all pages.
-        connect: gRPC address of a viewer that runs already.
-        bind: address that the web viewer is served at.
-        numbered: ``file`` is a name of ours, which gets a number where a file has it already.
-        replaced: `complete` has removed an earlier recording.
+        file: ``.rrd`` to write; an earlier one is moved aside at the first frame, and removed by `complete`.
+        viewer: whether to open the viewer in a window.
+        serve: whether to serve the web viewer, behind the guard of all pages.
+        connect: gRPC address of a running viewer.
+        bind: address on which the web viewer is served.
+        numbered: whether ``file`` was chosen by us, and gets a number if a file of this name exists.
+        replaced: whether `complete` has removed an earlier recording.
         page: address of the web viewer, once it is served.
     """
 
@@ -57,18 +57,20 @@ class Outputs:
     _shown: list[Any] | None = field(default=None, init=False, repr=False)
 
     def check(self) -> None:
-        """Find out before the work whether the outputs can be opened, and claim the file until `close`.
+        """Check before the work that the outputs can be opened, and claim the file until `close`.
 
         Raises:
-            ConfigError: the file may not or cannot be written, nothing listens at ``connect``, or this machine has no
-                address ``bind``.
+            ConfigError: the file must not or cannot be written, nothing listens at ``connect``, or ``bind`` is not an
+                address of this machine.
         """
         if os.environ.get("RERUN", "").lower() in SWITCHED_OFF:
-            raise ConfigError("RERUN in the environment switches Rerun off, so nothing would be recorded; unset it.")
+            raise ConfigError(
+                "The environment variable RERUN switches Rerun off, so nothing would be recorded; unset it."
+            )
         if self.connect is not None:
             check_viewer(self.connect)
         if self.serve:
-            from inspector.serving.server import bound_socket  # only who serves waits for a server's import
+            from inspector.serving.server import bound_socket  # imported late, since importing a server takes time
 
             bound_socket(self.bind).close()
         if self.file is not None:
@@ -80,7 +82,7 @@ class Outputs:
                 raise
 
     def check_space(self) -> None:
-        """Raise `ConfigError` when the disk is about to be full."""
+        """Raise `ConfigError` if the disk is almost full."""
         if self.file is not None and shutil.disk_usage(self.file.parent).free < RESERVE_BYTES:
             raise ConfigError(
                 f"The disk of {self.file} is full: less than {RESERVE_BYTES >> 20} MB are free; "
@@ -88,7 +90,7 @@ class Outputs:
             )
 
     def show(self) -> bool:
-        """Open the viewer and serve the page, before there is anything in them; returns whether they were not yet."""
+        """Open the viewer and serve the page, still empty; returns whether this call opened them."""
         if self._shown is not None:
             return False
         self._shown = []
@@ -104,31 +106,31 @@ class Outputs:
         return True
 
     def open(self) -> Sequence[Any]:
-        """Create the file, see that everything is shown, and return the file's path and Rerun's sinks."""
+        """Create the file and open the viewers; returns the file's path and Rerun's sinks."""
         file = [] if self.file is None else [self._claimed(self.file).begin()]
         self.show()
         self._begun.set()
         return [*file, *(self._shown or [])]
 
     def wait_while_serving(self) -> None:
-        """Return at Ctrl-C or SIGTERM; at once where nothing is served. The recording grows no more."""
+        """Serve until Ctrl-C or SIGTERM; returns at once if nothing is served. The recording must be complete."""
         self._ended.set()
         if self.page is not None:
             with StopRequest() as stop:
                 stop.wait()
 
     def complete(self) -> None:
-        """The recording is closed and whole: an earlier one of its name is removed."""
+        """Remove an earlier recording of the same name, since the new one is complete."""
         if self._claim is not None:
             self.replaced = self._claim.complete()
 
     @property
     def earlier(self) -> Path | None:
-        """Where an earlier recording of the same name lies, until `complete`."""
+        """Path of an earlier recording of the same name until `complete`; None without one."""
         return None if self._claim is None else self._claim.earlier
 
     def close(self) -> None:
-        """Stop the web server and let others write the file; an opened viewer stays."""
+        """Stop the web server and release the file; an opened viewer stays open."""
         if self._claim is not None:
             self._claim.release()
         self._ended.set()
@@ -146,12 +148,15 @@ class Outputs:
         except ConfigError:
             if self.file is None:
                 raise
-            self.viewer = False  # a screen was promised and is not there: the file is what remains
+            self.viewer = False  # the display does not work, so only the file is left
             return []
 
     def _serve(self, file: Path, folder: Path) -> None:
-        """Give out a file while it grows, in Rerun's web viewer, whose files go to a folder."""
-        from inspector.serving.recording import RECORDING, recording_app  # only who serves waits for a server's import
+        """Serve a growing file in Rerun's web viewer, whose files are put into a folder."""
+        from inspector.serving.recording import (
+            RECORDING,
+            recording_app,
+        )  # imported late, since importing a server takes time
         from inspector.serving.server import PageServer
         from inspector.serving.viewer_files import INDEX, fetch_viewer
 
@@ -162,10 +167,10 @@ class Outputs:
 
 
 def check_viewer(url: str) -> None:
-    """Find out whether a viewer listens at an address.
+    """Check that a viewer listens at an address.
 
     Raises:
-        ConfigError: none does, or it is no address.
+        ConfigError: none does, or the address is not valid.
     """
     host, port = _address(url)
     if not listening(host, port):
@@ -176,20 +181,22 @@ def _address(url: str) -> tuple[str, int]:
     """Host and port of a viewer's address.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: it is not a valid address.
     """
     try:
         address = urlsplit(url)
         host, port = address.hostname, address.port or 9876
-    except ValueError:  # a port that is none, a bracket too many
+    except ValueError:  # an invalid port, or a bracket too many
         host = None
     if host is None or address.scheme not in ("rerun", "rerun+http", "rerun+https"):
-        raise ConfigError(f"--connect {url} is not a valid address, for instance rerun+http://127.0.0.1:9876/proxy.")
+        raise ConfigError(
+            f"--connect {url} is not a valid address; give for instance rerun+http://127.0.0.1:9876/proxy."
+        )
     return host, port
 
 
 def has_display() -> bool:
-    """Whether a window could open."""
+    """Whether a window can open."""
     if platform.system() != "Linux" or os.environ.get("WAYLAND_DISPLAY"):
         return True
     display = os.environ.get("DISPLAY", "")

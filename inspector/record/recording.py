@@ -1,8 +1,8 @@
 """A Rerun recording of a calibration run: opened with its first frame, closed with a footer.
 
 The same input and seed give the same data, in the same chunks (``rerun rrd compare --unordered``): no wall-clock
-timeline, an id made from the run's options. Every frame is handed to the file when it is logged, so that memory stays
-bounded and a killed run leaves all frames but the one in work.
+timeline, an id made from the run's options. Every frame is flushed to the file when it is logged, so that memory stays
+bounded and a killed run keeps all frames but the current one.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from inspector.record.tabs.registry import wanted_tabs
 from inspector.record.tabs.watch import log_watch
 
 HANDED_BACK_EVERY = 16
-"""Frames after which free memory is handed back."""
+"""Number of frames after which free memory is returned to the system."""
 
 
 @dataclass(frozen=True)
 class RunDescription:
-    """What identifies a run.
+    """The identity of a run.
 
     Attributes:
-        title: for the viewer's list of recordings, for instance ``"kitti-odometry/04"``.
-        options: everything that changes the data, such as seed, range and preset.
-        provenance: what else a reader may ask for, such as versions; does not change the identity.
+        title: title in the viewer's list of recordings, for instance ``"kitti-odometry/04"``.
+        options: all options that affect the data, such as seed, range and preset.
+        provenance: further information, such as versions, which is not part of the identity.
     """
 
     title: str
@@ -54,7 +54,7 @@ class RunDescription:
 
     @property
     def recording_id(self) -> str:
-        """The same for the same title and options, another otherwise."""
+        """An id that depends only on title and options."""
         text = repr((self.title, sorted(self.options.items())))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -63,12 +63,12 @@ class Recording:
     """Logs observations to files and viewers; a context manager that closes properly."""
 
     def __init__(self, sinks: Sequence[Any], description: RunDescription, layout: Layout) -> None:
-        """Open the sinks and log what holds for the whole recording: title, properties, layout, legends.
+        """Open the sinks and log what applies to the whole recording: title, properties, layout and legends.
 
         Args:
             sinks: files and Rerun sinks, see `inspector.record.outputs`.
-            description: identifies the run.
-            layout: what the recording will contain.
+            description: identity of the run.
+            layout: content of the recording.
         """
         self._layout, self._contents = layout, layout.contents
         self._tabs = wanted_tabs(layout)
@@ -83,10 +83,10 @@ class Recording:
         self._rec = Subtree(self._stream.rec)
         for tab in self._tabs:
             tab.log_once(self._rec, layout)
-        self._stream.flush()  # a recording that is cut off anywhere later can still be read
+        self._stream.flush()  # so that a recording that is cut off anywhere later can still be read
 
     def log(self, observation: Observation) -> None:
-        """Log everything about one frame and hand it to the sinks."""
+        """Log everything about one frame and flush it to the sinks."""
         self._seconds[observation.frame.index] = observation.frame.timestamp
         log_frame(self._rec, observation, self._contents)
         for tab in self._tabs:
@@ -97,19 +97,19 @@ class Recording:
         self._flush_frame()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
-        """Log which frames could not be used, and why; nothing else is there of them."""
+        """Log the reasons why frames could not be used; nothing else is logged of these frames."""
         for bad in frames:
             self._rec.set_frame(bad.frame, self._seconds.get(bad.frame, 0.0))
             self._rec.log(entities.SKIPPED, rr.TextLog(bad.why, level=rr.TextLogLevel.WARN))
         self._stream.flush()
 
     def log_given(self, verdict: Verdict) -> None:
-        """Log whether the calibration that the run started from is good."""
+        """Log the verdict on the calibration that the run started from."""
         self._rec.log_once(entities.VERDICT_GIVEN, verdict_values(verdict))
         self._stream.flush()
 
     def log_outcome(self, verdict: Verdict, reference: Extrinsic | None = None) -> None:
-        """Make the run's verdict a property, and how far off the reference what was found is, where that is known."""
+        """Set properties with the run's verdict and, with a reference, the error of its result."""
         self._stream.rec.send_property(entities.OUTCOME, outcome_values(verdict, reference))
 
     def log_drive(
@@ -119,7 +119,7 @@ class Recording:
         given: Verdict | None = None,
         remarks: Sequence[str] = (),
     ) -> None:
-        """Log what all frames together make of the extrinsic, the verdict on the given one, and remarks."""
+        """Log the drive's extrinsic, the verdict on the given one, and remarks."""
         if estimate.verdict is not None:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
         if math.isfinite(self._worst):
@@ -128,19 +128,19 @@ class Recording:
         self._stream.flush()
 
     def log_no_drive(self, why: Sequence[str]) -> None:
-        """Say, where its answer would stand, why the drive is not solved."""
+        """Log why the drive is not solved, in the place of its result."""
         text = "\n\n".join(["# Not solved", *why])
         self._rec.log_for_all(entities.DRIVE_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self._stream.flush()
 
     def log_watch(self, watched: Watched) -> None:
-        """Log whether the mount moved, where there is a tab for it."""
+        """Log whether the mount moved, if there is a tab for it."""
         if self._layout.with_watch:
             to_frame = lambda frame: self._rec.set_frame(frame, self._seconds.get(frame, 0.0))  # noqa: E731
             log_watch(self._rec, watched.watch, list(sentences(watched)), to_frame)
 
     def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
-        """Log what the drive's extrinsic makes of a frame; nothing of one that is not recorded."""
+        """Log a frame's points under the drive's extrinsic; nothing for a frame that is not recorded."""
         if frame.index not in self._seconds:
             return
         observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
@@ -148,19 +148,19 @@ class Recording:
         self._flush_frame()
 
     def close(self, advance: Callable[[int, int], bool] | None = None) -> str:
-        """Flush and write the footer; nothing, where nothing can be written any more.
+        """Flush and write the footer; does nothing if the recording can no longer be written.
 
         Args:
             advance: see `inspector.record.indexing.index`.
 
         Returns:
-            What a user has to know about how it was closed; empty for nothing.
+            A note for the user on how the recording was closed; empty for none.
         """
         self._stream.close(advance)
         return self._stream.remark
 
     def _flush_frame(self) -> None:
-        """Hand a frame to the sinks and, now and then, free memory to the system."""
+        """Flush a frame to the sinks and, now and then, return free memory to the system."""
         self._stream.flush()
         self._flushed += 1
         if self._flushed % HANDED_BACK_EVERY == 0:
@@ -174,9 +174,9 @@ class Recording:
 
 
 def _described(layout: Layout) -> dict[str, Any]:
-    """What the recording contains, for readers that have no layout.
+    """Properties on the content of the recording, for readers without a layout.
 
-    Names are not those of any option: Rerun keeps one type a name in a process.
+    Names differ from those of options, since Rerun allows one type per name in a process.
     """
     return {
         "stage_numbers": [stage.number for stage in layout.stages],

@@ -1,6 +1,6 @@
-"""The recording of a rig: all its cameras side by side, the cloud coloured by all of them, and what each leaves.
+"""Records a rig: all its cameras side by side, the cloud coloured by all of them, and the residuals of each.
 
-What belongs to one camera lies below a prefix of its own, with the entities of an ordinary recording.
+The entities of each camera are those of an ordinary recording, below a prefix of its own.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from inspector.record.tabs.views import View, legend, overlay_view, with_legend
 from inspector.rig_result import CameraResult, RigResult
 
 MOMENTS = 40
-"""Frames of each camera that are shown, from all over the drive."""
+"""Largest number of frames shown of each camera, spread over the drive."""
 POINTS = 40_000
-"""Most points of the cloud."""
+"""Largest number of points of the cloud."""
 CLOUD, WORLD, TEXT = "rig/cloud", "rig", "rig/result"
 LEFT_SHARE = 0.64
-"""Share of the tab's width that the pictures take."""
+"""Share of the tab's width that the images take."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Shown:
 
     @property
     def prefix(self) -> str:
-        """Below which everything of it lies."""
+        """Prefix of the camera's entities."""
         return entities.camera_of_rig(self.solved.name)
 
 
@@ -64,17 +64,17 @@ def record_rig(
     frames: Mapping[str, Frames],
     observer: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Write the recording.
+    """Write the recording of a rig.
 
     Args:
-        sinks: of Rerun, see `inspector.record.outputs`.
+        sinks: Rerun's sinks, see `inspector.record.outputs`.
         description: identifies the run.
-        solved: what was found.
-        frames: of each camera, by its name; one that cannot be read is left out.
-        observer: called with the number of moments that are recorded, and that there are.
+        solved: the result.
+        frames: frames of each camera by its name; a frame that cannot be read is left out.
+        observer: called with the number of moments recorded so far, and the total.
 
     Returns:
-        How many moments it shows.
+        The number of moments shown.
     """
     cameras = [Shown(one, frames[one.name]) for one in solved.cameras]
     stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, rig_blueprint(cameras))
@@ -98,7 +98,7 @@ def record_rig(
 
 
 def _log_moment(rec: rr.RecordingStream, cameras: Sequence[Shown], position: int) -> None:
-    """The pictures of all cameras at one position of their frames, and the scan that they see."""
+    """Log the images of all cameras at one position of their frames, and the scan that they see."""
     seen = list[tuple[Shown, Frame]]()
     for camera in cameras:
         try:
@@ -117,7 +117,7 @@ def _log_moment(rec: rr.RecordingStream, cameras: Sequence[Shown], position: int
 
 
 def _log_camera(rec: Subtree, solved: CameraResult, frame: Frame) -> None:
-    """The picture, and the points over it as they were given, as they were found and as they truly are."""
+    """Log the image with the points under the initial extrinsic, the result and the reference."""
     verdict, start = solved.verdict, solved.initial
     rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
     observation = Observation(frame, CascadeTrace(start, ()), solved.reference)
@@ -130,7 +130,7 @@ def _log_camera(rec: Subtree, solved: CameraResult, frame: Frame) -> None:
 
 
 def _log_cloud(rec: Subtree, seen: Sequence[tuple[Shown, Frame]]) -> None:
-    """The scan in the colours of all cameras, and where these are."""
+    """Log the scan in the colours of all cameras, and the poses of the cameras."""
     points = whole_scan([frame for _, frame in seen])
     rgb = np.full((len(points), 3), OUTSIDE, np.uint8)
     for camera, frame in seen:
@@ -143,7 +143,7 @@ def _log_cloud(rec: Subtree, seen: Sequence[tuple[Shown, Frame]]) -> None:
 
 
 def whole_scan(frames: Sequence[Frame]) -> NDArray[np.float32]:
-    """The points ``[N, 4]`` of a moment: one scan that all share, or what each camera has of it, without the far ones.
+    """The points ``[N, 4]`` of a moment without far ones: the scan that all cameras share, or the union of their scans.
 
     Files of one camera may hold only what that camera sees.
     """
@@ -153,7 +153,7 @@ def whole_scan(frames: Sequence[Frame]) -> NDArray[np.float32]:
 
 
 def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
-    """A tab with everything, and one for each camera."""
+    """The layout: a tab with everything, and one for each camera."""
     sizes = [camera.solved.camera for camera in cameras]
     pictures = [
         _below(camera, overlay_view(camera.solved.name, entities.OVERLAY_CORRECTED, (size.width, size.height)))
@@ -170,7 +170,7 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
             position=(-12.0, 0.0, 9.0), look_target=(5.0, 0.0, -1.0), eye_up=(0.0, 0.0, 1.0)
         ),
     )
-    text = rrb.TextDocumentView(origin=TEXT, name="What was found, and what each camera leaves")
+    text = rrb.TextDocumentView(origin=TEXT, name="Result and residuals")
     together = rrb.Horizontal(
         left, rrb.Vertical(text, cloud, row_shares=[0.5, 0.5]), column_shares=[LEFT_SHARE, 1 - LEFT_SHARE], name="Rig"
     )
@@ -184,14 +184,14 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
 
 
 def _page(camera: Shown) -> View:
-    """One camera: what was found, and below it what it started from and the truth."""
+    """The page of one camera: its result, and below it the initial extrinsic and the reference."""
     size = camera.solved.camera.width, camera.solved.camera.height
     names = {"As given": entities.OVERLAY_MISCALIBRATED}
     if camera.solved.reference is not None:
         names = {"Miscalibrated": entities.OVERLAY_MISCALIBRATED, "Reference (truth)": entities.OVERLAY_REFERENCE}
     below = [_below(camera, overlay_view(name, path, size)) for name, path in names.items()]
     found = _below(camera, overlay_view("Found", entities.OVERLAY_CORRECTED, size))
-    side_by_side = size[0] < 2 * size[1]  # pictures that are high leave room beside them
+    side_by_side = size[0] < 2 * size[1]  # tall images leave room beside them
     layout = rrb.Horizontal if side_by_side else rrb.Vertical
     small = rrb.Vertical(*below) if side_by_side else rrb.Horizontal(*below)
     return layout(found, small, name=camera.solved.name)
@@ -203,7 +203,7 @@ def _below(camera: Shown, view: rrb.View) -> rrb.View:
 
 
 def _columns(cameras: int, aspect: float) -> int:
-    """Columns of the grid in which pictures of an aspect are largest, on the left of a wide screen."""
+    """Number of columns of the grid in which images of an aspect ratio are largest, on the left of a wide screen."""
     room = LEFT_SHARE * 1920 / 900
 
     def scale(columns: int) -> float:

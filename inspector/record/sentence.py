@@ -1,4 +1,4 @@
-"""The recording of a run that has none, because it failed: why, as a text, and the same as properties."""
+"""Records a failed run: a recording with the reason, as a text and as properties."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from inspector.record.recording import RunDescription
 from inspector.record.stream import Stream, plain
 
 SENTENCE = "sentence"
-"""Text: why there is no more."""
+"""Entity of the text with the reason."""
 
 
 def record_sentence(file: Path, description: RunDescription, word: str, cause: str, sentence: str) -> None:
-    """Write a recording of a run that has none, because it failed: its properties, and why as a text.
+    """Write the recording of a failed run: its properties, and the reason as a text.
 
     Raises:
-        OutputError: the file may not be written.
+        OutputError: the file must not be written.
     """
     claim = Claim(file, Kind.RECORDING)
     try:
-        view = rrb.TextDocumentView(origin=SENTENCE, name="Why there is no more")
+        view = rrb.TextDocumentView(origin=SENTENCE, name="Why it failed")
         layout = rrb.Blueprint(view, rrb.TimePanel(state="hidden"), auto_views=False, auto_layout=False)
         sinks = [rr.FileSink(claim.begin())]
         stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, layout)

@@ -1,4 +1,4 @@
-"""A stream of data to files and viewers: the same for the same calls, in bounded memory, closed with a footer."""
+"""A stream of data to files and viewers, which is reproducible, needs bounded memory and is closed with a footer."""
 
 from __future__ import annotations
 
@@ -20,38 +20,38 @@ from inspector.record.flushing import RecordingLostError, flush
 from inspector.record.indexing import NotIndexedError, index
 
 FLUSH_BYTES = 1024 * 1024 * 1024
-"""Above any batch, so that only the flushes cut chunks."""
+"""Size of a batch that is never reached, so that only flushes cut chunks."""
 
 
 class ViewerClosedError(CalibnetError):
-    """The viewer that the recording went to has closed, and there is no file to go on with."""
+    """The viewer that the recording went to has closed, and there is no file."""
 
 
 class Stream:
-    """A stream of Rerun's whose recordings are equal for equal data, and whose failures are errors with one sentence.
+    """A stream of Rerun that records equal data equally, and whose failures are errors with one sentence.
 
     Attributes:
-        rec: what to log to. Chunks are cut by `flush` alone, and there is no wall-clock timeline.
-        remark: what a user has to know about how it was closed; empty for nothing.
+        rec: Rerun's stream to log to. Only `flush` cuts chunks, and there is no wall-clock timeline.
+        remark: a note for the user on how it was closed; empty for none.
     """
 
     def __init__(
         self, application_id: str, recording_id: str, title: str, sinks: Sequence[Any], blueprint: rrb.Blueprint
     ) -> None:
-        """Connect the sinks and send what viewers show first.
+        """Connect the sinks and send title and blueprint.
 
         Args:
-            application_id: recordings with the same one share their layout in a viewer.
-            recording_id: the same for the same data.
-            title: for the viewer's list of recordings.
-            sinks: paths of files to write, and Rerun sinks, see `inspector.record.outputs`; without any, everything
-                goes to stdout.
+            application_id: application id; recordings with the same one share their layout in a viewer.
+            recording_id: recording id, which is the same for the same data.
+            title: title in the viewer's list of recordings.
+            sinks: paths of files to write, and Rerun sinks, see `inspector.record.outputs`; if empty, everything goes
+                to stdout.
             blueprint: the layout.
 
         Raises:
             ConfigError: a file cannot be written.
         """
-        rr.set_strict_mode(True)  # what cannot be logged must be an error, not a gap in the recording and a warning
+        rr.set_strict_mode(True)  # data that cannot be logged is an error, not a gap in the recording and a warning
         self.remark = ""
         self._sinks_gone = False
         self._files = [sink for sink in sinks if isinstance(sink, Path)]
@@ -78,7 +78,7 @@ class Stream:
         return rec
 
     def close(self, advance: Callable[[int, int], bool] | None = None) -> None:
-        """Flush, and give the files their footers; nothing, where nothing can be written any more.
+        """Flush, and give the files their footers; does nothing if they can no longer be written.
 
         Args:
             advance: see `inspector.record.indexing.index`.
@@ -97,8 +97,8 @@ class Stream:
         """Hand all rows to the sinks.
 
         Raises:
-            RecordingLostError: the file's writer has given up, for instance on a quota.
-            ViewerClosedError: the viewer has gone and there is no file.
+            RecordingLostError: the file's writer has failed, for instance because of a quota.
+            ViewerClosedError: the viewer has closed and there is no file.
         """
         try:
             flush(self.rec)
@@ -109,29 +109,29 @@ class Stream:
             if not self._has_file:
                 self._sinks_gone = True
                 raise ViewerClosedError(
-                    "The viewer has closed the connection, and there is no --save to go on with."
+                    "The viewer has closed the connection, so the run stopped; add --save to record to a file as well."
                 ) from None
 
 
 def plain(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options with text that is in UTF-8 and one line, whatever a folder is called."""
+    """Options with all text in UTF-8 and on one line, whatever the names of folders."""
     return {name: one_line(value) if isinstance(value, str) else value for name, value in options.items()}
 
 
 def _growing(path: Path) -> rr.FileSink:
-    """A file that is written while it has no footer."""
+    """A file sink for a growing file without a footer."""
     try:
         return rr.FileSink(path, write_footer=False)
-    except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
+    except (RuntimeError, ValueError) as error:  # for instance, a name that is not UTF-8
         raise ConfigError(f"{path} cannot be written: {error}.") from None
 
 
 @contextmanager
 def _passed_on(blueprint: rrb.Blueprint) -> Iterator[rrb.Blueprint]:
-    """A blueprint for a call of Rerun's, which keeps nothing of it after the block.
+    """A context with a blueprint for a call of Rerun, which keeps no data of it afterwards.
 
-    Rerun 0.41 logs it to a stream in memory of its own, which holds its data, which hold the stream: two threads and
-    some MB for every call until the process ends, unless that stream is disconnected.
+    Rerun 0.41 logs a blueprint to a memory stream that holds its data, which in turn hold the stream: every call costs
+    two threads and some MB until the process ends, unless that stream is disconnected.
     """
     streams: list[rr.RecordingStream] = []
     log: Callable[[rr.RecordingStream], None] = blueprint._log_to_stream
@@ -150,7 +150,7 @@ def _passed_on(blueprint: rrb.Blueprint) -> Iterator[rrb.Blueprint]:
 
 
 def release_closed() -> None:
-    """Let go of the threads and the memory of streams that are closed; for processes that record again and again."""
+    """Release threads and memory of closed streams, for processes that record repeatedly."""
     gc.collect()
     rerun_bindings.flush_and_cleanup_orphaned_recordings()
     hand_back()

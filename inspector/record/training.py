@@ -58,13 +58,13 @@ class TrainingLog:
             self._name(f"{entities.TRAINING}/{name}", name, color)
         self._at(progress)
         for loss, value in progress.losses.items():
-            if not math.isfinite(value):  # the warm-up has no pose whose error could be plotted
+            if not math.isfinite(value):  # the warm-up has no pose, and so no error
                 continue
             self.recording.log(f"{entities.TRAINING}/{loss}", rr.Scalars(value))
         self._stream.flush()
 
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
-        """Log the figures of the held-out frames."""
+        """Log the errors on the held-out frames."""
         self._at(progress)
         for figure, value in figures._asdict().items():
             self.recording.log(f"{entities.VALIDATION}/{figure}", rr.Scalars(value))
@@ -74,7 +74,7 @@ class TrainingLog:
         return self
 
     def __exit__(self, kind: object, *_: object) -> None:
-        """Write the footer; an earlier recording of the name goes, or stays where the run did not come to its end."""
+        """Write the footer; an earlier recording of the same name is removed, or kept if the run did not finish."""
         self._stream.close()
         if kind is None:
             self._claim.complete()

@@ -1,9 +1,9 @@
-"""One calibration in a recording of the user's own, beside whatever else is in it.
+"""Logs a calibration to a recording of the user's own, beside whatever else is in it.
 
     inspector.log_trace(recording, frame, trace, frame.camera_from_lidar)
     recording.send_blueprint(inspector.blueprint(frame, trace, frame.camera_from_lidar))
 
-The stream stays the user's: nothing here opens, flushes or closes it, or changes how Rerun treats errors.
+The stream stays the user's: this module never opens, flushes or closes it, or changes how Rerun treats errors.
 """
 
 from __future__ import annotations
@@ -35,21 +35,22 @@ def log_trace(
     prefix: str = "",
     contents: Contents = EVERYTHING,
 ) -> None:
-    """Log one calibrated frame and all that its trace tells, with the entities of a recording of ``calib-inspect``.
+    """Log one calibrated frame and its trace, with the entities of a recording of ``calib-inspect``.
 
     The timelines ``frame``, ``time`` and ``step`` are set to this frame and stay there, so that what is logged next
-    belongs to it too. Legends and the names of curves are written with the first frame below a prefix.
+    belongs to it as well. Legends and names of curves are logged with the first frame below a prefix.
 
     Args:
-        recording: any stream; properties of the recording are not touched.
-        frame: what was calibrated.
-        trace: of `calibnet.cascade.cascade.Cascade.calibrate`; only with ``detail=True`` does it hold cost volumes.
-        reference: the true ``camera_from_lidar``, 4x4; None where nobody knows it.
-        prefix: entity path that everything is put below, for instance one for each camera of a car.
-        contents: what is logged of the frame.
+        recording: any stream; its properties are not changed.
+        frame: the calibrated frame.
+        trace: trace from `calibnet.cascade.cascade.Cascade.calibrate`, which has cost volumes only with
+            ``detail=True``.
+        reference: the true ``camera_from_lidar``, 4x4; None if unknown.
+        prefix: entity path above everything, for instance one for each camera of a car.
+        contents: what to log of the frame.
 
     Raises:
-        ConfigError: points are to be coloured by their error, and there is no reference.
+        ConfigError: points are to be coloured by error, but there is no reference.
     """
     observation = _observe(frame, trace, reference, contents)
     layout, rec = Layout.of(observation, contents), Subtree(recording, prefix)
@@ -69,18 +70,18 @@ def blueprint(
     tabs: Sequence[str] | None = None,
     contents: Contents = EVERYTHING,
 ) -> rrb.Blueprint:
-    """The layout that shows what `log_trace` logs; its ``root_container`` can be put among other views.
+    """The layout for the data of `log_trace`, whose ``root_container`` can be put among other views.
 
     Args:
-        frame: any of the frames that are logged.
-        trace: its trace, which says what stages and cost volumes there are.
+        frame: any of the logged frames.
+        trace: its trace, which determines the stages and cost volumes to show.
         reference: as for `log_trace`.
         prefix: as for `log_trace`.
-        tabs: names of the tabs to show, such as ``["Overview", "3D"]``; all that have data, if none is named.
+        tabs: names of the tabs to show, such as ``["Overview", "3D"]``; all that have data if empty.
         contents: as for `log_trace`.
 
     Raises:
-        ConfigError: there is no tab of that name, or nothing is logged for it.
+        ConfigError: a name is not that of a tab, or the tab has no data.
     """
     layout = Layout.of(_observe(frame, trace, reference, contents), contents)
     return make_blueprint(layout, _named(tabs, layout) if tabs else None, prefix)
@@ -88,7 +89,7 @@ def blueprint(
 
 def _observe(frame: Frame, trace: CascadeTrace, reference: Extrinsic | None, contents: Contents) -> Observation:
     if contents.color is Coloring.ERROR and reference is None:
-        raise ConfigError("Points cannot be coloured by their error without a reference; give one or another color.")
+        raise ConfigError("Points cannot be coloured by error without a reference; give a reference or another color.")
     return Observation(frame, trace, reference)
 
 
@@ -96,5 +97,5 @@ def _named(names: Sequence[str], layout: Layout) -> list[Tab]:
     known = {tab.NAME: tab for tab in wanted_tabs(layout)}
     for name in names:
         if name not in known:
-            raise ConfigError(f"There is no tab {name!r} for this trace; choose from {', '.join(known)}.")
+            raise ConfigError(f"{name!r} is not a tab of this trace; choose from {', '.join(known)}.")
     return [known[name] for name in names]

@@ -1,4 +1,4 @@
-"""The recording of a drive that was watched: what its frames say over time, in a band, and where that changes."""
+"""Records a watched drive: the estimate over time with its band, and the changes."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def record_watch(sinks: Sequence[Any], title: str, recording_id: str, found: Wat
 
     Args:
         sinks: files and Rerun sinks, see `inspector.record.outputs`.
-        title: of the recording.
-        recording_id: the same for the same data.
-        found: what was found; None where there is only something to say.
-        lines: what is said, the result last.
+        title: title of the recording.
+        recording_id: recording id, which is the same for the same data.
+        found: the estimate over the drive; None if there is only text.
+        lines: lines of text, the result last.
 
     Returns:
-        What a user has to know about how it was closed; empty for nothing.
+        A note for the user on how the recording was closed; empty for none.
     """
     stream = Stream(entities.APPLICATION_ID, recording_id, title, sinks, watch_blueprint())
     try:
@@ -39,6 +39,6 @@ def record_watch(sinks: Sequence[Any], title: str, recording_id: str, found: Wat
 
 
 def watch_blueprint() -> rrb.Blueprint:
-    """What came of it beside six plots."""
+    """The layout: the result as text beside six plots."""
     panel = rrb.TimePanel(timeline=entities.FRAME, state="collapsed")
     return rrb.Blueprint(watch_view(), panel, collapse_panels=True)

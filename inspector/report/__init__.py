@@ -1,1 +1,1 @@
-"""A report of a run as a static folder, made from its recording alone: page, pictures, figures as JSON."""
+"""Reports of runs as static folders, made from recordings alone: page, pictures, and figures as JSON."""

@@ -1,4 +1,4 @@
-"""The table of `ablate` as rows of text, and as Markdown: what each module costs and what it is worth."""
+"""The tables of `ablate`, as rows of text and as Markdown: cost and benefit of each module."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from calibnet.geometry import MiscalibrationRange
 from inspector.markdown import markdown_table
 from inspector.report.bench_summary import NO_CORRECTION, known_and_other
 
-COSTS = ("parameters", "multiply-adds", "a look", "samples")
+COSTS = ("parameters", "multiply-adds", "latency", "samples")
 ERRORS = ("rigs trained on", "other rigs", "the paper")
 HEADS = ("without", *COSTS, *ERRORS)
 
 
 def title(content: dict[str, Any]) -> str:
-    """What the table is of."""
+    """The title of the tables."""
     label = MiscalibrationRange.parse(content["range"]).label
-    return f"Ablation: one look, from {label}; in brackets what the paper says of its own"
+    return f"Ablation: one pass, from {label}; the paper's figures in brackets"
 
 
 def tables(content: dict[str, Any]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
-    """A table for each preset: its name, the heads of the columns that have something in them, and its lines."""
+    """A table for each preset: its name, the headings of columns that are not empty, and its rows."""
     for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
         rows = [row for row in content["rows"] if row["preset"] == preset]
         known = {row["rig"] for row in rows if row.get("in_rig")}
@@ -52,7 +52,7 @@ def _line(rows: list[dict[str, Any]], known: set[str]) -> list[str]:
 
 
 def untrained(content: dict[str, Any]) -> str:
-    """The sentence that says which rows have no errors because their weights are missing; empty where all have them."""
+    """A sentence on the rows without errors because their weights are missing; empty if there are none."""
     which = []
     for preset in dict.fromkeys(row["preset"] for row in content["rows"]):
         rows = [row for row in content["rows"] if row["preset"] == preset]
@@ -61,18 +61,19 @@ def untrained(content: dict[str, Any]) -> str:
             which.append(f"{preset} ({'all rows' if len(missing) == len(rows) else ', '.join(missing)})")
     if not which:
         return ""
-    return f"Not trained, so without errors: {', '.join(which)}."
+    return f"Rows without errors, since they are not trained: {', '.join(which)}."
 
 
 def as_markdown(content: dict[str, Any]) -> str:
-    """The tables for documents."""
+    """The tables as Markdown, for documents."""
     parts = [f"# {title(content)}"]
     for preset, heads, lines in tables(content):
         parts += [f"## {preset}", "\n".join(markdown_table(heads, lines, heads[1:]))]
     of = ", ".join(f"{one['frames']} frames of {one['name']} ({one['rig']})" for one in content["sequences"])
     parts.append(
         f"Mean errors over {of or 'no frames'}, {content['repeats']} miscalibrations each, seed {content['seed']}; "
-        f"multiply-adds at {content['input'][0]} x {content['input'][1]}; a look on {content['processor']}, "
+        f"multiply-adds at {content['input'][0]} x {content['input'][1]}; latency of one pass on "
+        f"{content['processor']}, "
         f"{content['threads']} threads. Made by `calib-inspect ablate`."
     )
     return "\n\n".join([*parts, untrained(content)]).strip() + "\n"

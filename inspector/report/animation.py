@@ -1,4 +1,4 @@
-"""A moving picture of a run: the same frames before any correction and after every stage, one after the other."""
+"""An animation of a run: some frames before the correction and after every stage."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.report.pictures import draw_overlay
 
 FORMATS: Final[dict[str, dict[str, Any]]] = {".webp": {"quality": 60, "method": 4}, ".gif": {"optimize": True}}
-"""Endings of the file's name, and the options with which Pillow writes each."""
+"""File name suffixes, and the options with which Pillow writes each format."""
 WIDTH: Final = 800
 CAPTION_HEIGHT: Final = 30
 FONT_SIZE: Final = 16
@@ -28,19 +28,19 @@ MARGIN: Final = 10
 BACKGROUND: Final = (24, 24, 27)
 TEXT: Final = (240, 240, 240)
 FIRST_MS, STAGE_MS, LAST_MS = 1600, 900, 2600
-"""How long the start, a stage and the result of a frame stay."""
+"""Durations of the start, a stage and the result of a frame, in milliseconds."""
 FRAMES: Final = 3
-"""Frames of a run that are shown unless others are asked for."""
+"""Default number of frames of a run that are shown."""
 
 
 class Step(NamedTuple):
-    """One still of the moving picture.
+    """One still of the animation.
 
     Attributes:
         overlay: entity of the recording whose points are drawn.
-        name: which extrinsic that is.
+        name: name of the extrinsic.
         error: its error against the reference, in words; empty without a reference.
-        milliseconds: how long the still stays.
+        milliseconds: duration of the still.
     """
 
     overlay: str
@@ -59,18 +59,18 @@ def write_animation(run: RecordedRun, file: Path, frames: Sequence[int]) -> None
     """Write an endless animation of some frames of a run.
 
     Args:
-        run: recorded with the overlay after every stage (``--log overlays`` or more).
-        file: ends in ``.webp`` or ``.gif``; GIF has 256 colours and is several times as large.
+        run: run with recorded overlays after every stage (``--log overlays`` or more).
+        file: file to write, ``.webp`` or ``.gif``; GIF has 256 colours and is several times as large.
         frames: numbers of frames of the run; at least one.
 
     Raises:
-        ConfigError: the file has another ending.
-        RecordingError: the recording holds no overlay of one of these frames and a stage.
+        ConfigError: the file has another suffix.
+        RecordingError: the recording lacks the overlay of a frame and stage.
         OSError: the file cannot be written.
     """
     kind = file.suffix.lower()
     if kind not in FORMATS:
-        raise ConfigError(f"A moving picture is a .webp or a .gif file; choose such a name instead of {file}.")
+        raise ConfigError(f"{file} is not a .webp or .gif file; give a name with one of these endings.")
     recorded = {frame.index: frame for frame in run.frames}
     steps = [(frame, step) for frame in (recorded[index] for index in frames) for step in steps_of(run, frame)]
     pictures = [_still(run, frame, step) for frame, step in steps]
@@ -83,7 +83,7 @@ def write_animation(run: RecordedRun, file: Path, frames: Sequence[int]) -> None
 
 
 def steps_of(run: RecordedRun, frame: RecordedFrame) -> Iterator[Step]:
-    """The start, every stage, and the result where that is not what the last stage found."""
+    """The start, every stage, and the result if that is not the last stage's."""
     start = "miscalibrated" if run.has_reference else "as given"
     yield Step(entities.OVERLAY_MISCALIBRATED, start, _error(frame, frame.initial), FIRST_MS)
     for stage in run.stages:
@@ -102,7 +102,7 @@ def _error(frame: RecordedFrame, camera_from_lidar: Extrinsic) -> str:
 
 
 def _still(run: RecordedRun, frame: RecordedFrame, step: Step) -> Image.Image:
-    """The frame's image with the points of one extrinsic, below a line that says which and how far off it is."""
+    """The frame's image with the points under one extrinsic, below a line with its name and error."""
     points = run.overlay(step.overlay, frame.index)
     size = (frame.camera.width, frame.camera.height)
     drawn = Image.open(io.BytesIO(draw_overlay(run.image(frame.index), points.uv, points.rgb, size)))

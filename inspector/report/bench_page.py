@@ -1,4 +1,4 @@
-"""The table of `bench` as a page of its own, in the looks of a report."""
+"""The tables of `bench` as an HTML page, in the style of a report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ summary { cursor: pointer; font-weight: 600; }
 
 
 def page(content: dict[str, Any]) -> str:
-    """The page of what ``bench --json`` wrote."""
+    """The HTML page of the content of a ``bench --json`` file."""
     sections = [_section(title, *table) for title, table in short_tables(content)]
     sections += [_section(title, *table, folded=True) for title, table in long_tables(content)]
     header = f'<h1>{TITLE}</h1>\n<p class="about">{escape(about(content))}</p>\n<p>{escape(LEGEND)}</p>'
@@ -38,7 +38,7 @@ def _section(title: str, heads: list[str], body: list[list[str]], folded: bool =
 
 
 def _cells(line: list[str]) -> str:
-    """The cells of a line; empty ones belong to the one before, which has a sentence."""
+    """The cells of a row; empty cells are merged with the one before, which holds a sentence."""
     cells: list[tuple[str, int]] = []
     for text in line:
         if text or not cells:

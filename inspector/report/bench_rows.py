@@ -1,4 +1,4 @@
-"""The table of `bench` as rows of text, which the terminal, CSV, Markdown and the page show alike."""
+"""The rows of `bench` as text, shared by terminal, CSV, Markdown and page."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from calibnet.geometry import MiscalibrationRange
 NOTHING = "–"
 KINDS = ("rotation_deg", "translation_cm")
 SHOWN = 4
-"""Rigs that are named of those that a method was trained on."""
+"""Largest number of training rigs named per method."""
 AXES = ("roll", "pitch", "yaw"), ("x", "y", "z")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table: a method, a range and what it was measured on.
+    """A row of the table: a method, a range and a rig.
 
     Attributes:
-        method: its name.
-        range: for instance ``"5/0.5"``.
+        method: name of the method.
+        range: range of the miscalibrations, for instance ``"5/0.5"``.
         rig: sensors and mount.
         known: whether the method was trained on that rig, in words.
-        of: frames or drives.
-        figures: what JSON has of it.
+        of: ``"frames"`` or ``"drives"``.
+        figures: the row's figures in JSON.
     """
 
     method: str
@@ -39,21 +39,21 @@ class Row:
 
     @property
     def label(self) -> str:
-        """The range as people write it."""
+        """The range for people."""
         return MiscalibrationRange.parse(self.range).label
 
     @property
     def why(self) -> str:
-        """Why there are no figures; empty where there are."""
+        """Reason why there are no figures; empty if there are."""
         return str(self.figures.get("why", ""))
 
     def error(self, kind: str, statistic: str) -> float | None:
-        """A figure of ``rotation_deg`` or ``translation_cm``."""
+        """A statistic of ``rotation_deg`` or ``translation_cm``."""
         values = self.figures.get(kind)
         return None if values is None else float(values[statistic])
 
     def said(self, kind: str, statistic: str) -> str:
-        """The same as text, with its unit."""
+        """The statistic as text, with its unit."""
         value = self.error(kind, statistic)
         return NOTHING if value is None else f"{value:.2f}°" if kind == "rotation_deg" else f"{value:.1f} cm"
 
@@ -65,12 +65,12 @@ class Row:
 
     @property
     def refused(self) -> str:
-        """Runs that were refused, of how many."""
+        """Number of refused runs and of all runs."""
         return refused([self.figures])
 
 
 def refused(figures: Iterable[dict[str, Any]]) -> str:
-    """Runs that were refused, of how many; and how many there were to be, where the time was over before."""
+    """Numbers of refused and of all runs, and the number planned if the time limit was reached before."""
     measured = [one for one in figures if one.get("runs")]
     if not measured:
         return NOTHING
@@ -81,7 +81,7 @@ def refused(figures: Iterable[dict[str, Any]]) -> str:
 
 
 def rows(content: dict[str, Any]) -> Iterator[Row]:
-    """The rows of a bench, by range, those in a known rig before the others."""
+    """The rows of a bench by range, those on training rigs before the others."""
     found = [
         Row(name, row["range"], row.get("rig", ""), _known(entry, row), row.get("of", NOTHING), row)
         for name, entry in content["methods"].items()
@@ -99,7 +99,7 @@ def _known(entry: dict[str, Any], row: dict[str, Any]) -> str:
 
 
 def costs(entry: dict[str, Any]) -> dict[str, str]:
-    """What a method costs, by heading."""
+    """The costs of a method, by heading."""
     parameters, adds, ms = entry["parameters"], entry["multiply_adds"], entry["latency_ms"]
     samples, trained = entry["samples_trained"], entry["trained_on"]
     rigs = ", ".join(trained[:SHOWN]) + (f" and {len(trained) - SHOWN} more" if len(trained) > SHOWN else "")
@@ -113,18 +113,18 @@ def costs(entry: dict[str, Any]) -> dict[str, str]:
 
 
 def published_results(content: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """What papers report of their own methods, by method."""
+    """The results that papers report, by method."""
     for name, entry in content["methods"].items():
         for result in entry["claims"]:
             yield name, result
 
 
 def about(content: dict[str, Any]) -> str:
-    """What was measured on, in a sentence."""
+    """A sentence on the frames and settings of the measurement."""
     rigs = list(dict.fromkeys(one["rig"] for one in content["sequences"]))
     return (
         f"{_count(len(content['sequences']), 'sequence')} of {_count(len(rigs), 'rig')} ({'; '.join(rigs)}); "
-        f"at most {content['most']} frames of each, {_count(content['repeats'], 'miscalibration')} a frame, "
+        f"at most {content['most']} frames of each, {_count(content['repeats'], 'miscalibration')} per frame, "
         f"seed {content['seed']}; {_count(content['threads'], 'thread')}."
     )
 
@@ -134,7 +134,7 @@ def _count(number: int, what: str) -> str:
 
 
 def as_csv(content: dict[str, Any]) -> str:
-    """A line a row; empty where there is no figure."""
+    """CSV with one line per row; missing figures are empty."""
     heads = ["method", "range", "rig", "in_rig", "of", "runs", "refused"]
     statistics = [
         (kind, name) for kind, axes in zip(KINDS, AXES, strict=True) for name in ("mean", "median", "p95", *axes)

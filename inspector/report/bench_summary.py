@@ -1,4 +1,4 @@
-"""The first table of `bench` for a range: a line a method, over all rigs that it was trained on and over all others."""
+"""The first table of `bench` for a range: one row per method, over its training rigs and over all others."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ PICTURES = ("grey picture", "other picture")
 COSTS = ("a frame", "parameters")
 NO_CORRECTION = "no correction"
 LEGEND = (
-    "Mean errors, of rotation and translation. A refused run counts with the error that it began with; in brackets the "
-    "runs planned, where the time for them was over. Methods without training have the same rigs in a column as the "
-    "trained ones. Grey picture, other picture: errors when the picture is made grey or is one of another drive. A "
-    "method that then refuses, or errs as if uncorrected, looks at the picture; one that corrects as before reads its "
-    "answer off the scan."
+    "Mean errors of rotation and translation. A refused run counts with its initial error; if the time limit was "
+    "reached, the number of planned runs is in brackets. For methods without training, the columns have the same rigs "
+    "as for the trained ones. Grey picture, other picture: errors when the image is made grey, or replaced by one of "
+    "another drive. A method that then refuses, or does not reduce the error, uses the image; one that corrects as "
+    "before reads its answer off the scan."
 )
 
 
 def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[str]]]:
-    """Heads and lines of the table for a range."""
+    """Headings and rows of the table for a range."""
     of_range = [row for row in rows(content) if row.range == range_]
     known = {row.rig for row in of_range if row.known == "known"}
     heads = ["method", "of", *ERRORS, *PICTURES, *COSTS, "its paper"]
@@ -30,11 +30,11 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
     if initial:
         body.append([NO_CORRECTION, "frames", *known_and_other(initial, known), *[NOTHING] * (len(heads) - 4)])
     for name, entry in content["methods"].items():
-        here = entry.get("costs_of", range_) == range_  # another range is another number of networks
+        here = entry.get("costs_of", range_) == range_  # the number of networks depends on the range
         told = [costs(entry)[head] if here else NOTHING for head in COSTS]
         beside = [*_pictures(entry, range_), *told, _claim(entry)]
         own = [row for row in of_range if row.method == name]
-        for of in dict.fromkeys(row.of for row in own):  # what stands beside the errors, once
+        for of in dict.fromkeys(row.of for row in own):  # figures beside the errors, once
             figures = [row.figures for row in own if row.of == of]
             where = {row.rig for row in own if row.known == "known"} if entry["samples_trained"] else known
             body.append([name, of, *known_and_other(figures, where), refused(figures), *beside])
@@ -49,7 +49,7 @@ def _pictures(entry: dict[str, Any], range_: str) -> list[str]:
 
 
 def known_and_other(figures: Iterable[dict[str, Any]], known: set[str]) -> list[str]:
-    """Mean errors in rigs that are known, and in others, every run alike."""
+    """Mean errors over all runs on training rigs, and over all runs on other rigs."""
     parts: tuple[list[dict[str, Any]], ...] = [], []
     for one in figures:
         parts[one["rig"] not in known].append(one)
@@ -66,7 +66,7 @@ def _mean(figures: list[dict[str, Any]]) -> str:
 
 
 def pair(degrees: float, centimetres: float) -> str:
-    """Both errors of a cell."""
+    """Text of a cell with both errors."""
     return f"{degrees:.2f}° / {centimetres:.{0 if centimetres >= 10 else 1}f} cm"
 
 

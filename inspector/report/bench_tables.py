@@ -1,4 +1,4 @@
-"""The tables of `bench` in the order that a reader needs them, and as Markdown."""
+"""The tables of `bench`, the most important first, and as Markdown."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from inspector.report.bench_summary import LEGEND, summary
 Table = tuple[list[str], list[list[str]]]
 TITLE = "All methods on the same frames"
 WORDS = frozenset(("method", "of", "rig", "trained there", "trained on", "measured on", "source", "range"))
-"""Heads of columns that hold words; all others hold figures."""
+"""Headings of columns with text; all others have figures."""
 
 
 def short_tables(content: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """What answers most questions: a table a range, what methods cost, what papers report; with their titles."""
+    """The main tables with their titles: one per range, the costs, and the results of the papers."""
     for range_ in content["ranges"]:
         yield f"From {_label(range_)}", summary(content, range_)
-    yield "What they cost, and what they were trained on", _costs(content)
-    yield "What the papers say", _claims(content)
+    yield "Cost and training data", _costs(content)
+    yield "Results reported by the papers", _claims(content)
 
 
 def long_tables(content: dict[str, Any]) -> Iterator[tuple[str, Table]]:
-    """Every rig and axis, with their titles."""
+    """Tables by rig and axis, with their titles."""
     for range_ in content["ranges"]:
         yield f"From {_label(range_)}, by rig", _errors(content, range_)
         yield f"From {_label(range_)}, by axis: means of the absolute values", _axes(content, range_)
 
 
 def as_markdown(content: dict[str, Any]) -> str:
-    """All tables for documents, the long ones folded."""
+    """All tables as Markdown for documents, with the long ones folded."""
     parts = ["<!-- Made by calib-inspect bench --from FILE --markdown FILE. -->", f"# {TITLE}", about(content), LEGEND]
     for title, table in short_tables(content):
         parts += [f"## {title}", _markdown(table)]

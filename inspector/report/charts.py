@@ -1,4 +1,4 @@
-"""The charts of the page, and the colours of their series: those of the viewer."""
+"""The charts of the page, whose series have the colours of the viewer."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from inspector.report.metrics import Figures, State
 from inspector.report.verdict import ROTATION, TRANSLATION, Quantity
 
 ON_PAPER = 0.8
-"""Brightness of the series' colours on white, where those of the viewer's dark background are too pale."""
+"""Brightness of the series' colours on white, where those for the viewer's dark background are too pale."""
 
 
 def charts(figures: Figures) -> str:
-    """Curves over the frames and histograms; a single frame has neither."""
+    """Curves over the frames and histograms; nothing for a single frame."""
     if len(figures.run.frames) == 1:
         return ""
     what = figures.measure
@@ -57,7 +57,7 @@ def _legend(states: Sequence[State]) -> str:
 
 
 def series_styles(states: Sequence[State]) -> dict[str, str]:
-    """What `page.css` leaves open: ``colors`` on white, ``dark_colors``, and the ``series`` that use them."""
+    """Parts for `page.css`: ``colors`` on white, ``dark_colors``, and the ``series`` that use them."""
     palette = {_css(state): _color(state) for state in states}
     series = (
         f"svg .line.{css} {{ stroke: var(--{css}); }} svg .dot.{css}, .legend .{css} {{ fill: var(--{css}); "

@@ -1,4 +1,4 @@
-"""Line charts and histograms as inline SVG: units at the axes, colours from the page's style sheet."""
+"""Line charts and histograms as inline SVG, with units at the axes and colours from the page's style sheet."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from calibnet.geometry.types import Floats
 
 WIDTH, HEIGHT = 560, 250
 LEFT, RIGHT, TOP, BOTTOM = 48, 10, 28, 40
-"""Margins of the plot: numbers on the left, the axes' names above and below."""
+"""Margins of the plot, for numbers on the left and names of the axes above and below."""
 TICKS = 5
 LINE_POINTS = 600
-"""Above so many frames a line shows the extremes of neighbouring ones: the plot has no more pixels."""
+"""Largest number of points of a line; for more frames, it shows the extremes of neighbouring ones."""
 MARKED_POINTS = 80
-"""Up to so many frames each is a dot that names itself under the pointer."""
+"""Largest number of frames that are drawn as dots with a tooltip."""
 BINS = 24
 
 
@@ -27,8 +27,8 @@ class Series:
     """One line or one set of bars.
 
     Attributes:
-        name: for the dots' texts.
-        css: class of the style sheet that colours it.
+        name: name in tooltips.
+        css: class of the style sheet with its colour.
         values: ``[N]``, in the unit of the axis.
     """
 
@@ -39,7 +39,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axes:
-    """Maps data to the drawing and draws its frame; ``x_limits`` and ``y_limits`` are what the plot spans."""
+    """Maps data to the drawing and draws the axes; ``x_limits`` and ``y_limits`` are the limits of the plot."""
 
     x_limits: tuple[float, float]
     y_limits: tuple[float, float]
@@ -55,7 +55,7 @@ class Axes:
         return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (value - low) / (high - low)
 
     def frame(self, x_name: str, y_name: str, whole_x: bool = False, whole_y: bool = False) -> str:
-        """Grid, numbers and names; frame numbers and counts have no fractions."""
+        """Grid, numbers and names; ``whole_x`` and ``whole_y`` allow whole numbers only, for frames and counts."""
         parts = []
         for tick in ticks(*self.y_limits, whole_y):
             parts += [_rule(self.y(tick), "grid"), _text(LEFT - 6, self.y(tick) + 4, f"{tick:g}", "end")]
@@ -72,14 +72,14 @@ class Axes:
 def line_chart(
     title: str, frames: Sequence[int], series: Sequence[Series], unit: str, spoken: Callable[[float], str]
 ) -> str:
-    """Values over frame numbers, one line a series, from zero up.
+    """A chart of values over frame numbers, with one line per series and an axis from zero.
 
     Args:
-        title: read out by screen readers.
+        title: title for screen readers.
         frames: ``[N]`` ascending frame numbers.
-        series: in drawing order, the last on top.
-        unit: of the values, for the axis.
-        spoken: a value with its unit, for the texts of the dots.
+        series: series in drawing order, the last on top.
+        unit: unit of the values, for the axis.
+        spoken: gives a value with its unit, for tooltips.
     """
     first, last = min(frames), max(frames)
     highest = max(float(one.values.max()) for one in series)
@@ -100,7 +100,7 @@ def line_chart(
 
 
 def histogram(title: str, series: Sequence[Series], x_name: str) -> str:
-    """How many frames have which value: the same bins for all series, drawn over one another."""
+    """A histogram of values over frames, with the same bins for all series, which overlap."""
     highest = headroom(max(float(one.values.max()) for one in series))
     edges = np.linspace(0.0, highest, BINS + 1)
     counts = [np.histogram(one.values, edges)[0] for one in series]
@@ -119,7 +119,7 @@ def histogram(title: str, series: Sequence[Series], x_name: str) -> str:
 
 
 def ticks(low: float, high: float, whole: bool = False) -> list[float]:
-    """Round numbers between two limits: some `TICKS` of them, 1, 2 or 5 times a power of ten apart."""
+    """Round numbers between two limits: about `TICKS` of them, 1, 2 or 5 times a power of ten apart."""
     raw = max((high - low) / TICKS, 1e-9)
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= 0.85 * raw)
@@ -130,12 +130,12 @@ def ticks(low: float, high: float, whole: bool = False) -> list[float]:
 
 
 def headroom(highest: float) -> float:
-    """The end of an axis that starts at zero: a little above the highest value, never zero itself."""
+    """Upper limit of an axis that starts at zero: a little above the highest value, and never zero."""
     return 1.06 * highest if highest > 0.0 else 1.0
 
 
 def thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """At most `LINE_POINTS` points of a line, with every peak and every dip kept."""
+    """At most `LINE_POINTS` points of a line, which keep every peak and every dip."""
     if len(x) <= LINE_POINTS:
         return x, y
     rows: list[int] = []

@@ -18,18 +18,18 @@ from inspector.read.run import RecordedFrame, RecordedRun
 from inspector.report.files import EXAMPLES
 
 DISTANCE_M = 10.0
-"""Frames are ranked by how far, at most, a point at this distance is misplaced."""
+"""Distance in metres of the points whose largest misplacement ranks the frames."""
 
 
 @dataclass(frozen=True)
 class State:
-    """The calibrations before the first or after one of the stages, all frames together.
+    """The calibrations of all frames, before the first stage or after one of the stages.
 
     Attributes:
-        name: for people.
-        number: of the stage; None before the first.
-        range: what the stage was trained for, for instance ``"5/0.5"``; None before the first.
-        errors: of every frame.
+        name: name to show.
+        number: number of the stage; None before the first.
+        range: range that the stage was trained for, for instance ``"5/0.5"``; None before the first.
+        errors: error of every frame.
     """
 
     name: str
@@ -60,15 +60,15 @@ class State:
 
 @dataclass(frozen=True)
 class Figures:
-    """All that the page and ``metrics.json`` say in numbers.
+    """All figures of the page and of ``metrics.json``.
 
     Attributes:
         run: the recording.
-        states: initial first, then every stage that ran; the last is the corrected one, where frames that
-            are rejected stand as they started.
-        changes: from the initial to the corrected extrinsic, a frame each.
-        median: extrinsic in the middle of all corrected ones; None where the frames are of several mounts.
-        median_error: of that extrinsic; None without reference or median.
+        states: the initial state and that after every stage; the last is the corrected one, in which rejected frames
+            keep their initial extrinsics.
+        changes: distance from the initial to the corrected extrinsic of every frame.
+        median: median of all corrected extrinsics; None where the frames come from several mounts.
+        median_error: error of that extrinsic; None without a reference or a median.
     """
 
     run: RecordedRun
@@ -82,7 +82,7 @@ class Figures:
         """Measure a run.
 
         Args:
-            run: with at least one frame.
+            run: a run with at least one frame.
         """
         frames = run.frames
         median = median_pose(run.results)
@@ -107,34 +107,34 @@ class Figures:
 
     @property
     def has_reference(self) -> bool:
-        """Whether errors are against a known reference; if not they are distances to ``median``."""
+        """Whether errors are relative to a reference; otherwise they are distances from ``median``."""
         return self.run.has_reference
 
     @property
     def measure(self) -> str:
-        """What the errors of the states are, in words."""
+        """Name of the states' errors, in words."""
         if self.has_reference:
             return "Error"
         return "Distance from the result" if len(self.run.frames) == 1 else "Distance from the frames’ median"
 
     @property
     def initial(self) -> State:
-        """Before the first stage."""
+        """The state before the first stage."""
         return self.states[0]
 
     @property
     def corrected(self) -> State:
-        """After the last stage."""
+        """The state after the last stage."""
         return self.states[-1]
 
     @cached_property
     def change(self) -> Metrics:
-        """Statistics of how far the calibration was moved."""
+        """Statistics of the size of the correction."""
         return Metrics.of(self.changes)
 
     @property
     def rejected(self) -> int:
-        """Frames that were left as they were."""
+        """Number of rejected frames, which were not changed."""
         return sum(frame.rejected for frame in self.run.frames)
 
     def ranking(self) -> list[int]:
@@ -177,7 +177,7 @@ class Figures:
         }
 
     def _verdicts(self) -> dict[str, int]:
-        """How many frames have each verdict."""
+        """The number of frames with each verdict."""
         words = [frame.verdict.word for frame in self.run.frames]
         return {word.replace(" ", "_"): words.count(word) for word in WORDS}
 
@@ -198,15 +198,15 @@ class Figures:
 
 
 def misplacement_cm(error: PoseError) -> float:
-    """How far a point `DISTANCE_M` away is misplaced at most, in centimetres."""
+    """Largest misplacement of a point `DISTANCE_M` away, in centimetres."""
     return float(np.radians(error.rotation_deg)) * 100.0 * DISTANCE_M + error.translation_cm
 
 
 def _rounded(error: PoseError) -> dict[str, float]:
-    """An error rounded to a millionth, far below what can be measured, so that the file of a long run stays small."""
+    """An error rounded to a millionth, far below any accuracy, so that the file of a long run stays small."""
     return {name: round(value, 6) for name, value in asdict(error).items()}
 
 
 def _distributions(metrics: Metrics) -> dict[str, Any]:
-    """The statistics without success rates, which only a reference can give."""
+    """The statistics without success rates, which need a reference."""
     return {name: value for name, value in metrics.as_dict().items() if not name.startswith("success")}

@@ -1,4 +1,4 @@
-"""The page of a report: one HTML file that needs no network and no other file but its pictures."""
+"""The page of a report: one HTML file that needs no network and no other files than its pictures."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ SETTING_NAMES = {
     "color": "points coloured by",
     "calib_inspect": "calib-inspect",
 }
-"""What settings are called on the page, in its order; others follow under their own names."""
+"""Names of settings on the page, in order; other settings follow under their own names."""
 METHOD = (
     "Rotation: the angle of R_est · R_refᵀ in degrees. Translation: |t_est − t_ref| in centimetres, the LiDAR’s origin "
     "seen from the camera. Per axis, in the camera’s frame: roll about z (ahead), pitch about x (right), yaw about y "
     "(down). p95: 95 % of the frames lie below. {against}"
 )
-AGAINST_REFERENCE = "The reference is the data’s own extrinsic, so no figure can be better than that calibration is."
+AGAINST_REFERENCE = "The reference is the data’s own extrinsic, whose accuracy limits all figures."
 AGAINST_MEDIAN = (
-    "There is no reference: in its place stands the median of all corrected extrinsics, so the figures say how far "
-    "the frames scatter, not how right they are."
+    "There is no reference; the median of all corrected extrinsics takes its place, so the figures show how much "
+    "the frames scatter, not how accurate they are."
 )
 
 
 class Example(NamedTuple):
-    """A frame with its pictures.
+    """An example frame with its pictures.
 
     Attributes:
         name: worst, median or best.
-        position: of the frame in the run.
-        pictures: file below the report's folder by what it shows, the result last.
+        position: position of the frame in the run.
+        pictures: files relative to the report's folder, by what they show, the result last.
     """
 
     name: str
@@ -60,22 +60,22 @@ class Example(NamedTuple):
 
 
 COLORINGS = {
-    Coloring.DEPTH: "coloured by depth. Where the calibration is right, colours jump on the edges of the picture.",
-    Coloring.INTENSITY: "coloured by the laser’s intensity: where the calibration is right, paint and signs agree.",
-    Coloring.EDGE: "pink before something farther: where the calibration is right, pink lies on outlines.",
-    Coloring.ERROR: "coloured by how many pixels they are off the reference, from dark (0) to bright (20 and more).",
+    Coloring.DEPTH: "coloured by depth. Where the calibration is right, colours jump at edges of the image.",
+    Coloring.INTENSITY: "coloured by the laser’s intensity. Where the calibration is right, paint and signs match.",
+    Coloring.EDGE: "pink at depth edges. Where the calibration is right, pink lies on outlines.",
+    Coloring.ERROR: "coloured by their distance from the reference in pixels, from dark (0) to bright (20 or more).",
 }
-"""What the points' colours stand for, and what to look for."""
+"""Meaning of the points' colours, and what to look for."""
 
 
 def make_page(figures: Figures, examples: Sequence[Example], recording: str, recording_bytes: int) -> str:
     """Fill the template.
 
     Args:
-        figures: what to say.
-        examples: what to show.
+        figures: figures of the run.
+        examples: frames to show.
         recording: name of the recording beside the page.
-        recording_bytes: its size.
+        recording_bytes: size of the recording.
     """
     run = figures.run
     name = str(run.settings.get("sequence", run.title))
@@ -112,7 +112,7 @@ def _items(found: Sequence[Finding]) -> str:
 
 
 def _coloring(run: RecordedRun) -> Coloring:
-    """What the recorded points' colours stand for; recordings from before there was a choice show depth."""
+    """Colouring of the recorded points; recordings of early versions show depth."""
     return Coloring(run.settings.get("color", Coloring.DEPTH))
 
 
@@ -153,7 +153,7 @@ def _example(figures: Figures, example: Example) -> str:
 
 
 def _choice(example: Example, lefts: Sequence[str]) -> str:
-    """What to compare the corrected picture with, where there is more than one."""
+    """Buttons that choose the picture to compare the corrected one with, if there are several."""
     if len(lefts) < 2:
         return ""
     radios = (
@@ -184,7 +184,7 @@ def _told(value: object) -> str:
 
 
 def _record(record: Mapping[str, Any]) -> str:
-    """A training record in short; ``metrics.json`` has it whole."""
+    """A short form of a training record; ``metrics.json`` has all of it."""
     parts = [
         f"{record[name]:,g} {name}" for name in ("minutes", "samples") if isinstance(record.get(name), int | float)
     ]

@@ -1,4 +1,4 @@
-"""The report's pictures: LiDAR points over the image, as the recording holds both."""
+"""The report's pictures: recorded LiDAR points over the recorded image."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from calibnet.errors import CalibnetError
 from inspector.colors import FAR_M, NEAR_M, depth_colors
 
 PICTURE_WIDTH = 1600
-"""Pixels; all pictures are scaled to it, so that points look alike whatever the camera."""
+"""Width of all pictures in pixels, so that points look alike for all cameras."""
 POINT_RADIUS = (2.2, 3.2)
-"""Least and most pixels: few points are drawn larger, so that they show when the picture is small."""
+"""Smallest and largest radius in pixels; fewer points are drawn larger, so that they show in a small picture."""
 POINT_SHARE = 0.2
-"""Radius as a share of the distance between points."""
+"""Radius relative to the distance between points."""
 DIMMED = 0.75
-"""Brightness that is left of the image, so that points stand out from a bright road."""
+"""Brightness of the image, dimmed so that points stand out from a bright road."""
 JPEG_QUALITY = 86
 FARTHEST_PX = 1e5
-"""Points beyond are not drawn: they are not in the picture."""
+"""Largest coordinate of points to draw; others are far outside the image."""
 TALLEST = 8
-"""Height, as a multiple of the width, of what a camera sees."""
+"""Largest height of an image, relative to its width."""
 SHIFT = 4
-"""Binary digits after the point in the positions that cv2 draws at."""
+"""Fractional bits of the positions at which cv2 draws."""
 SCALE_LABELS_M = (3, 5, 10, 20, 40, 80)
 
 
@@ -55,7 +55,7 @@ def draw_overlay(
         what = str(error).partition(";")[0]
         raise PictureError(f"An image in the recording {what}; record the run again.") from None
     if image.shape[0] > TALLEST * image.shape[1]:
-        raise PictureError("An image in the recording is a strip and no picture; record the run again.")
+        raise PictureError("An image in the recording is far too narrow; record the run again.")
     scale = PICTURE_WIDTH / image.shape[1]
     size = (PICTURE_WIDTH, round(image.shape[0] * scale))
     near = (np.abs(pixels) < FARTHEST_PX).all(axis=1)  # false for NaN
@@ -73,7 +73,7 @@ def draw_overlay(
 
 
 def depth_scale() -> str:
-    """The colours of the points as an inline SVG, with depths in metres below."""
+    """The colour scale of depth as an inline SVG, with depths in metres below."""
     width, height, steps = 320, 12, 64
     span = np.log(FAR_M / NEAR_M)
     depths = (NEAR_M * np.exp(span * (np.arange(steps) + 0.5) / steps)).astype(np.float32)

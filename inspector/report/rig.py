@@ -1,4 +1,4 @@
-"""The report of a rig: one page with all its cameras, before and after, and what each leaves."""
+"""The report of a rig: one page with all its cameras before and after, and their residuals."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from inspector.verdicts import explained
 
 
 def write_rig_report(rig: RecordedRig, folder: Path) -> Path:
-    """Write the report of a rig; of what the folder holds only files of the same names are replaced.
+    """Write the report of a rig; existing files are replaced only by files of the same names.
 
     Args:
         rig: the recording.
-        folder: created if it does not exist.
+        folder: folder of the report, created if it does not exist.
 
     Returns:
         The page.
@@ -43,7 +43,7 @@ def write_rig_report(rig: RecordedRig, folder: Path) -> Path:
 
 
 def _draw(rig: RecordedRig, number: int, camera: CameraResult, folder: Path) -> str:
-    """Draw a frame of a camera before and after; returns the HTML that shows them."""
+    """Draw a frame of a camera before and after; returns the HTML that shows both."""
     pictures, size = rig.pictures(camera.name), (camera.camera.width, camera.camera.height)
     moments = rig.moments[camera.name]
     index = moments[len(moments) // 2]
@@ -77,7 +77,7 @@ def _page(rig: RecordedRig, figures: list[str], recording_bytes: int) -> str:
 
 
 def _reasons(cameras: tuple[CameraResult, ...]) -> Iterator[str]:
-    """The reasons of the verdicts, each with the cameras that it is of."""
+    """The reasons of the verdicts, each with its cameras."""
     named: dict[str, list[CameraResult]] = {}
     for camera in cameras:
         named.setdefault(explained(camera.verdict), []).append(camera)
@@ -93,5 +93,5 @@ def _table(columns: list[str], rows: list[list[str]]) -> str:
 
 
 def _whole(cell: str) -> str:
-    """A cell in which no unit is torn from its number."""
+    """A cell in which no line break separates a number from its unit."""
     return cell.replace(" cm", "\u00a0cm").replace(" px", "\u00a0px")

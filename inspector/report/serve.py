@@ -1,4 +1,4 @@
-"""What is served of one report: its page, pictures and recording, and the embedded viewer."""
+"""Serves one report: its page, pictures and recording, and the embedded viewer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from inspector.serving.viewer_files import VIEWER_FILES
 
 
 def served_files(report: Path, viewer: Path) -> dict[str, Path]:
-    """What the server gives out: path of the address to file."""
+    """The served files, by the path of their URL."""
     files = {f"/{name}": report / name for name in (PAGE, METRICS, RECORDING)}
     files |= {f"/{PICTURES}/{picture.name}": picture for picture in (report / PICTURES).glob("*.jpg")}
     files |= {f"/{VIEWER}/{name}": viewer / name for name in VIEWER_FILES}

@@ -1,4 +1,4 @@
-"""The JSON of `bench` and `ablate` read back, and held against what their tables are made of."""
+"""Reads the JSON of `bench` and `ablate`, and checks it against the types of their tables."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class _Translation(_Spread):
 
 @dataclass(frozen=True, kw_only=True)
 class _Figures:
-    """What was measured, or why it was not."""
+    """Figures of a row, or the reason why there are none."""
 
     runs: Count = 0
     of_runs: Count = 0
@@ -124,12 +124,12 @@ class _Ablation(_Table):
 
 
 def read_table(source: Path, command: str) -> dict[str, Any]:
-    """The JSON that ``bench`` or ``ablate`` wrote earlier.
+    """Read a JSON file that ``bench`` or ``ablate`` wrote.
 
     Raises:
-        ConfigError: it is not one of that command's.
+        ConfigError: it is not a file of that command.
     """
-    remedy = f"give what `calib-inspect {command} --json` wrote"
+    remedy = f"give a file written by `calib-inspect {command} --json`"
     try:
         content = parse_json(read_text(source, f"The table of {command}", error=ConfigError))
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""The tables of the page: errors after every stage, in all and per axis."""
+"""The tables of the page: errors after every stage, in total and per axis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from inspector.report.metrics import Figures, State
 from inspector.report.verdict import ROTATION, TRANSLATION
 
 STATISTICS, MORE = ("median", "p95"), ("mean", "std")
-"""Statistics of both errors; a telephone shows the first two."""
+"""Statistics of both errors; narrow screens show the first two."""
 
 
 def stages_table(figures: Figures) -> str:
@@ -37,7 +37,7 @@ def stages_table(figures: Figures) -> str:
 
 
 def axes_table(figures: Figures) -> str:
-    """Mean absolute values on each axis, one row a state."""
+    """A table of mean absolute values per axis, with one row per state."""
     heads = ["<th>after</th>"]
     heads += [f"<th>{name}</th>" for name in ("roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)")]
     rows = []
@@ -57,7 +57,7 @@ def _row(state: State, cells: Iterable[str]) -> str:
 
 
 def _cell(text: str, more: bool = False) -> str:
-    """A cell; one that says ``more`` is left out where there is little room."""
+    """A cell, which with ``more`` is left out on narrow screens."""
     return f'<td class="more">{text}</td>' if more else f"<td>{text}</td>"
 
 

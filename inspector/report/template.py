@@ -1,4 +1,4 @@
-"""The base of all pages, and what the reports of a run and of a rig share: verdict, files, pictures under a slider."""
+"""The base of all pages, and the common parts of reports of runs and rigs: verdict, files, pictures under a slider."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ SERVE_COMMAND = "calib-inspect report {recording} --output . --open"
 
 
 class Head(NamedTuple):
-    """The beginning of a report.
+    """The head of a report.
 
     Attributes:
-        title: of the page.
-        kind: of report.
+        title: title of the page.
+        kind: kind of report.
         word: of the verdict, which it is coloured by.
         verdict: the word, and what the result is certain to be within.
-        reasons: of it, as HTML items.
-        headline: what was found, in a sentence.
-        findings: what else is to be known at once, as HTML.
-        about: what the report is of.
-        metrics: what ``metrics.json`` beside it holds.
+        reasons: reasons of the verdict, as HTML items.
+        headline: the result in a sentence.
+        findings: further findings, as HTML.
+        about: subject of the report.
+        metrics: content of ``metrics.json``, in words.
     """
 
     title: str
@@ -44,7 +44,7 @@ class Head(NamedTuple):
 
 
 class Side(NamedTuple):
-    """A picture under the slider: its file, what it shows in a word, and what it shows for those who do not see it."""
+    """A picture under the slider: its file, its name, and its alternative text."""
 
     file: str
     name: str
@@ -55,11 +55,11 @@ def report_page(head: Head, sections: str, recording: str, recording_bytes: int,
     """The HTML of a report.
 
     Args:
-        head: its beginning.
-        sections: what it says, as HTML; the last section is left open for the list of files.
+        head: head of the report.
+        sections: sections as HTML, of which the last is left open for the list of files.
         recording: name of the recording beside the page.
-        recording_bytes: its size.
-        states: whose curves have colours.
+        recording_bytes: size of the recording.
+        states: states whose curves have colours.
     """
     header = template("report.html").substitute(
         grade=GRADES[head.word],
@@ -78,13 +78,13 @@ def report_page(head: Head, sections: str, recording: str, recording_bytes: int,
 
 
 def html_page(title: str, kind: str, header: str, sections: str, style: str, script: str = "") -> str:
-    """A whole page of HTML, which needs no other file but those that it shows.
+    """A whole HTML page that needs no other files than those that it shows.
 
     Args:
-        title: in the browser's tab.
-        kind: of page, above its header.
-        header: as HTML.
-        sections: as HTML.
+        title: title of the browser's tab.
+        kind: kind of page, shown above the header.
+        header: header as HTML.
+        sections: sections as HTML.
         style: CSS, see `stylesheet`.
         script: JavaScript.
     """
@@ -99,12 +99,12 @@ def html_page(title: str, kind: str, header: str, sections: str, style: str, scr
 
 
 def figure(caption: str, left: Side, right: Side) -> str:
-    """Two pictures of which a slider shows more of the one or the other.
+    """Two pictures with a slider between them.
 
     Args:
-        caption: as HTML.
-        left: what was before.
-        right: what came of it.
+        caption: caption as HTML.
+        left: picture of the state before.
+        right: picture of the result.
     """
     return f"""<figure>
 <figcaption>{caption}</figcaption>
@@ -118,12 +118,12 @@ def figure(caption: str, left: Side, right: Side) -> str:
 
 
 def scale_of_depth() -> str:
-    """What the points' colours stand for."""
+    """The colour scale of depth, with its label."""
     return f'<div class="depth"><span>Depth</span>{depth_scale()}</div>'
 
 
 def stylesheet(states: Sequence[State] = ()) -> str:
-    """The looks of a page, with the colours of the curves of some states."""
+    """The style sheet of a page, with the colours of the curves of some states."""
     return template("page.css").substitute(series_styles(states))
 
 

@@ -1,4 +1,4 @@
-"""The verdict on a run, and what its figures mean, in plain words: one sentence of result and a few findings."""
+"""The verdict on a run and the meaning of its figures in words: a headline and a few findings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Grade = Literal["good", "fair", "bad", "note"]
 
 
 class Finding(NamedTuple):
-    """One sentence and how it is to be taken."""
+    """A sentence and its grade."""
 
     grade: Grade
     sentence: str
@@ -30,12 +30,12 @@ class Quantity:
     """Rotation or translation, with the bounds of the two success rates.
 
     Attributes:
-        name: at the start of a sentence.
-        unit: with the space before it, where there is one.
+        name: name at the start of a sentence.
+        unit: unit, including the space before it if there is one.
         axis: the unit as a word, for charts.
-        good: bound of the stricter success rate.
-        fair: bound of the other.
-        decimals: digits that mean something.
+        good: limit of the stricter success rate.
+        fair: limit of the other success rate.
+        decimals: number of meaningful decimals.
     """
 
     name: str
@@ -50,12 +50,12 @@ class Quantity:
         return f"{value:.{self.decimals}f}{self.unit}"
 
     def brief(self, value: float) -> str:
-        """The same with two or three digits, for a sentence."""
+        """A value with its unit in two or three digits, for a sentence."""
         decimals = 2 if value < 1.0 else 1 if value < 10.0 else 0
         return f"{value:.{decimals}f}{self.unit}"
 
     def bound(self, value: float) -> str:
-        """A bound with its unit, without empty decimals."""
+        """A limit with its unit, without empty decimals."""
         return f"{value:g}{self.unit}"
 
 
@@ -63,7 +63,7 @@ ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
 TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 2.5, 5.0, 1)
 GRADES: dict[Word, Grade] = {ACCEPTED: "good", CANNOT_TELL: "fair", REJECTED: "bad"}
 CLEAR_CHANGE = 2.0
-"""A change that is not so many times larger than the frames' disagreement is no evidence of anything."""
+"""Ratio of a correction to the frames' disagreement from which the correction is significant."""
 
 
 def headline(figures: Figures) -> str:
@@ -80,11 +80,11 @@ def headline(figures: Figures) -> str:
     result = f"Changed the calibration of {name} by {pair(figures.change)}{_median(figures)}"
     if len(run.frames) == 1:
         return f"{result}, judged from a single frame."
-    return f"{result}; its {count(len(run.frames))} agree on the result within {pair(figures.corrected.metrics)}."
+    return f"{result}; its {count(len(run.frames))} agree within {pair(figures.corrected.metrics)}."
 
 
 def _drive_headline(figures: Figures, drive: Extrinsic) -> str:
-    """The drive's one extrinsic first, beside it the frames one by one."""
+    """A headline with the drive's extrinsic first, and then the single frames."""
     run, error = figures.run, figures.run.drive_error
     used = len(run.frames) - len({bad.frame for bad in run.verdict.skipped} & {frame.index for frame in run.frames})
     frames = count(used) if used == len(run.frames) else f"{used:,} of {count(len(run.frames))}"
@@ -97,12 +97,12 @@ def _drive_headline(figures: Figures, drive: Extrinsic) -> str:
 
 
 def briefly(error: PoseError) -> str:
-    """Both figures of one extrinsic, briefly."""
+    """Both errors of one extrinsic, briefly."""
     return f"{ROTATION.brief(error.rotation_deg)}\u00a0/\u00a0{TRANSLATION.brief(error.translation_cm)}"
 
 
 def verdict(run: RecordedRun) -> list[Finding]:
-    """The reason of the run's verdict, likely causes, how sure the result is, and the frames left out."""
+    """The reason of the run's verdict, likely causes, the uncertainty, and the skipped frames."""
     found = run.verdict
     lines = [Finding(GRADES[found.word], found.reason)]
     lines += [Finding("bad", f"{cause.name.capitalize()}: {cause.text} ({cause.evidence})") for cause in found.causes]
@@ -111,7 +111,7 @@ def verdict(run: RecordedRun) -> list[Finding]:
 
 
 def findings(figures: Figures) -> list[Finding]:
-    """What is good in the figures and what is not."""
+    """Findings on what is good in the figures and what is not."""
     if figures.rejected == len(figures.run.frames):
         return [Finding("bad", "Every frame is rejected: nothing was corrected.")]
     if figures.has_reference:
@@ -137,7 +137,7 @@ def _median(figures: Figures) -> str:
 
 
 def _leading(figures: Figures) -> PoseError | None:
-    """Error of the drive's one extrinsic, where that is what the page leads with."""
+    """Error of the drive's extrinsic, if the page leads with it."""
     run = figures.run
     return run.drive_error if run.believes_drive and len(run.frames) > 1 else None
 
@@ -147,7 +147,7 @@ def _statistics(quantity: Quantity, state: State) -> Distribution:
 
 
 def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
-    """Of the drive's one extrinsic where there is one, else of the frames."""
+    """A finding on the error of the drive's extrinsic or, without one, of the frames."""
     before, alone = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
     name, say, drive = quantity.name, quantity.say, _leading(figures)
     worse, spread, after, most = _worse(quantity, figures), "", alone.median, alone.p95
@@ -162,7 +162,7 @@ def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
     if most < quantity.good:
         return Finding("good", f"{name} is good: {result}.{worse}")
     if after < quantity.good:
-        return Finding("fair", f"{name} is good in most frames, not in all: {result}.{worse}")
+        return Finding("fair", f"{name} is good in most frames but not in all: {result}.{worse}")
     if after < quantity.fair:
         wanted = f"below {quantity.bound(quantity.good)} would be good"
         return Finding("fair", f"{name} is roughly right: {result}; {wanted}.{worse}")
@@ -171,7 +171,7 @@ def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
 
 
 def _worse(quantity: Quantity, figures: Figures, what: str = "it") -> str:
-    """How many frames it made worse; nothing if none, or if there is only one."""
+    """A sentence on the number of frames that got worse; empty for none, or for a single frame."""
     before, after = (
         state.rotation_deg if quantity is ROTATION else state.translation_cm
         for state in (figures.initial, figures.corrected)
@@ -181,7 +181,7 @@ def _worse(quantity: Quantity, figures: Figures, what: str = "it") -> str:
 
 
 def _rejected(figures: Figures) -> list[Finding]:
-    """How many frames were left as they were; nothing if none."""
+    """A finding on the rejected frames; none if there are none."""
     if not figures.rejected:
         return []
     were = "is rejected and was left as it was" if figures.rejected == 1 else "are rejected and were left as they were"
@@ -189,7 +189,7 @@ def _rejected(figures: Figures) -> list[Finding]:
 
 
 def _together(figures: Figures) -> list[Finding]:
-    """How good the frames are when they are taken together; how good one by one, where that leads the page."""
+    """A finding on the frames together or, if the page leads with the drive, on the single frames."""
     error, metrics = figures.median_error, figures.corrected.metrics
     if error is None or len(figures.run.frames) == 1:
         return []
@@ -198,13 +198,13 @@ def _together(figures: Figures) -> list[Finding]:
         worse = "".join(_worse(quantity, figures, quantity.name.lower()) for quantity in (ROTATION, TRANSLATION))
         return [Finding("note", f"One by one, 95 % of the frames end below {most}.{worse}")]
     off = f"{ROTATION.say(error.rotation_deg)} / {TRANSLATION.say(error.translation_cm)}"
-    return [Finding("note", f"Taken together, the median of all frames' results is off by {off}.")]
+    return [Finding("note", f"The median of all frames' results is off by {off}.")]
 
 
 def _judge_agreement(figures: Figures) -> list[Finding]:
-    unknown = Finding("note", "No reference is known, so nobody can say how right the result is.")
+    unknown = Finding("note", "There is no reference, so the accuracy of the result is unknown.")
     if len(figures.run.frames) == 1:
-        return [unknown, Finding("bad", "A single frame has nothing to agree with: run more frames.")]
+        return [unknown, Finding("bad", "A single frame cannot show agreement: run more frames.")]
     findings = [unknown]
     for quantity in (ROTATION, TRANSLATION):
         start, end = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
@@ -217,7 +217,7 @@ def _judge_agreement(figures: Figures) -> list[Finding]:
             findings.append(Finding("bad", f"{name}: the frames do not agree ({scatter})."))
         if start.median < CLEAR_CHANGE * end.median:
             offset = f"the start lies {quantity.say(start.median)} from the frames' median"
-            doubt = "not clearly more than they disagree: it may have been right"
+            doubt = "not clearly more than they disagree, so it may have been right"
             findings.append(Finding("note", f"{name}: {offset}, {doubt}."))
-    shared = "Agreement cannot show a mistake that all frames share: look at the pictures."
+    shared = "Agreement cannot reveal an error that all frames share: look at the pictures."
     return [*findings, Finding("note", shared)]

@@ -1,4 +1,4 @@
-"""Writing a report: pictures, figures and the recording first, the page that shows them last."""
+"""Writes a report: pictures, figures and the recording first, then the page that shows them."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ Shown = TypeVar("Shown")
 
 
 def check_folder(folder: Path) -> None:
-    """Create the report's folder, so that one that cannot be written is found before the work.
+    """Create the report's folder, so that a failure shows before the work.
 
     Raises:
-        ConfigError: nothing can be written into it.
+        ConfigError: the folder cannot be written.
     """
     try:
         (folder / PICTURES).mkdir(parents=True, exist_ok=True)
@@ -41,7 +41,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_report(run: RecordedRun, folder: Path) -> Path:
-    """Write the report of a run; of what the folder holds only files of the same names are replaced.
+    """Write the report of a run; existing files are replaced only by files of the same names.
 
     Args:
         run: the recording.
@@ -67,14 +67,14 @@ def write_report(run: RecordedRun, folder: Path) -> Path:
 def write_files(
     folder: Path, recording: Path, draw: Callable[[], Shown], metrics: str, page: Callable[[Shown, int], str]
 ) -> Path:
-    """Write the files of a report; the page comes last, so that it never shows what is not there.
+    """Write the files of a report, the page last, so that it never refers to missing files.
 
     Args:
         folder: created if it does not exist.
-        recording: copied into it.
-        draw: writes the pictures, and hands back what the page says of them.
-        metrics: of ``metrics.json``.
-        page: makes the page of what was drawn and of the recording's size in bytes.
+        recording: recording to copy into the folder.
+        draw: writes the pictures, and returns their description for the page.
+        metrics: content of ``metrics.json``.
+        page: makes the page from the description of the pictures and the recording's size in bytes.
 
     Returns:
         The page.
@@ -98,19 +98,19 @@ def write_files(
 
 
 def _json(content: Mapping[str, Any]) -> str:
-    """Indented, but every frame in a line of its own: a long run stays readable."""
+    """Indented JSON with one line per frame, so that a long run stays readable."""
     frames = ",\n  ".join(json.dumps(frame, allow_nan=False) for frame in content["per_frame"])
     head = json.dumps({**content, "per_frame": []}, indent=1, allow_nan=False)
     return head.removesuffix("[]\n}") + f"[\n  {frames}\n ]\n}}\n"
 
 
 def copy_recording(source: Path, target: Path) -> None:
-    """Copy the recording beside the page, unless it lies there already.
+    """Copy the recording beside the page, unless it is there already.
 
-    It is no hard link: the next run that records to the same path would write into the report.
+    It is not a hard link, since the next run that records to the same path would then write into the report.
     """
     if not (target.exists() and target.samefile(source)):
-        claim = Claim(target, Kind.RECORDING)  # another run may be recording there
+        claim = Claim(target, Kind.RECORDING)  # another run may be recording to it
         try:
             write_whole(target, lambda partial: shutil.copyfile(source, partial), Kind.RECORDING)
         finally:
@@ -118,7 +118,7 @@ def copy_recording(source: Path, target: Path) -> None:
 
 
 def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) -> Example:
-    """Draw one frame before and after and, where there is one, with the reference."""
+    """Draw one frame before, after and, if known, under the reference."""
     index = run.frames[position].index
     camera, image = run.frames[position].camera, run.image(index)
     size = (camera.width, camera.height)
@@ -130,7 +130,7 @@ def _write_pictures(run: RecordedRun, name: str, position: int, folder: Path) ->
 
 
 def _overlays(run: RecordedRun, frame: RecordedFrame) -> Mapping[str, OverlayPoints]:
-    """What is shown of a frame, the result last: that of the whole drive, where it is believed and there are points."""
+    """The overlays of a frame by name, the result last, which is the drive's if it is not rejected and has points."""
     index = frame.index
     start = "miscalibrated" if run.has_reference else "start"
     shown = {start: run.overlay(entities.OVERLAY_MISCALIBRATED, index)}
@@ -138,13 +138,13 @@ def _overlays(run: RecordedRun, frame: RecordedFrame) -> Mapping[str, OverlayPoi
         shown["reference"] = run.overlay(entities.OVERLAY_REFERENCE, index)
     own = run.overlay(entities.OVERLAY_CORRECTED, index)
     if run.believes_drive:
-        with contextlib.suppress(RecordingError):  # of the drive nothing was drawn on this frame
+        with contextlib.suppress(RecordingError):  # this frame has no overlay of the drive
             return shown | {ALONE: own, AS_ONE: run.overlay(entities.OVERLAY_DRIVE, index)}
     return shown | {LEFT if frame.rejected else CORRECTED: own}
 
 
 def cannot_write(error: OSError, folder: Path) -> ConfigError:
-    """What to say when a report's folder cannot be written."""
+    """The error for a report's folder that cannot be written."""
     reason = os.strerror(error.errno) if error.errno else str(error)
     return ConfigError(
         f"{error.filename or folder} cannot be written ({reason}); free some space or choose another folder."

@@ -1,1 +1,1 @@
-"""The pictures that tabs show: overlays, maps, search windows, slices, activations, the cloud and legends."""
+"""Pictures for the tabs: overlays, maps, search windows, slices, activations, the cloud and legends."""

@@ -1,17 +1,17 @@
-"""How large the caption above an overlay is; layouts leave room for it."""
+"""The size of the caption above an overlay, for which layouts leave room."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 LETTERS_OF_WIDTH, LETTERS_OF_HEIGHT = 0.04, 0.1
-"""Height of the letters, in widths of a wide picture and in heights of a high one, as views scale them."""
+"""Height of the letters, relative to the width of a wide image and to the height of a tall one."""
 ONE_LINE = 2.2
-"""Width over height of a picture from which on a name and its figures fit into one line."""
+"""Aspect ratio of an image from which a name and its figures fit on one line."""
 
 
 class Strip(NamedTuple):
-    """The caption's letters and its own height, in pixels of the picture below it."""
+    """Heights of the caption's letters and of the caption itself, in pixels of the image below it."""
 
     letters: int
     lines: int
@@ -19,7 +19,7 @@ class Strip(NamedTuple):
 
 
 def caption_strip(image: tuple[int, int]) -> Strip:
-    """The caption's size above a picture of this width and height."""
+    """The size of the caption above an image of this width and height."""
     width, height = image
     letters = max(8, round(max(LETTERS_OF_WIDTH * width, LETTERS_OF_HEIGHT * height)))
     lines = 1 if width >= ONE_LINE * height else 2

@@ -1,4 +1,4 @@
-"""Many small maps as one picture with a palette: activations by channel, volume slices by displacement."""
+"""Many small maps as one picture with a palette, such as activations by channel or volume slices by displacement."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from inspector.colors import EMPTY, VIRIDIS
 from inspector.record.pictures.lettering import font
 
 CHANNELS: Final = 8
-"""Channels shown at most: those that vary most."""
+"""Largest number of channels shown; those that vary most are chosen."""
 COLUMNS: Final = 4
 TILE_WIDTH: Final = 176
-"""Width of a tile in pixels, or a little less: maps are magnified to it, so that the letters above them are sharp."""
+"""Width of a tile in pixels, to which maps are magnified so that the letters above them are sharp."""
 HEADER: Final = 16
-"""Height of the words above a tile, and of those above all of them."""
+"""Height of the text above a tile and above all tiles, in pixels."""
 GAP, TEXT = 0, 255
-"""Palette entries that are no level."""
+"""Palette entries that are not levels."""
 LOWEST, HIGHEST = 1, 254
 PALETTE: Final = np.concatenate([[EMPTY], VIRIDIS[LOWEST : HIGHEST + 1], [(255, 255, 255)]]).astype(np.uint8)
 
 
 def liveliest_channels(activations: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Numbers, ascending, of the `CHANNELS` channels of ``[C, h, w]`` that vary most; none that is constant."""
+    """Ascending numbers of the `CHANNELS` channels of ``[C, h, w]`` that vary most, without constant ones."""
     spread = np.nan_to_num(activations.astype(np.float32)).std(axis=(1, 2))
     liveliest = np.argsort(-spread, kind="stable")[:CHANNELS]
     varying = liveliest[spread[liveliest] > 0]
@@ -36,13 +36,13 @@ def liveliest_channels(activations: NDArray[np.floating]) -> NDArray[np.intp]:
 def channel_grid(
     activations: NDArray[np.floating], low: float, high: float, numbers: NDArray[np.integer]
 ) -> NDArray[np.uint8]:
-    """Lay out ``[C, h, w]`` activations, `COLUMNS` tiles a row, its channel's number above each, above all the scale.
+    """Lay out ``[C, h, w]`` activations in rows of `COLUMNS` tiles, with numbers above the tiles and the scale on top.
 
     Args:
         activations: maps of any size.
         low: value of the darkest colour.
         high: value of the brightest.
-        numbers: ``[C]``, of the channels.
+        numbers: ``[C]`` numbers of the channels.
 
     Returns:
         ``[H, W]`` uint8 entries of `PALETTE`.
@@ -74,7 +74,7 @@ def slice_grid(volume: NDArray[np.floating], occupied: NDArray[np.bool_], high: 
 
 
 def _words(text: str, width: int) -> NDArray[np.bool_]:
-    """The pixels ``[HEADER, width]`` of a few words, without half-tones, for which the palette has no entries."""
+    """The pixels ``[HEADER, width]`` of a text, without half-tones, for which the palette has no entries."""
     drawn = Image.new("1", (width, HEADER))
     ImageDraw.Draw(drawn).text((2, HEADER / 2), text, 1, font(HEADER - 4), anchor="lm")
     return np.asarray(drawn)
@@ -88,7 +88,7 @@ def levels(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.
 
 
 def palette_png(grid: NDArray[np.uint8]) -> bytes:
-    """The picture as PNG with a palette: lossless, one byte a cell before deflation."""
+    """The picture as a PNG with a palette."""
     picture = Image.fromarray(grid)
     picture.putpalette(PALETTE.tobytes())
     encoded = io.BytesIO()

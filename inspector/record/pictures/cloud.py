@@ -1,4 +1,4 @@
-"""The scan as a cloud in 3D: which points are shown, and the colours that the image gives them."""
+"""The scan as a cloud in 3D: the points that are shown, and their colours from the image."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from calibnet.geometry.types import Extrinsic
 from inspector.record.observation import Observation
 
 SEEN_SHARE = 0.8
-"""Share of the points that is left to those which the camera sees."""
+"""Share of the shown points that the camera sees."""
 OUTSIDE = (70, 72, 80)
 """Colour of points that the camera does not see."""
 RANGE_M = 80.0
-"""Points farther from the LiDAR are left out."""
+"""Largest distance of shown points from the LiDAR, in metres."""
 
 
 def subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
-    """At most ``limit`` points ``[M, 4]`` of the scan, most of them such as the camera sees before or after."""
+    """At most ``limit`` points ``[M, 4]`` of the scan, most of which the camera sees before or after the correction."""
     frame = observation.frame
     near = np.square(frame.points[:, :3]).sum(axis=1) < RANGE_M**2
     seen = np.zeros(len(frame.points), dtype=np.bool_)
@@ -33,7 +33,7 @@ def subsample(observation: Observation, limit: int) -> NDArray[np.float32]:
 
 
 def seen_colors(frame: Frame, points: NDArray[np.float32], camera_from_lidar: Extrinsic) -> NDArray[np.uint8]:
-    """``[M, 3]`` RGB: the colour of the pixel that each point falls on, grey where it falls on none."""
+    """``[M, 3]`` RGB: the colour of the pixel that each point projects to, or grey outside the image."""
     image, camera = frame.as_taken
     projection = project_through(points, camera_from_lidar, camera)
     rgb = np.full((len(points), 3), OUTSIDE, dtype=np.uint8)
@@ -44,5 +44,5 @@ def seen_colors(frame: Frame, points: NDArray[np.float32], camera_from_lidar: Ex
 
 
 def _evenly(rows: NDArray[np.intp], limit: int) -> NDArray[np.intp]:
-    """Rows at equal distances, ``limit`` at most."""
+    """At most ``limit`` evenly spaced rows."""
     return rows[:: max(1, -(-len(rows) // limit))]

@@ -1,4 +1,4 @@
-"""The overlays of one frame: its points under every extrinsic of the run, and a caption in each that says which."""
+"""The overlays of one frame: its points under every extrinsic of the run, each with a caption."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from inspector.record.pictures.painting import make_painter
 from inspector.record.subtree import Subtree, Timeless
 
 SPARSE, DENSE = Thinning(cells_across=140, pixel=1.0), Thinning(cells_across=180, pixel=0.25)
-"""Sparse keeps about 2,500 of KITTI's 19,000 points: enough to judge, few enough for a megabyte a frame."""
+"""Two densities of points; sparse keeps about 2,500 of KITTI's 19,000 points, so that a frame takes under a
+megabyte."""
 
 
 class FrameOverlays:
     """Draws the overlay of each extrinsic once, however many entities show it."""
 
     def __init__(self, observation: Observation, contents: Contents) -> None:
-        """Draw points of an observation in the density and the colours that the contents ask for."""
+        """Draw points of an observation with the density and colouring of the contents."""
         self._observation, self._camera = observation, observation.frame.as_taken.camera
         self._thinning = DENSE if contents.dense else SPARSE
         self._paint = make_painter(observation, contents.color)
@@ -39,23 +40,23 @@ class FrameOverlays:
         camera_from_lidar: Extrinsic,
         color: colors.Rgb = colors.LETTERS,
     ) -> None:
-        """Log the points under an extrinsic and, above them, its name and how far off it is."""
+        """Log the points under an extrinsic and, above them, its name and error."""
         rec.log(entity, self._under(camera_from_lidar).archetype())
         error = self._observation.error(camera_from_lidar)
         figures = "" if error is None else f"{error.rotation_deg:.2f}°, {error.translation_cm:.1f} cm off"
         self._log_caption(rec, entity, name, figures, color)
 
     def log_reference(self, rec: Subtree, entity: str, reference: Extrinsic) -> None:
-        """Log the points under the reference, whose caption is its name alone."""
+        """Log the points under the reference, with its name only."""
         rec.log(entity, self._under(reference).archetype())
         self._log_caption(rec, entity, "reference")
 
     def log_worst(self, rec: Subtree) -> None:
-        """Log the result at all times, as that of the worst frame."""
+        """Log the result as static data, as that of the worst frame."""
         self.log_result(Timeless(rec), entities.OVERLAY_WORST, f"frame {self._observation.frame.index}, ")
 
     def log_result(self, rec: Subtree, entity: str, whose: str = "") -> None:
-        """Log the points under what is believed in the end, and the verdict on it above."""
+        """Log the points under the final result, and above them the verdict."""
         trace = self._observation.trace
         word = "" if trace.verdict is None else trace.verdict.word
         became = "worse than before" if self._observation.worse else "corrected"
@@ -72,7 +73,7 @@ class FrameOverlays:
     def _log_caption(
         self, rec: Subtree, entity: str, name: str, figures: str = "", color: colors.Rgb = colors.LETTERS
     ) -> None:
-        """A strip of the picture's width that lies above it."""
+        """Log a strip of the image's width above it."""
         camera, path = self._camera, entities.caption(entity)
         strip = caption_strip((camera.width, camera.height))
         lines = [": ".join(filter(None, [name, figures]))] if strip.lines == 1 else [name, figures]

@@ -1,4 +1,4 @@
-"""Legends, which are logged once: what the colours of points and maps stand for, and names in their colours."""
+"""Legends of the colours of points and maps, and of names in colours; each is logged once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from inspector.record.subtree import Subtree
 
 BAR_WIDTH = 1800
 POINT_BAR_HEIGHT, CERTAINTY_BAR_HEIGHT = 54, 140
-"""Pixels: one lies across a whole page, the other in a third of it."""
+"""Heights in pixels of a bar across a whole page, and of one across a third of it."""
 NAMES_HEIGHT = 64
 WHEEL_RADIUS = 40
 LABELLED_DEPTHS_M = (3, 5, 10, 20, 40, 80)
@@ -24,19 +24,19 @@ LABELLED_CERTAINTIES = (0.0, 0.05, 0.2, 0.5, 1.0)
 
 
 class Bar(NamedTuple):
-    """A strip of colours ``[BAR_WIDTH, 3]`` and the labels on it by their place, 0..1."""
+    """A strip of colours ``[BAR_WIDTH, 3]``, and the labels on it by their position, 0..1."""
 
     strip: NDArray[np.uint8]
     labels: dict[float, str]
 
 
 def log_point_legend(rec: Subtree, coloring: Coloring) -> None:
-    """What the colours of an overlay's points stand for, at `entities.LEGEND_POINTS`."""
+    """Log the legend of the points' colours, at `entities.LEGEND_POINTS`."""
     _log_bar(rec, entities.LEGEND_POINTS, point_bar(coloring), POINT_BAR_HEIGHT)
 
 
 def log_map_legends(rec: Subtree) -> None:
-    """What the colours of maps stand for, at `entities.LEGEND_DISPLACEMENT` and `entities.LEGEND_CERTAINTY`."""
+    """Log the legends of maps, at `entities.LEGEND_DISPLACEMENT` and `entities.LEGEND_CERTAINTY`."""
     rec.log_once(entities.LEGEND_DISPLACEMENT, rr.Image(displacement_wheel()))
     certainty = colors.certainty_colors(np.linspace(0.0, 1.0, BAR_WIDTH) ** 2)
     bar = Bar(certainty, {c**0.5: f"{c:g}" for c in LABELLED_CERTAINTIES})
@@ -44,7 +44,7 @@ def log_map_legends(rec: Subtree) -> None:
 
 
 def log_decided_legend(rec: Subtree, with_truth: bool) -> None:
-    """What the brightness of maps of where probability lies stands for, at `entities.LEGEND_DECIDED`."""
+    """Log the legend of the maps of how decided cells are, at `entities.LEGEND_DECIDED`."""
     strip = colors.map_colors(np.linspace(0.0, 1.0, BAR_WIDTH), 0.0, 1.0)
     low, brighten, high = "undecided: all displacements alike", "the hourglass should brighten", "decided: one has all"
     if with_truth:
@@ -56,20 +56,22 @@ def log_decided_legend(rec: Subtree, with_truth: bool) -> None:
 
 
 def log_names(rec: Subtree, path: str, names: Mapping[str, colors.Rgb]) -> None:
-    """Names in a row, each after a dot in its colour."""
+    """Log names in a row, each after a dot in its colour."""
     picture = names_png(list(names.items()), NAMES_HEIGHT)
     rec.log_once(path, rr.EncodedImage(contents=picture, media_type="image/png"))
 
 
 def point_bar(coloring: Coloring) -> Bar:
-    """What the colours of an overlay's points stand for."""
+    """The legend of the colours of an overlay's points."""
     share = np.linspace(0.0, 1.0, BAR_WIDTH)
     if coloring is Coloring.INTENSITY:
         strip = colors.map_colors(share, 0.0, 1.0)
         return Bar(strip, {0.0: "weak return of the laser", 0.5: "intensity", 1.0: "strong"})
     if coloring is Coloring.EDGE:
         strip = np.where(share[:, None] < 0.5, colors.EDGE, colors.REST).astype(np.uint8)
-        return Bar(strip, {0.25: "points at depth edges: they must lie on outlines in the picture", 0.75: "all others"})
+        return Bar(
+            strip, {0.25: "points at depth edges, which should lie on outlines in the image", 0.75: "all others"}
+        )
     if coloring is Coloring.ERROR:
         labels = {px / colors.WORST_PX: f"{px} px off" for px in (0, 5, 10, 15)} | {
             1.0: f"{colors.WORST_PX:g} px or more"

@@ -1,7 +1,7 @@
-"""Words as pictures: captions and legends that read the same in a light and in a dark viewer.
+"""Text as pictures: captions and legends that look the same in a light and in a dark viewer.
 
-The viewer writes labels in their points' colour on a ground of its theme's, so that white letters vanish on the light
-one. A picture brings its own ground.
+The viewer writes labels in the colour of their points on the background of its theme, where white letters vanish in the
+light one. A picture has its own background.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from PIL import Image, ImageDraw, ImageFont
 from inspector import colors
 
 LEVELS: Final = 16
-"""Shades between ground and letters: smooth enough, and half a byte a pixel in the file."""
+"""Number of shades between background and letters, which takes half a byte per pixel."""
 DOT: Final = 0.34
-"""Radius of the dot before a name, in heights of the letters."""
+"""Radius of the dot before a name, relative to the height of the letters."""
 
 
 @lru_cache(maxsize=16)
 def font(height: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    """Pillow's own font, which every installation has, in letters of so many pixels."""
+    """Pillow's built-in font, with letters of the given height in pixels."""
     return ImageFont.load_default(float(height))
 
 
 def letter_width(text: str, height: int) -> int:
-    """Pixels that a text takes in one line."""
+    """Width of a line of text in pixels."""
     return int(np.ceil(font(height).getlength(text)))
 
 
 def text_png(lines: Sequence[str], size: tuple[int, int], height: int, color: colors.Rgb) -> bytes:
-    """Lines of text, centred, in letters of ``height`` pixels or as many fewer as a line needs to fit.
+    """Lines of centred text as PNG, in letters of ``height`` pixels, or smaller ones if a line would not fit.
 
     Args:
         lines: from top to bottom.
         size: width and height of the picture in pixels.
-        height: of the letters.
-        color: of the letters; the ground is `colors.GROUND`.
+        height: height of the letters.
+        color: colour of the letters; the background is `colors.GROUND`.
     """
     mask = Image.new("L", size)
     drawing, row = ImageDraw.Draw(mask), size[1] / len(lines)
@@ -71,7 +71,7 @@ def names_png(names: Sequence[tuple[str, colors.Rgb]], height: int) -> bytes:
 
 
 def bar_png(strip: NDArray[np.uint8], labels: dict[float, str], height: int) -> bytes:
-    """A strip of colours ``[W, 3]`` with labels on it by their place, 0..1, in black or white for contrast."""
+    """A strip of colours ``[W, 3]`` with labels by their position, 0..1, in black or white for contrast."""
     picture = Image.fromarray(np.tile(strip, (height, 1, 1)))
     drawing, letters, width = ImageDraw.Draw(picture), round(0.5 * height), len(strip)
     for place, label in labels.items():

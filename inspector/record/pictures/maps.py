@@ -1,6 +1,6 @@
-"""Maps over the cells of a cost volume: displacements in flow colours, certainties from dark to bright.
+"""Maps of the cells of a cost volume: displacements in flow colours, certainties from dark to bright.
 
-They let the picture under them through, and show nothing else of it where a cell holds no LiDAR point.
+They are translucent over the image, and fully transparent in cells without a LiDAR point.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from calibnet.trace import ScaleTrace
 from inspector import colors
 
 OPACITY = 0.62
-"""Opacity of a cell that holds a point."""
+"""Opacity of a cell with a point."""
 LOGIT_SCALE = 14.0
 """Factor by which the network multiplies matching scores before its softmax, as in `calibnet.network.cost_volume`."""
 
@@ -26,8 +26,8 @@ def flow_image(
 
     Args:
         displacement: ``(dx, dy)`` in pixels.
-        reach: length in pixels that is fully saturated.
-        seen: ``[h, w]``, the cells that hold a LiDAR point; the others are left out.
+        reach: length in pixels at which colours are fully saturated.
+        seen: ``[h, w]``, the cells with a LiDAR point; the others are left out.
     """
     return _image(colors.flow_colors(displacement, reach), seen)
 
@@ -43,7 +43,7 @@ def share_image(values: NDArray[np.floating], seen: NDArray[np.bool_]) -> rr.Enc
 
 
 def _image(picture: NDArray[np.uint8], seen: NDArray[np.bool_]) -> rr.EncodedImage:
-    """The picture as PNG, a third of the bytes; the viewer heeds alpha only where the image's opacity is below 1."""
+    """The picture as PNG, a third of the size; the viewer uses alpha only if the image's opacity is below 1."""
     done, encoded = cv2.imencode(".png", np.dstack([picture[..., ::-1], 255 * seen.astype(np.uint8)]))
     assert done, "maps are small"
     return rr.EncodedImage(contents=encoded.tobytes(), media_type="image/png", opacity=OPACITY)
@@ -52,7 +52,7 @@ def _image(picture: NDArray[np.uint8], seen: NDArray[np.bool_]) -> rr.EncodedIma
 def decidedness(probability: NDArray[np.floating]) -> NDArray[np.float32]:
     """``[h, w]`` float32, how far ``[Dy, Dx, h, w]`` probabilities have decided: 0 all alike, 1 a single displacement.
 
-    It is what is missing of the largest entropy, as a share of that.
+    It is one minus the entropy relative to the largest entropy.
     """
     p = np.clip(probability.astype(np.float32), 1e-12, 1.0).reshape(-1, *probability.shape[2:])
     entropy = -(p * np.log(p)).sum(axis=0)
@@ -82,7 +82,7 @@ def within_window(scale: ScaleTrace, true: NDArray[np.floating]) -> NDArray[np.b
 
 
 def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:
-    """``[Dy, Dx, h, w]``: what the matching scores alone, before aggregation, would make of every displacement."""
+    """``[Dy, Dx, h, w]``: the probability of every displacement by the matching scores alone, before aggregation."""
     scores = LOGIT_SCALE * scale.volume.astype(np.float32)
     weights = np.exp(scores - scores.max(axis=(0, 1)))
     probability: NDArray[np.float32] = weights / weights.sum(axis=(0, 1))
@@ -92,7 +92,7 @@ def matching_probability(scale: ScaleTrace) -> NDArray[np.float32]:
 def subcell_match(scale: ScaleTrace) -> NDArray[np.float32]:
     """``[h, w, 2]`` float32 displacement ``(dx, dy)`` in cells: the mean of the most probable one and its neighbours.
 
-    The last stages move points by less than a cell, which the most probable one alone would not show.
+    The last stages move points by less than a cell, which the most probable displacement alone would not show.
     """
     down, across = scale.probability.shape[:2]
     padded = np.pad(scale.probability.astype(np.float32), ((1, 1), (1, 1), (0, 0), (0, 0)))
@@ -108,5 +108,5 @@ def subcell_match(scale: ScaleTrace) -> NDArray[np.float32]:
 
 
 def reach_px(scale: ScaleTrace) -> float:
-    """Longest displacement in pixels along one axis that the search window holds."""
+    """Largest displacement of the search window along an axis, in pixels."""
     return scale.stride * float(max(scale.volume.shape[0] // 2, scale.volume.shape[1] // 2))

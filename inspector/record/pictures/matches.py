@@ -1,4 +1,4 @@
-"""Where a stage's cells start and truly belong, and the one cell whose search window is shown."""
+"""Initial and true positions of a stage's cells, and the one cell whose search window is shown."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class StartingPoints:
     """The scan in the network's image before a stage.
 
     Attributes:
-        camera: the network's.
-        projection: of the scan with the extrinsic that the stage starts from, rows far to near.
+        camera: the camera of the network's image.
+        projection: the scan projected under the stage's initial extrinsic, rows far to near.
         displacement: ``[M, 2]`` float32 pixels ``(dx, dy)`` to where the reference puts each point; None without one.
     """
 
@@ -29,7 +29,7 @@ class StartingPoints:
 
     @classmethod
     def of(cls, observation: Observation, stage: StageTrace) -> StartingPoints:
-        """The scan as the stage found it; the network's image is the frame's, turned upright and resized."""
+        """The scan as projected by the stage; the network's image is the frame's, turned upright and resized."""
         camera, reference, frame = stage.camera, observation.reference, observation.frame
         if stage.upright is None and frame.original is None:
             projection = observation.projected(stage.before)
@@ -45,11 +45,11 @@ class StartingPoints:
             return cls(camera, projection, None)
         to_image = (camera.matrix @ reference[:3]).astype(np.float32)
         true = frame.points[projection.index, :3] @ to_image[:, :3].T + to_image[:, 3]
-        ahead = np.maximum(true[:, 2:], 1e-3)  # what is behind the true camera is off by a lot, whatever the figure
+        ahead = np.maximum(true[:, 2:], 1e-3)  # a point behind the true camera is far off in any case
         return cls(camera, projection, true[:, :2] / ahead - pixels)
 
     def nearest(self, stride: int) -> NDArray[np.int64]:
-        """``[h, w]``: row of the nearest point of each cell, -1 where there is none."""
+        """``[h, w]``: row of the nearest point of each cell, -1 in empty cells."""
         return nearest_per_cell(self.projection, self.camera, stride, np.arange(len(self.projection.depth)))
 
     def true_field(self, stride: int) -> NDArray[np.float32] | None:
@@ -78,9 +78,9 @@ class Match:
 
 
 def chosen_match(points: StartingPoints, results: StageDetail) -> Match | None:
-    """The nearest point of the cell the stage is surest of; None if no cell holds a point.
+    """The nearest point of the cell with the highest confidence; None if all cells are empty.
 
-    Cells whose search window reaches over the image's border are passed over where others exist.
+    Cells whose search window extends over the image's border are used only if there are no others.
     """
     finest = results.scales[0]
     winner = points.nearest(finest.stride)
@@ -99,7 +99,7 @@ def chosen_match(points: StartingPoints, results: StageDetail) -> Match | None:
 
 
 def match_of(points: StartingPoints, row: int) -> Match | None:
-    """A point of the scan, by its row; None where it does not fall into the network's image."""
+    """The match of a point of the scan, by its row; None if it is outside the network's image."""
     (found,) = np.nonzero(points.projection.index == row)
     if not len(found):
         return None
@@ -108,12 +108,12 @@ def match_of(points: StartingPoints, row: int) -> Match | None:
 
 
 def point_at(projection: Projection, pixel: tuple[float, float], reach: float) -> int | None:
-    """Row in the scan of the point that is seen nearest to a pixel, the nearer one in space where two are as near.
+    """Row of the point that is projected nearest to a pixel, and of two equally near ones, the closer one in space.
 
     Args:
-        projection: of the scan.
-        pixel: ``(u, v)``.
-        reach: distance in pixels up to which a point counts; None is returned where there is none.
+        projection: the projected scan.
+        pixel: the pixel ``(u, v)``.
+        reach: largest distance in pixels; None is returned if no point is within it.
     """
     off = np.linalg.norm(projection.pixels - np.asarray(pixel, np.float32), axis=1)
     near = np.flatnonzero(off <= reach)

@@ -15,11 +15,11 @@ from inspector.record.pictures.painting import Painter, paint_depth
 
 @dataclass(frozen=True)
 class Thinning:
-    """How many points of an overlay are kept, and how exactly.
+    """Density and precision of an overlay's points.
 
     Attributes:
-        cells_across: z-buffer cells over the image's width; one point of each cell stays.
-        pixel: grid that positions are rounded to, in pixels; coarser numbers compress better.
+        cells_across: number of z-buffer cells over the image's width, in each of which one point is kept.
+        pixel: grid to which positions are rounded, in pixels; coarser numbers compress better.
     """
 
     cells_across: int
@@ -33,7 +33,7 @@ class Overlay:
     Attributes:
         pixels: ``[M, 2]`` float32, ``(u, v)``.
         colors: ``[M, 3]`` uint8.
-        sizes: ``[M]`` float32, radii in points of the screen.
+        sizes: ``[M]`` float32, radii in screen points.
     """
 
     pixels: NDArray[np.float32] = field(repr=False)
@@ -41,7 +41,7 @@ class Overlay:
     sizes: NDArray[np.float32] = field(repr=False)
 
     def archetype(self) -> rr.Points2D:
-        """The points as Rerun draws them: half a pixel on, since its pixel centres are at x.5."""
+        """The points for Rerun, shifted by half a pixel since its pixel centres are at x.5."""
         sizes = self.sizes[:1] if len(np.unique(self.sizes)) < 2 else self.sizes
         return rr.Points2D(self.pixels + 0.5, colors=self.colors, radii=rr.Radius.ui_points(sizes))
 
@@ -49,13 +49,13 @@ class Overlay:
 def make_overlay(
     projection: Projection, camera: CameraModel, thinning: Thinning, paint: Painter = paint_depth
 ) -> Overlay:
-    """Thin a projected scan; the nearest point of each cell stays.
+    """Thin out a projected scan, keeping the nearest point of each cell.
 
     Args:
         projection: rows far to near, see `inspector.record.observation.Observation.projected`.
-        camera: whose image it is.
-        thinning: how many points to keep.
-        paint: gives the points their colours and sizes.
+        camera: camera of the image.
+        thinning: density of the points.
+        paint: gives the colours and sizes of points.
     """
     stride = max(1, round(camera.width / thinning.cells_across))
     winner = nearest_per_cell(projection, camera, stride, np.arange(len(projection.depth)))

@@ -16,24 +16,24 @@ from inspector.record.contents import Coloring
 from inspector.record.observation import Observation
 
 POINT_SIZE: Final = 1.4
-"""Radius in points of the screen, so that zooming separates the points instead of growing them."""
+"""Radius in screen points, so that zooming separates the points instead of enlarging them."""
 EDGE_SIZE: Final = 1.7
 REST_SIZE: Final = 0.7
 EDGE_JUMP: Final = 0.1
-"""A point is at an edge where a neighbour lies farther by this share of its range, and by half a metre."""
+"""Share of a point's range by which a neighbour at an edge is farther away, and at least half a metre."""
 EDGE_CELL_DEG: Final = (0.25, 0.5)
-"""Azimuth and elevation of a cell of the range image that neighbours are looked for in."""
+"""Azimuth and elevation of a cell of the range image in which neighbours are searched, in degrees."""
 EDGE_REACH: Final = 2
-"""Cells to either side in which a neighbour is looked for."""
+"""Number of cells to either side in which neighbours are searched."""
 
 Paint = tuple[NDArray[np.uint8], NDArray[np.float32]]
-"""``[M, 3]`` RGB and ``[M]`` radii in points of the screen."""
+"""``[M, 3]`` RGB and ``[M]`` radii in screen points."""
 Painter = Callable[[Projection, NDArray[np.int64]], Paint]
-"""Paints the points of a projection whose rows are given."""
+"""Paints the points in the given rows of a projection."""
 
 
 def make_painter(observation: Observation, coloring: Coloring) -> Painter:
-    """The painter of one frame: the same point has the same colour under every extrinsic, but for depth and error."""
+    """The painter of one frame; except for depth and error, a point has the same colour under every extrinsic."""
     points = observation.frame.points
     if coloring is Coloring.INTENSITY:
         return _by_scan(colors.map_colors(points[:, 3], *colors.robust_limits(points[:, 3])))
@@ -51,9 +51,9 @@ def paint_depth(projection: Projection, rows: NDArray[np.int64]) -> Paint:
 
 
 def depth_edges(points: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Points of a scan ``[N, >=3]`` behind which, to one side, the scene falls away as the scanner sees it: ``[N]``.
+    """Whether each point of a scan ``[N, >=3]`` is at a depth edge, next to which the scanner sees farther: ``[N]``.
 
-    It depends on the scan alone, so that every extrinsic's overlay highlights the same points.
+    It depends only on the scan, so that all overlays highlight the same points.
     """
     x, y, z = points[:, :3].T
     distance = np.sqrt(x * x + y * y + z * z)

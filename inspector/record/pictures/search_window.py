@@ -1,4 +1,4 @@
-"""The search window of one LiDAR cell: its scores, and where the point is now, was found, and truly belongs."""
+"""The search window of one LiDAR cell: its scores, and the initial, the found and the true position of the point."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ CELL_FRAME: colors.Rgb = (255, 0, 200)
 
 
 class SearchWindow:
-    """The window that a scale of a cost volume searches for one match, in cells, the cell itself in its middle."""
+    """The window of a cost volume in which one match is searched, in cells, with the cell itself at the centre."""
 
     def __init__(self, scale: ScaleTrace, match: Match) -> None:
-        """Take the window of the match's cell out of the volume."""
+        """Extract the window of the match's cell from the volume."""
         height, width = scale.occupied.shape
         x, y = match.cell(scale.stride)
         self._cell = min(x, width - 1), min(y, height - 1)
@@ -27,7 +27,7 @@ class SearchWindow:
         self._middle = np.array([self._scores.shape[1] // 2, self._scores.shape[0] // 2]) + 0.5
 
     def scores(self) -> rr.Image:
-        """The matching scores, dark to bright over the window's own extent."""
+        """The matching scores, dark to bright over the window's own range."""
         return rr.Image(colors.map_colors(self._scores, float(self._scores.min()), float(self._scores.max())))
 
     def cells(self) -> rr.Boxes2D:
@@ -40,7 +40,7 @@ class SearchWindow:
         )
 
     def truth(self) -> rr.Points2D | None:
-        """Where the reference puts the point, on the window's border if it lies beyond; None without reference."""
+        """The true position of the point, on the window's border if it is outside; None without a reference."""
         if self._true is None:
             return None
         height, width = self._scores.shape

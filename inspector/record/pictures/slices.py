@@ -1,4 +1,4 @@
-"""An aggregated cost volume as one picture: a tile for every displacement, and which tiles matter."""
+"""An aggregated cost volume as one picture: a tile for every displacement, with the important ones framed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from inspector import colors
 from inspector.record.pictures.channel_grid import palette_png, slice_grid
 
 INSET = 0.15
-"""How far a frame lies within another of the same tile, in heights of the tile."""
+"""Inset of a frame within another one of the same tile, relative to the tile's height."""
 BRIGHTEST_PERCENTILE = 90.0
 """Percentile of the cells' peak probabilities that is drawn brightest."""
 
@@ -25,7 +25,7 @@ def slices_picture(scale: ScaleTrace) -> rr.EncodedImage:
 
 
 def slice_marks(scale: ScaleTrace, true: NDArray[np.float32] | None) -> rr.Boxes2D:
-    """Frames around the tile without displacement, the one that won most cells and the truly right one.
+    """Frames around the tile without displacement, the one that won most cells and the true one.
 
     Args:
         scale: the volume.
@@ -40,7 +40,7 @@ def slice_marks(scale: ScaleTrace, true: NDArray[np.float32] | None) -> rr.Boxes
         marked.append((np.clip(typical, -middle, middle), colors.REFERENCE))
     tile, cells = np.array([width + 1, height + 1]), [tuple(cell) for cell, _ in marked]
     inset = [INSET * tile.min() * cells[:position].count(cell) for position, cell in enumerate(cells)]
-    return rr.Boxes2D(  # frames of one tile lie within each other
+    return rr.Boxes2D(  # frames of one tile are nested
         mins=[(middle + cell) * tile + by for cell, by in zip(cells, inset, strict=True)],
         sizes=[tile - 2 * by for by in inset],
         colors=[color for _, color in marked],
@@ -49,7 +49,7 @@ def slice_marks(scale: ScaleTrace, true: NDArray[np.float32] | None) -> rr.Boxes
 
 
 def _most_common(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The displacement ``(dx, dy)`` that most of ``[N, 2]`` share; none of no cells."""
+    """The most frequent displacement ``(dx, dy)`` of ``[N, 2]``; none if there are no cells."""
     if not len(cells):
         return np.zeros(2, dtype=np.int64)
     found, counts = np.unique(cells, axis=0, return_counts=True)

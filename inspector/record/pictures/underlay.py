@@ -1,4 +1,4 @@
-"""The picture under the maps: small, grey and dim, so that one sees which cell lies on what."""
+"""The image under the maps, small, grey and dim, which shows what each cell covers."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from inspector.record.observation import Observation
 from inspector.record.subtree import Subtree
 
 WIDTH = 288
-"""Pixels of it at most: a page shows it a third of a screen wide."""
+"""Largest width in pixels; a page shows it a third of a screen wide."""
 BRIGHTNESS = 0.75
 JPEG_QUALITY = 55
 BEHIND = -30.0
-"""Order in which it is drawn; images have -10."""
+"""Draw order; other images have -10."""
 
 
 def log_underlays(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log the picture that each stage saw once for every scale whose maps are shown, in that scale's cells."""
+    """Log the image that each stage saw, once for every scale whose maps are shown, in units of its cells."""
     for stage in observation.trace.stages:
         for scale in contents.scales(stage.detail):
             jpeg, width, height = _seen_by(observation, stage)
@@ -36,7 +36,7 @@ def log_underlays(rec: Subtree, observation: Observation, contents: Contents) ->
 
 
 def _seen_by(observation: Observation, stage: StageTrace) -> tuple[bytes, int, int]:
-    """JPEG, width and height of what a stage saw; stages differ in how large they see it and how it was turned."""
+    """JPEG, width and height of the image that a stage saw, whose size and rotation depend on the stage."""
     upright = None if stage.upright is None else stage.upright.tobytes()
     size = (stage.camera.width, stage.camera.height) if upright else (0, 0)
     return _encoded(observation, upright, size, stage.camera.matrix.tobytes() if upright else b"")

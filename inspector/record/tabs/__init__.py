@@ -1,4 +1,4 @@
-"""The tabs of the viewer: one module a tab says what it logs, how it is laid out, and its legend.
+"""The tabs of the viewer, each a module with its data, layout and legend.
 
-`registry` lists them and says what a tab is, `blueprint` puts them side by side; `views` and `table` are shared parts.
+`registry` defines and lists them, `blueprint` puts them side by side, and `views` and `table` are shared parts.
 """

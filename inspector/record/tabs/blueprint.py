@@ -1,4 +1,4 @@
-"""The layout of the viewer: the tabs of a recording side by side, and everything else out of the way."""
+"""The layout of the viewer: the tabs of a recording side by side, with all panels collapsed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from inspector.record.tabs.registry import Tab, wanted_tabs
 from inspector.record.tabs.views import View
 
 FRAMES_PER_SECOND = 10.0
-"""Speed at which frames play: that of KITTI's scanner."""
+"""Playback speed in frames per second, that of KITTI's scanner."""
 
 
 def make_blueprint(
@@ -24,14 +24,14 @@ def make_blueprint(
     timeline: str = entities.FRAME,
     following: bool = False,
 ) -> rrb.Blueprint:
-    """The layout of a recording, or of the part of a recording that lies below a prefix.
+    """The layout of a recording, or of the part of a recording below a prefix.
 
     Args:
         layout: what the recording contains.
-        tabs: which tabs to show; all that it has data for, if not given.
-        prefix: of the entities' paths.
-        timeline: that the viewer stands on.
-        following: always show the newest data, until somebody chooses a time.
+        tabs: tabs to show; None for all that have data.
+        prefix: prefix of the entity paths.
+        timeline: timeline to select in the viewer.
+        following: whether to show the newest data until the user chooses a time.
     """
     shown = wanted_tabs(layout) if tabs is None else tabs
     root = rrb.Tabs(*(tab.view(layout) for tab in shown), active_tab=0, name=prefix.strip("/") or None)
@@ -53,7 +53,7 @@ def make_blueprint(
 
 
 def move_below(part: View, prefix: str) -> None:
-    """Put a prefix before every entity path in views that are not shown yet."""
+    """Put a prefix before every entity path of views that are not shown yet."""
     if isinstance(part, rrb.Container):
         for child in part.contents:
             move_below(child, prefix)

@@ -1,7 +1,7 @@
-"""Tab *Cascade*: the overlay after every stage, and where each stage moves the points and how sure it is of it.
+"""Tab *Cascade*: the overlay after every stage, and the displacements and confidences of each stage.
 
-Overlays belong to `Part.OVERLAYS`; on the timeline `entities.STEP` one of them walks through the stages of a frame.
-A stage's displacements and confidences belong to `Part.VOLUMES`.
+Overlays belong to `Part.OVERLAYS`; on the timeline `entities.STEP` one of them steps through the stages of a frame. A
+stage's displacements and confidences belong to `Part.VOLUMES`.
 """
 
 from __future__ import annotations
@@ -31,32 +31,32 @@ from inspector.record.tabs.views import (
 NAME = "Cascade"
 
 ARROW_SPACING = (2, 3)
-"""Fewest and most cells between two arrows of the displacement field: long arrows stand farther apart."""
+"""Smallest and largest distance between arrows of the displacement field, in cells; long arrows are farther apart."""
 ARROW_COLOR = (20, 20, 20)
 
 
 def displacement(stage: int) -> str:
-    """Where the network moves the LiDAR cells, as a map of flow colours."""
+    """Entity of the displacements of the LiDAR cells, as a map in flow colours."""
     return f"stage_{stage}/displacement"
 
 
 def displacement_arrows(stage: int) -> str:
-    """The same, as arrows in cells."""
+    """Entity of the displacements as arrows, in cells."""
     return f"{displacement(stage)}/arrows"
 
 
 def confidence(stage: int) -> str:
-    """How sure the network is of each displacement."""
+    """Entity of the confidence of each displacement."""
     return f"stage_{stage}/confidence"
 
 
 def wanted(layout: Layout) -> bool:
-    """Where stages ran, and their overlays or maps are recorded."""
+    """Whether stages ran, and their overlays or maps are recorded."""
     return bool(layout.stages and layout.contents.parts & {Part.OVERLAYS, Part.VOLUMES})
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log what the colours of points and maps stand for."""
+    """Log the legends of points and maps."""
     log_point_legend(rec, layout.contents.color)
     if Part.VOLUMES in layout.contents.parts:
         log_map_legends(rec)
@@ -73,7 +73,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 
 
 def view(layout: Layout) -> View:
-    """A page with all overlays, one with the overlay that walks through the stages, and one for every stage."""
+    """A page with all overlays, one with the overlay that steps through the stages, and one for every stage."""
     pages: list[View] = []
     if Part.OVERLAYS in layout.contents.parts:
         overlays = [overlay_view(f"Start: {layout.start.lower()}", entities.OVERLAY_MISCALIBRATED, layout.image)]
@@ -131,7 +131,7 @@ def _log_overlays(rec: Subtree, observation: Observation, contents: Contents) ->
     if observation.reference is not None:
         rec.set_step(frame.index, entities.STEP_REFERENCE)
         overlays.log_reference(rec, entities.OVERLAY_CURRENT, observation.reference)
-    rec.set_step(frame.index, entities.STEP_RESULT)  # last, since the other timelines show what was logged last
+    rec.set_step(frame.index, entities.STEP_RESULT)  # last, since the other timelines show what is logged last
     overlays.log_result(rec, entities.OVERLAY_CURRENT)
     rec.set_step(frame.index, 0)
 

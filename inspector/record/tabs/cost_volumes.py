@@ -1,4 +1,4 @@
-"""Tab *Cost volumes*: which displacement won in every cell, which is true, and what the volumes themselves hold.
+"""Tab *Cost volumes*: the best and the true displacement of every cell, and the volumes themselves.
 
 The maps and the search window of one cell belong to `Part.VOLUMES`, the raw volumes and all their slices to
 `Part.TENSORS`.
@@ -44,7 +44,7 @@ BEST_MATCH = "best_match"
 TRUE_MATCH = "true_match"
 """Displacement to where the reference puts each cell's point, as flow colours."""
 PEAK_PROBABILITY = "peak_probability"
-"""Probability of the best match: how sure each cell is."""
+"""Probability of the best match of each cell."""
 SLICES = "slices"
 """All slices of the aggregated volume side by side, one for every displacement."""
 SLICE_MARKS = f"{SLICES}/marks"
@@ -52,26 +52,26 @@ SLICE_MARKS = f"{SLICES}/marks"
 WINDOW = "window"
 """The search window of the chosen cell."""
 WINDOW_CELLS = f"{WINDOW}/cells"
-"""The cell where the point is now and the one where it was found, framed in that window."""
+"""Frames in the window around the cell where the point is now and the one where it was found."""
 WINDOW_TRUTH = f"{WINDOW}/truth"
-"""Where the reference puts the point, in that window or, if outside, on its border."""
+"""True position of the point in the window, or on its border if outside."""
 CHOSEN_CELL = "chosen_cell"
 """A frame around the chosen cell, drawn over the maps."""
 
 LEGEND_SLICES = "legend/slices"
-"""What the frames among the slices stand for."""
+"""Legend of the frames among the slices."""
 LEGEND_WINDOW = "legend/window"
-"""What the marks in the search window stand for."""
+"""Legend of the marks in the search window."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
 
 
 def wanted(layout: Layout) -> bool:
-    """Where the run kept cost volumes, and their maps or the volumes are recorded."""
+    """Whether the run kept cost volumes, and their maps or the volumes are recorded."""
     return bool(layout.stages_with_volumes and layout.contents.parts & {Part.VOLUMES, Part.TENSORS})
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log what the colours of the maps and the marks in the window stand for."""
+    """Log the legends of the maps and of the marks in the window."""
     true = {"true": colors.REFERENCE} if layout.has_reference else {}
     if Part.TENSORS in layout.contents.parts:
         marks = {"tile of no displacement": colors.INITIAL, "won most cells": colors.FOUND}
@@ -84,7 +84,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log the volumes of every stage that kept them."""
+    """Log the cost volumes of every stage that kept them."""
     if not contents.parts & {Part.VOLUMES, Part.TENSORS}:
         return
     for stage in observation.trace.stages:
@@ -136,7 +136,7 @@ def _map_row(number: int, grid: Grid, layout: Layout, alone: bool) -> View:
 
 
 def _slices(stage: StageLayout) -> View:
-    """The finest scale large, the others beside it."""
+    """The slices, the finest scale large and the others beside it."""
     finest, *others = (_slices_view(stage.number, grid) for grid in stage.grids)
     return rrb.Horizontal(finest, rrb.Vertical(*others), column_shares=[2.0, 1.0]) if others else finest
 
@@ -188,7 +188,7 @@ def log_windows(rec: Subtree, observation: Observation, contents: Contents, poin
 
 
 def _log_maps(rec: Subtree, number: int, scale: ScaleTrace, true: NDArray[np.float32] | None) -> None:
-    """Which displacement won in every cell, how surely, and which is the true one."""
+    """Log the best displacement of every cell, its probability, and the true displacement."""
     stride, reach = scale.stride, reach_px(scale)
     best = flow_image(subcell_match(scale) * stride, reach, scale.occupied)
     rec.log(entities.of_scale(number, stride, BEST_MATCH), best)
@@ -199,7 +199,7 @@ def _log_maps(rec: Subtree, number: int, scale: ScaleTrace, true: NDArray[np.flo
 
 
 def _log_window(rec: Subtree, number: int, scale: ScaleTrace, window: SearchWindow) -> None:
-    """The search window of the chosen cell, and that cell on the maps."""
+    """Log the search window of the chosen cell, and that cell on the maps."""
     rec.log(entities.of_scale(number, scale.stride, CHOSEN_CELL), window.frame())
     rec.log(entities.of_scale(number, scale.stride, WINDOW), window.scores())
     rec.log(entities.of_scale(number, scale.stride, WINDOW_CELLS), window.cells())
@@ -209,8 +209,11 @@ def _log_window(rec: Subtree, number: int, scale: ScaleTrace, window: SearchWind
 
 
 def _log_tensors(rec: Subtree, number: int, scale: ScaleTrace) -> None:
-    """The volume before and after aggregation as it is."""
-    low, high = colors.robust_limits(scale.volume)[0], float(scale.volume.max())  # most of the highest are in one slice
+    """Log the raw volume before and after aggregation."""
+    low, high = (
+        colors.robust_limits(scale.volume)[0],
+        float(scale.volume.max()),
+    )  # most of the highest values are in one slice
     raw = rr.Tensor(scale.volume, dim_names=TENSOR_DIMENSIONS, value_range=(low, max(high, low + 1e-3)))
     rec.log(entities.of_scale(number, scale.stride, COST_VOLUME), raw)
     aggregated = rr.Tensor(scale.probability, dim_names=TENSOR_DIMENSIONS)

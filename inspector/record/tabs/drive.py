@@ -1,7 +1,7 @@
-"""Tab *Whole drive as one*: how each of the six parameters converges that are estimated from all frames of a drive.
+"""Tab *Whole drive as one*: the convergence of the six parameters that are estimated from all frames of a drive.
 
-Each curve has its uncertainty band, and beside them stands the verdict. The tab is there where `Layout.with_drive` says
-so, whatever else is recorded.
+Each curve has its uncertainty band, and the verdict is beside them. The tab exists if `Layout.with_drive` is set,
+whatever else is recorded.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm",
 """Parameters of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
 LEGEND_CURVES = "legend/drive"
-"""The names of the curves in their colours."""
+"""Legend of the curves."""
 CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT, "zero": colors.INITIAL}
-"""Curves of every parameter, with their colours."""
+"""Curves of every parameter, and their colours."""
 
 
 NOT_YET = "# Not solved yet\n\nThe whole drive is solved as one when the last of its frames is calibrated."
@@ -43,17 +43,17 @@ TEXT_SHARE = 0.24
 
 
 def parameter(name: str) -> str:
-    """One parameter of the extrinsic estimated from the whole drive."""
+    """Entity of one parameter of the drive's extrinsic."""
     return f"drive/{name}"
 
 
 def curve(name: str, kind: str) -> str:
-    """A parameter's curve: ``estimate``, the ``upper`` or ``lower`` end of its uncertainty, or ``zero``."""
+    """Entity of a parameter's curve: ``estimate``, the ``upper`` or ``lower`` end of its uncertainty, or ``zero``."""
     return f"{parameter(name)}/{kind}"
 
 
 def wanted(layout: Layout) -> bool:
-    """Where an estimate from the whole drive follows the frames."""
+    """Whether an estimate from the whole drive follows the frames."""
     return layout.with_drive
 
 
@@ -71,7 +71,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log nothing of a single frame: the estimate needs all of them, see `log_drive`."""
+    """Log nothing for a single frame, since the estimate needs all of them; see `log_drive`."""
 
 
 def log_drive(
@@ -85,12 +85,12 @@ def log_drive(
     """Log the estimate after each frame of its history, on the frames' own times.
 
     Args:
-        rec: the frames are already in it.
-        estimate: of the drive.
-        reference: that curves are relative to; without one, the estimate of all frames.
-        seconds: time of every recorded frame by its index.
-        given: verdict on the extrinsic that the drive started from, where that was to be verified.
-        remarks: what else is to be said beside it, of its frames one by one.
+        rec: recording that has the frames already.
+        estimate: estimate of the drive.
+        reference: extrinsic to which curves are relative; None for the estimate from all frames.
+        seconds: time of every recorded frame, by its number.
+        given: verdict on the extrinsic that the drive started from, if that was to be verified.
+        remarks: further sentences, on the single frames.
     """
     lines = _lines(estimate, reference, given, remarks)
     text = rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
@@ -107,7 +107,7 @@ def log_drive(
 
 
 def view(layout: Layout) -> View:
-    """The verdict beside six plots: a good calibration runs into zero, inside its band."""
+    """The verdict beside six plots, whose curves converge to zero for a good calibration."""
     views = [
         curve_view(f"{name.capitalize()} off {_zero(layout)} [{unit}]", f"/{parameter(name)}")
         for name, unit in PARAMETERS.items()
@@ -118,7 +118,7 @@ def view(layout: Layout) -> View:
 
 
 def _zero(layout: Layout) -> str:
-    """What the curves are relative to."""
+    """The extrinsic to which the curves are relative, in words."""
     return "the reference" if layout.has_reference else "the estimate from all frames"
 
 
@@ -138,12 +138,12 @@ def log_drive_overlay(rec: Subtree, observation: Observation, contents: Contents
 def _lines(
     estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None, remarks: Sequence[str]
 ) -> list[str]:
-    """Verdicts, errors where they are known, frames and the matrix, as Markdown."""
+    """Verdicts, error if known, frames and the matrix, as Markdown."""
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     if estimate.verdict is not None:
         lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
         if estimate.verdict.covariance is not None:
-            lines.pop()  # how sure it is and how far off make one paragraph
+            lines.pop()  # uncertainty and error form one paragraph
     solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"
     if reference is not None:
         error = pose_error(estimate.camera_from_lidar, reference)

@@ -1,6 +1,6 @@
-"""Tab *Inside*: what a method other than the cascade has to show of its work, in pictures and curves of its own.
+"""Tab *Inside*: pictures and curves that a method other than the cascade shows of its work.
 
-They belong to `Part.VOLUMES`, as the cascade's maps do. A method names them; nothing here knows any method.
+They belong to `Part.VOLUMES`, like the cascade's maps. The method names them; this module knows no method.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ NAME = "Inside"
 
 JPEG_QUALITY = 85
 LARGEST = 1280
-"""Pixels along the longer side of a picture; a larger one is made smaller."""
+"""Largest side of a picture in pixels; larger ones are scaled down."""
 COLUMNS = 2
 
 
 def exhibit(stage: int, position: int) -> str:
-    """One picture of a stage, by its position among them."""
+    """Entity of a picture of a stage, by its position."""
     return f"stage_{stage}/inside/picture_{position}"
 
 
 def curve(stage: int, position: int) -> str:
-    """One curve of a stage, likewise."""
+    """Entity of a curve of a stage, by its position."""
     return f"stage_{stage}/inside/curve_{position}"
 
 
 def wanted(layout: Layout) -> bool:
-    """Where a method shows something, and it is recorded."""
+    """Whether the method shows something, and it is recorded."""
     return any(map(_shown, layout.stages)) and Part.VOLUMES in layout.contents.parts
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log nothing: names stand above the views."""
+    """Log nothing, since names are above the views."""
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log the pictures of every stage, and its curves over their steps."""
+    """Log the pictures and the curves of every stage."""
     if Part.VOLUMES not in contents.parts:
         return
     for stage in observation.trace.stages:
@@ -85,7 +85,7 @@ def _page(stage: StageLayout, layout: Layout, name: str) -> View:
 
 
 def _picture(shown: Exhibit) -> rr.EncodedImage | rr.Image:
-    """A picture as it is; a map from dark, its low values, to bright, and empty where it has none."""
+    """A picture as it is; a map from dark (low) to bright (high), transparent where it has no value."""
     values = shown.picture
     if values.ndim == 3:
         scale = LARGEST / max(values.shape[:2])

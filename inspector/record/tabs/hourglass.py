@@ -1,9 +1,9 @@
-"""Tab *Hourglass*: where the probability of each cell's window lies before and after aggregation, and the activations.
+"""Tab *Hourglass*: the probability within each cell's window before and after aggregation, and the activations.
 
-A cell has decided when all probability of its search window lies on one displacement; where the truth is known, a map
-says how much of it lies on that. Before aggregation it is the probability that the matching scores alone would give.
-The channels behind that are the same ones on both sides. What leaves the hourglass is some ten times as large as what
-enters it, so that each side has a scale of its own, which stands above it.
+A cell is decided when one displacement has all probability of its search window; with a reference, a map shows the
+share on the true displacement. Before aggregation, it is the probability by the matching scores alone. The same
+channels are shown before and after. Activations that leave the hourglass are about ten times as large as those that
+enter, so each side has a scale of its own above it.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ NAME = "Hourglass"
 
 # entities of every scale of every stage, see `entities.of_scale`
 DECIDED_BEFORE = "decided_before"
-"""How far the matching scores alone decide each cell."""
+"""How decided each cell is by the matching scores alone."""
 DECIDED_AFTER = "decided_after"
-"""How far the aggregated volume does."""
+"""How decided each cell is by the aggregated volume."""
 TRUTH_BEFORE = "on_truth_before"
-"""The share of a window's probability within a cell of the true displacement, by the matching scores alone."""
+"""Share of a window's probability within a cell of the true displacement, by the matching scores alone."""
 TRUTH_AFTER = "on_truth_after"
-"""The same of the aggregated volume."""
+"""The same share by the aggregated volume."""
 BEFORE = "hourglass_before"
-"""Activations entering the hourglass, channels side by side."""
+"""Activations that enter the hourglass, channels side by side."""
 AFTER = "hourglass_after"
-"""Activations leaving it, channels side by side."""
+"""Activations that leave the hourglass, channels side by side."""
 
 
 def wanted(layout: Layout) -> bool:
-    """Where the run kept activations, and they are recorded."""
+    """Whether the run kept activations, and they are recorded."""
     return bool(layout.stages_with_volumes) and Part.HOURGLASS in layout.contents.parts
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log what is bright."""
+    """Log the legend of brightness."""
     log_decided_legend(rec, layout.has_reference)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log what aggregation did in every stage that kept it."""
+    """Log the maps and channels of every stage that kept them."""
     if Part.HOURGLASS not in contents.parts:
         return
     for stage in observation.trace.stages:
@@ -69,7 +69,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 
 
 def view(layout: Layout) -> View:
-    """For every stage a page with its probabilities and one with its channels, a row for every scale."""
+    """For every stage, a page with its probabilities and one with its channels, with a row for every scale."""
     return rrb.Tabs(*(_stage_pages(stage, layout) for stage in layout.stages_with_volumes), name=NAME)
 
 
@@ -102,7 +102,7 @@ def _channels_row(number: int, grid: Grid) -> View:
 
 
 def _log_probability(rec: Subtree, stage: StageTrace, scale: ScaleTrace, points: StartingPoints) -> None:
-    """How decided the windows are, and how much of them lies on the truth, before and after aggregation."""
+    """Log how decided the windows are and their share on the truth, before and after aggregation."""
     before = matching_probability(scale)
     maps = {DECIDED_BEFORE: decidedness(before), DECIDED_AFTER: decidedness(scale.probability)}
     seen = dict.fromkeys(maps, scale.occupied)
@@ -116,7 +116,7 @@ def _log_probability(rec: Subtree, stage: StageTrace, scale: ScaleTrace, points:
 
 
 def _log_activations(rec: Subtree, number: int, scale: ScaleTrace) -> None:
-    """The channels that vary most after aggregation, of those that both sides have."""
+    """Log the channels that vary most after aggregation, of those that both sides have."""
     both = min(len(scale.before), len(scale.after))
     channels = liveliest_channels(scale.after[:both])
     for name, activations in ((BEFORE, scale.before), (AFTER, scale.after)):

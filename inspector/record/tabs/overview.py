@@ -1,9 +1,9 @@
-"""Tab *Overview*: the answer first, as one large picture and in words.
+"""Tab *Overview*: the result first, as one large picture and in words.
 
-The large picture is that of the result: of the whole drive where it is solved as one. On the timeline `entities.STEP`
-it walks from the start through every stage and the reference to the result, and by the names above it it can be changed
-for these. Below it are the curves over the frames; beside it words, and under these the start and the reference.
-Its overlays are in every recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
+The large picture shows the result, which is the whole drive's if that is solved. On the timeline `entities.STEP` it
+steps from the start through every stage and the reference to the result; the tabs above it switch between these. Below
+it are curves over the frames, beside it is text, and below the text are start and reference. Its overlays are in every
+recording, since reports and comparisons show them too; its curves belong to `Part.CURVES`.
 """
 
 from __future__ import annotations
@@ -40,38 +40,38 @@ WORST = "Worst frame"
 LARGE_SHARE = 0.62
 """Share of the tab's width that the large picture takes."""
 LARGEST_OVERLAY, LARGEST_SMALL = 600.0, 250.0
-"""Heights in pixels beyond which what else is in their column would have too little room."""
+"""Largest heights of both kinds of pictures in pixels, which leave room for the rest of their columns."""
 _SMALL = (entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_REFERENCE)
 
 FIT = "fit"
-"""Curves of the error in pixels of the frame's image that the stages expect of their matches."""
+"""Curves of the match error that the stages expect, in pixels of the frame's image."""
 FIT_LIMIT = f"{FIT}/limit"
-"""The match error up to which the last stage's result is believed."""
+"""Largest match error at which the last stage's result is believed."""
 LEGEND_CURVES = "legend/curves"
-"""The names of the curves in their colours."""
+"""Legend of the curves."""
 SUCCESS = {"rotation": 1.0, "translation": 2.5}
 """Limits of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
 
 
 def fit_stage(number: int) -> str:
-    """Curve of the match error of one stage."""
+    """Entity of the curve of one stage's match error."""
     return f"{FIT}/stage_{number}"
 
 
 def wanted(layout: Layout) -> bool:
-    """Every recording has data for it."""
+    """Always true, since every recording has data for it."""
     return True
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log what the points' colours stand for, and the curves' names and colours."""
+    """Log the legends of points and curves."""
     log_point_legend(rec, layout.contents.color)
     if Part.CURVES in layout.contents.parts:
         _log_curve_styles(rec, layout)
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log the three overlays of a frame and a point of every curve."""
+    """Log the overlays of a frame and its point of every curve."""
     trace, reference = observation.trace, observation.reference
     overlays = frame_overlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, trace.initial)
@@ -84,13 +84,13 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 
 
 def log_worst(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Show a frame's result in the tab of the worst one, in place of an earlier frame's."""
+    """Show a frame's result in the tab of the worst frame, replacing an earlier one."""
     frame_overlays(observation, contents).log_worst(rec)
     rec.log_for_all(entities.IMAGE_WORST, image_of(observation.frame))
 
 
 def view(layout: Layout) -> View:
-    """The large picture above curves, and beside them what is to be said of it."""
+    """The large picture above curves, and the text beside them."""
     names = _pictures(layout)
     pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
     if layout.with_worst:
@@ -116,7 +116,7 @@ def view(layout: Layout) -> View:
 
 
 def _pictures(layout: Layout) -> dict[str, str]:
-    """The names above the large picture, and the overlay that each shows; the result first."""
+    """The tabs of the large picture, and the overlay that each shows; the result comes first."""
     names = {"Result (on “step”: every stage)": entities.OVERLAY_CURRENT}
     if not layout.stages or Part.OVERLAYS not in layout.contents.parts:
         names = {"Result": entities.OVERLAY_DRIVE if layout.with_drive else entities.OVERLAY_CORRECTED}
@@ -127,7 +127,7 @@ def _pictures(layout: Layout) -> dict[str, str]:
 
 
 def _height(layout: Layout, share: float) -> float:
-    """Height in pixels of a picture with its caption that takes ``share`` of the screen's width."""
+    """Height in pixels of a picture with its caption, if it takes ``share`` of the screen's width."""
     width, height = layout.image
     return share * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
 
@@ -152,7 +152,7 @@ def _curve_views(layout: Layout) -> list[View]:
 
 
 def _log_errors(rec: Subtree, observation: Observation) -> None:
-    """Rotation in degrees and translation in centimetres, at the start, after every stage and of the result."""
+    """Log the errors in degrees and centimetres of the start, every stage and the result."""
     trace = observation.trace
     if observation.reference is None:
         return
@@ -167,7 +167,7 @@ def _log_errors(rec: Subtree, observation: Observation) -> None:
 
 
 def _log_fit(rec: Subtree, observation: Observation) -> None:
-    """The match error that every stage expects, which needs no reference, and the limit of the last one's."""
+    """Log the match error that every stage expects, which needs no reference, and the limit of the last one's."""
     trace = observation.trace
     for stage in trace.stages:
         if not (trace.method and math.isnan(stage.match_error_px)):

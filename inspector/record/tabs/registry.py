@@ -1,4 +1,4 @@
-"""The viewer's tabs, in their order. A new one is a module beside this one, and its name in `TABS`."""
+"""The viewer's tabs, in order. A new tab is a module beside this one, listed in `TABS`."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from inspector.record.tabs.views import View
 
 
 class Tab(Protocol):
-    """What a tab records and how it shows it; the modules here are tabs themselves.
+    """The interface of a tab: what it records and how it shows it; the modules here implement it.
 
-    A tab may show entities of another, but each entity is logged by one alone; legends may be logged by several.
+    A tab may show entities of another, but each entity is logged by one tab only, except legends.
 
     Attributes:
-        NAME: its title in the viewer.
+        NAME: title in the viewer.
     """
 
     NAME: str
 
     def wanted(self, layout: Layout) -> bool:
-        """Whether a recording has anything for this tab; if not, no other function of it is called."""
+        """Whether a recording has data for this tab; if not, its other functions are not called."""
         ...
 
     def log_once(self, rec: Subtree, layout: Layout) -> None:
-        """Log with `Subtree.log_once` what holds for all frames: legends, names and colours of curves."""
+        """Log what applies to all frames, with `Subtree.log_once`: legends, names and colours of curves."""
         ...
 
     def log(self, rec: Subtree, observation: Observation, contents: Contents) -> None:
-        """Log one frame; the timelines stand at it, before its first stage, and must stand there again afterwards."""
+        """Log one frame; the timelines are at the frame, before its first stage, and must be so again afterwards."""
         ...
 
     def view(self, layout: Layout) -> View:
-        """The views of the tab, of which each has data; entities are named as they are logged."""
+        """The views of the tab, each of which has data; entities are named as they are logged."""
         ...
 
 

@@ -1,7 +1,7 @@
-"""Tab *3D*: the scan coloured by the image, and the camera where every stage believes it is.
+"""Tab *3D*: the scan coloured by the image, and the camera's pose after every stage.
 
-The world is the LiDAR's own frame (x forward, y left, z up). The scan therefore stands still and
-the cameras move; what the extrinsic changes about the scan is which pixel colours which point.
+The world is the LiDAR's own frame (x forward, y left, z up). The scan is therefore static and the cameras move; the
+extrinsic only changes which pixel colours which point.
 """
 
 from __future__ import annotations
@@ -26,34 +26,34 @@ NAME = "3D"
 
 WORLD = "world"
 CLOUD = "world/cloud"
-"""Positions, once a frame, and colours through every extrinsic: components of the archetype `COLORS_THROUGH`."""
+"""Positions, logged once per frame, and colours under every extrinsic: components of the archetype `COLORS_THROUGH`."""
 COLORS_THROUGH = "colors_through"
 LIDAR = "world/lidar"
 CAMERA_INITIAL = "world/camera/initial"
 CAMERA_REFERENCE = "world/camera/reference"
 LEGEND_CAMERAS = "legend/stages"
-"""The names of the frustums in their colours."""
+"""Legend of the frustums."""
 
 SPARSE, DENSE = 5_000, 30_000
-"""Points of the cloud at most."""
+"""Largest numbers of points of the cloud, in sparse and in dense recordings."""
 POINT_SIZE = 2.2
 FRUSTUM_LENGTH_M = 1.2
 BACKGROUND = (44, 47, 54)
-"""Grey enough that dark points of the picture stay visible."""
+"""Background, a grey on which dark points stay visible."""
 
 
 def camera_stage(number: int) -> str:
-    """The camera's frustum in the LiDAR frame after a stage."""
+    """Entity of the camera's frustum in the LiDAR frame after a stage."""
     return f"world/camera/stage_{number}"
 
 
 def wanted(layout: Layout) -> bool:
-    """Where it is recorded."""
+    """Whether the scene is recorded."""
     return Part.SCENE in layout.contents.parts
 
 
 def log_once(rec: Subtree, layout: Layout) -> None:
-    """Log the world's axes, the LiDAR and the names of the cameras in their colours."""
+    """Log the world's axes, the LiDAR and the legend of the cameras."""
     rec.log_once(WORLD, rr.ViewCoordinates.FLU)
     rec.log_once(LIDAR, rr.TransformAxes3D(0.5), rr.Transform3D())
     names = {layout.start.lower(): colors.INITIAL}
@@ -62,7 +62,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log the cloud of a frame, its colours through every extrinsic, and a camera for each."""
+    """Log the cloud of a frame, its colours under every extrinsic, and a camera for each."""
     if Part.SCENE not in contents.parts:
         return
     frame, trace = observation.frame, observation.trace
@@ -83,7 +83,7 @@ def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
 
 
 def view(layout: Layout) -> View:
-    """A page with the cloud coloured through start, result and reference, and a page for every extrinsic."""
+    """A page with the cloud coloured under start, result and reference, and a page for every extrinsic."""
     seen = {layout.start: ("initial", CAMERA_INITIAL)}
     seen |= {stage.title: (f"stage_{stage.number}", camera_stage(stage.number)) for stage in layout.stages}
     last, (through, _) = list(seen.items())[-1]
@@ -108,7 +108,7 @@ def view(layout: Layout) -> View:
 def frustum(
     camera_from_lidar: Extrinsic, camera: PinholeCamera, color: colors.Rgb
 ) -> tuple[rr.Transform3D, rr.Pinhole]:
-    """The camera's place in the LiDAR frame, and its field of view."""
+    """The camera's pose in the LiDAR frame, and its field of view."""
     lidar_from_camera = invert(camera_from_lidar)
     return (
         rr.Transform3D(translation=lidar_from_camera[:3, 3], mat3x3=lidar_from_camera[:3, :3]),
@@ -124,13 +124,13 @@ def frustum(
 
 
 def _scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> rrb.Spatial3DView:
-    """The cloud seen over the camera's shoulder.
+    """The cloud, seen from behind the camera.
 
     Args:
-        name: of the view.
-        through: whose colours the cloud has: a component of `COLORS_THROUGH`.
+        name: name of the view.
+        through: component of `COLORS_THROUGH` with the colours of the cloud.
         cameras: entities of the frustums to draw.
-        layout: says where the camera is.
+        layout: layout with the pose of the camera.
     """
     mapping = VisualizerComponentMapping(
         target="Points3D:colors",
@@ -154,7 +154,7 @@ def _scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> 
 
 
 def _seen_from(layout: Layout, ahead: float, left: float, up: float) -> Xyz:
-    """A position in the LiDAR frame, given in metres from the camera along its heading."""
+    """A position in the LiDAR frame, given in metres relative to the camera and its heading."""
     (x, y, z), (dx, dy, _) = layout.position, layout.forward
     length = math.hypot(dx, dy) or 1.0
     dx, dy = dx / length, dy / length

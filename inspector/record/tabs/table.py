@@ -1,7 +1,7 @@
-"""The text panel: what every stage did to this frame, as Markdown.
+"""The text panel: the effect of every stage on this frame, as Markdown.
 
-Timings are left out on purpose: they differ from run to run, and two recordings of one seed must be
-equal. The command line prints them.
+It has no timings, which differ from run to run, since two recordings with one seed must be equal; the command line
+prints them.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NOTHING = "–"
 READING_AID = (
-    "Where the calibration is right, jumps in the points' colours lie on the edges of the picture: change between the "
-    "pictures by their names above them, or choose the timeline `step` below and press the arrow keys: start, every "
-    "stage, truth and result of each frame follow one another in the same place."
+    "Where the calibration is right, jumps in the points' colours lie on edges of the image. Switch between the images "
+    "by the tabs above them, or select the timeline `step` below and press the arrow keys to step through start, every "
+    "stage, reference and result of each frame in the same place."
 )
 
 
 def stage_table(observation: Observation, path: Callable[[str], str] | None = None) -> str:
-    """The table of one frame, with the stages that did not run and why.
+    """The table of one frame, including the stages that did not run and the reasons.
 
     Args:
-        observation: the frame and what was done to it.
-        path: gives the full path of an entity, so that the stages' names link to their overlays; None where these are
+        observation: the frame and its calibration.
+        path: gives the full path of an entity, so that the names of stages link to their overlays; None if these are
             not recorded.
     """
     lines = [
@@ -45,19 +45,19 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
     ]
     lines += [f"{stage.reason}\n" for stage in observation.skipped]
     if observation.reference is None:
-        lines += ["*No reference extrinsic is known for these frames, so there are no errors.*", ""]
+        lines += ["*These frames have no reference extrinsic, so there are no errors.*", ""]
     return "\n".join([*lines, *_extrinsic(observation.trace), "", READING_AID, ""])
 
 
 def _verdicts(observation: Observation) -> list[str]:
-    """On the extrinsic that the run started from, where that is verified, and on what was found."""
+    """The verdicts on the extrinsic that the run started from, if that is verified, and on the result."""
     given, found = observation.given, observation.trace.verdict
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     return lines if found is None else lines + markdown_lines(found, "" if given is None else OF_RESULT)
 
 
 def _headline(observation: Observation) -> str:
-    """The result in a line."""
+    """The result in one line."""
     frame, trace = observation.frame, observation.trace
     if trace.rejected:
         return f"Frame {frame.index}: left as it was"
@@ -72,16 +72,19 @@ def _headline(observation: Observation) -> str:
 
 
 def _match_error(observation: Observation) -> list[str]:
-    """How well picture and scan fit together after the last stage, in pixels of the frame's image."""
+    """The match error after the last stage, in pixels of the frame's image."""
     trace = observation.trace
     if not trace.stages or math.isinf(trace.match_error_limit_px):
         return []
     last = trace.stages[-1]
     found = f"{observation.image_px(last, last.match_error_px):.1f} px"
     limit = f"{observation.image_px(last, trace.match_error_limit_px):.1f} px"
-    lines = [f"After stage {last.number} matches are expected to be {found} off; at most {limit} are believed.", ""]
+    lines = [f"Expected match error after stage {last.number}: {found}; results with at most {limit} are believed.", ""]
     if not trace.fits:
-        lines += ["Do picture and scan belong together, and is the start within the range of the first stage?", ""]
+        lines += [
+            "Check that image and scan belong together, and that the start is within the first stage's range.",
+            "",
+        ]
     return lines
 
 
@@ -113,12 +116,12 @@ def _range(range_: MiscalibrationRange) -> str:
 
 
 def _axes(observation: Observation) -> list[str]:
-    """What is left on each axis or, without a reference, what was changed on it."""
+    """The remaining error per axis or, without a reference, the correction per axis."""
     trace = observation.trace
     known = observation.reference is not None
     rows = {
         "miscalibrated by": observation.error(trace.initial),
-        "left over": observation.error(trace.corrected),
+        "remaining error": observation.error(trace.corrected),
         "corrected by": None if known else pose_error(trace.corrected, trace.initial),
     }
     header = ["", "roll", "pitch", "yaw", "x (right)", "y (down)", "z (ahead)"]

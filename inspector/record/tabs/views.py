@@ -1,4 +1,4 @@
-"""The views that several tabs are made of: one function for each kind of view and of legend."""
+"""Views that several tabs use: one function for each kind of view and of legend."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from inspector.record.observation import Grid, Layout
 from inspector.record.pictures.captions import caption_strip
 
 SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
-"""Pixels that tabs are laid out for."""
+"""Screen size in pixels for which tabs are laid out."""
 LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
 LEGEND_SHARE = 0.06
-"""Share of a page's height that its legend takes."""
+"""Share of a page's height for its legend."""
 DIMMED = 0.65
-"""Opacity of the image under points, so that these stand out."""
+"""Opacity of the image under points, so that points stand out."""
 COLORED_BY = {
     Coloring.DEPTH: "Depth of the points",
     Coloring.INTENSITY: "Intensity of the points",
@@ -36,13 +36,13 @@ def overlay_view(
     caption: bool = True,
     image_of: str = entities.IMAGE,
 ) -> rrb.Spatial2DView:
-    """Points over the frame's image, and the caption above it.
+    """A view of points over the frame's image, with a caption above.
 
     Args:
-        name: of the view.
+        name: name of the view.
         points: entity of the overlay.
-        image: size of the image; what lies beyond it and the caption does not widen the view then.
-        caption: show it; a small view has no room for letters that can be read.
+        image: size of the image, so that points outside do not widen the view.
+        caption: whether to show the caption, which is not readable in a small view.
         image_of: entity of the image.
     """
     bounds = None
@@ -60,12 +60,12 @@ def overlay_view(
 
 
 def map_view(name: str, path: str, stage: int, grid: Grid, *marks: str) -> rrb.Spatial2DView:
-    """A map over the cells of a scale of a stage, over what that stage saw, and marks drawn on it."""
+    """A view of a map of one scale of a stage, over the image that the stage saw, with marks."""
     return image_view(name, path, grid, entities.of_scale(stage, grid.stride, entities.PICTURE), *marks)
 
 
 def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> rrb.Spatial2DView:
-    """An image and the marks drawn on it; with ``grid``, marks that reach beyond its cells do not widen the view."""
+    """A view of an image with marks; with ``grid``, marks outside its cells do not widen the view."""
     if grid is None:
         return rrb.Spatial2DView(origin=f"/{path}", name=name, background=colors.GROUND)
     bounds = rrb.VisualBounds2D(x_range=(0.0, float(grid.width)), y_range=(0.0, float(grid.height)))
@@ -76,22 +76,22 @@ def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> r
 
 
 def scale_name(grid: Grid) -> str:
-    """What a scale of a cost volume is called in names of views."""
+    """Name of a scale of a cost volume in names of views."""
     return f"{grid.stride} px cells"
 
 
 def legend(name: str, path: str) -> rrb.Spatial2DView:
-    """A static legend, without a title bar: its labels say it."""
+    """A view of a legend, without a title bar."""
     return rrb.Spatial2DView(origin=f"/{path}", name=name, titlebar=False, background=colors.GROUND)
 
 
 def point_legend(layout: Layout) -> rrb.Spatial2DView:
-    """What the colours of the overlays' points stand for."""
+    """The legend of the overlays' points."""
     return legend(COLORED_BY[layout.contents.color], entities.LEGEND_POINTS)
 
 
 def map_legends(*more: View) -> View:
-    """What the colours of displacements and of certainties stand for, and what else a page needs, in one row."""
+    """The legends of displacements and certainties, and further ones, in one row."""
     return rrb.Horizontal(
         image_view("Displacement: hue = direction, white = none", entities.LEGEND_DISPLACEMENT),
         image_view("Probability, confidence", entities.LEGEND_CERTAINTY),
@@ -100,12 +100,12 @@ def map_legends(*more: View) -> View:
 
 
 def with_legend(view: View, below: View, name: str) -> View:
-    """A page with a legend at its lower edge."""
+    """A page with a legend at the bottom."""
     return rrb.Vertical(view, below, row_shares=[1.0 - LEGEND_SHARE, LEGEND_SHARE], name=name)
 
 
 def curve_view(name: str, origin: str, *contents: str, highest: float | None = None) -> rrb.TimeSeriesView:
-    """Curves over the frames: all below ``origin``, or what the expressions in ``contents`` choose.
+    """A view of curves over the frames: all below ``origin``, or those selected by the expressions in ``contents``.
 
     Without the viewer's own legend, which would lie over the curves' ends and have no room for all of them. All frames
     are shown; the viewer alone would show a thousand to either side of the one at hand. Ends are not given as numbers,
@@ -113,10 +113,10 @@ def curve_view(name: str, origin: str, *contents: str, highest: float | None = N
     that, see `frames_named`.
 
     Args:
-        name: of the view.
-        origin: entity that lies above the curves.
-        contents: expressions that choose among them.
-        highest: value that just fits in, above zero; None for what the curves need.
+        name: name of the view.
+        origin: parent entity of the curves.
+        contents: expressions that select among them.
+        highest: upper limit of the axis, above zero; None for an automatic one.
     """
     return rrb.TimeSeriesView(
         origin=origin,
@@ -129,7 +129,7 @@ def curve_view(name: str, origin: str, *contents: str, highest: float | None = N
 
 
 def frames_named(layout: Layout) -> dict[str, colors.Rgb]:
-    """What the legend of curves says of their ends, in a colour that has no dot."""
+    """An entry without a dot for the legend of curves, with the first and the last frame."""
     return span_named(*layout.frames) if layout.frames is not None and layout.several else {}
 
 
@@ -139,7 +139,7 @@ def span_named(first: int, last: int) -> dict[str, colors.Rgb]:
 
 
 def tensor_view(name: str, path: str) -> rrb.TensorView:
-    """A cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
+    """A view of a cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
     return rrb.TensorView(
         origin=f"/{path}",
         name=name,
@@ -150,5 +150,5 @@ def tensor_view(name: str, path: str) -> rrb.TensorView:
 
 
 def uncapitalized(title: str) -> str:
-    """A title within another, for instance ``"stage 3 (±5°/0.5 m)"``."""
+    """A title for use within another, for instance ``"stage 3 (±5°/0.5 m)"``."""
     return title[0].lower() + title[1:]

@@ -1,6 +1,6 @@
-"""Tab *Did it move?*: what the frames of a drive say over time, each axis with its band, and where that changes.
+"""Tab *Did it move?*: the estimate over a drive, each axis with its band, and the changes.
 
-It is there where `Layout.with_watch` says so; a recording of ``calib-inspect watch`` shows nothing else.
+It exists if `Layout.with_watch` is set; a recording of ``calib-inspect watch`` shows nothing else.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ CURVES = {
 }
 """Curves of every axis: name, colour and width."""
 CHANGE = "change"
-"""Mark of an axis at frames where the mount has moved."""
+"""Mark of an axis at frames where the mount moved."""
 MARK_SIZE = 6.0
-NOT_YET = "# Not looked at yet\n\nWhether the mount moved is told when the whole drive is solved."
+NOT_YET = "# Not checked yet\n\nWhether the mount moved is checked once the whole drive is solved."
 TEXT_SHARE = 0.24
 """Share of the tab's width that the text takes."""
 
 
 def curve(axis: str, kind: str) -> str:
-    """Path of a curve of an axis."""
+    """Entity of a curve of an axis."""
     return f"watch/{axis}/{kind}"
 
 
 def wanted(layout: Layout) -> bool:
-    """Where a drive is solved that has enough frames."""
+    """Whether a drive with enough frames is solved."""
     return layout.with_watch
 
 
@@ -56,15 +56,15 @@ def log_once(rec: Subtree, layout: Layout) -> None:
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
-    """Log nothing of a single frame: a change needs those around it, see `log_watch`."""
+    """Log nothing for a single frame, since a change needs those around it; see `log_watch`."""
 
 
 def log_curve_styles(rec: Subtree, more: Mapping[str, colors.Rgb] = MappingProxyType({})) -> None:
-    """Names and colours of the curves, and their legend, in which more may stand."""
+    """Log names and colours of the curves, and their legend with further entries."""
     names = {CURVES["frames"][0]: colors.REST, CURVES["estimate"][0]: colors.FOUND}
-    names |= {"± one standard deviation": colors.LIMIT, "the mount has moved": colors.INITIAL}
+    names |= {"± one standard deviation": colors.LIMIT, "the mount moved": colors.INITIAL}
     log_names(rec, LEGEND, {**names, **more})
-    mark = rr.SeriesPoints(names="the mount has moved", colors=colors.INITIAL, marker_sizes=MARK_SIZE)
+    mark = rr.SeriesPoints(names="the mount moved", colors=colors.INITIAL, marker_sizes=MARK_SIZE)
     for axis in AXES:
         for kind, (name, color, width) in CURVES.items():
             rec.log_once(curve(axis, kind), rr.SeriesLines(names=name, colors=color, widths=width))
@@ -72,12 +72,12 @@ def log_curve_styles(rec: Subtree, more: Mapping[str, colors.Rgb] = MappingProxy
 
 
 def log_watch(rec: Subtree, found: Watch | None, lines: Sequence[str], to_frame: Callable[[int], None]) -> None:
-    """Log what watching a drive told.
+    """Log the result of watching a drive.
 
     Args:
-        rec: what is logged to.
-        found: the estimate over the drive; None where there is only something to say.
-        lines: what is said, the result last.
+        rec: recording to log to.
+        found: the estimate over the drive; None if there is only text.
+        lines: lines of text, the result last.
         to_frame: sets the timelines to a frame by its number.
     """
     text = "\n\n".join([f"# {lines[-1]}", *lines[:-1]])
@@ -97,12 +97,12 @@ def log_watch(rec: Subtree, found: Watch | None, lines: Sequence[str], to_frame:
 
 
 def view(layout: Layout) -> View:
-    """What came of it beside six plots."""
+    """The result as text beside six plots."""
     return watch_view()
 
 
 def watch_view() -> View:
-    """The same without a layout."""
+    """The same view without a layout."""
     units = {axis: "cm" if axis in ("x", "y", "z") else "deg" for axis in AXES}
     views = [
         curve_view(f"{axis.capitalize()} against the whole drive [{unit}]", f"/watch/{axis}")

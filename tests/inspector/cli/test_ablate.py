@@ -26,7 +26,7 @@ def test_costs_need_no_frames_and_come_back_from_json(tmp_path: Path, capsys: py
     assert rows["full"]["preset"] == "compact"
     assert rows["full"]["latency_ms"] is None
     said = " ".join(capsys.readouterr().out.split())
-    assert said.count("Not trained, so without errors: compact (all rows). ") == 1
+    assert said.count("Rows without errors, since they are not trained: compact (all rows). ") == 1
     assert "train --preset PRESET --ablation ROW --range 5/0.5" in said
     assert run(cli, ["ablate", "--from", str(out), "--markdown", str(page)]) == 0
     written = page.read_text()

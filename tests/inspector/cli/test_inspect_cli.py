@@ -243,12 +243,12 @@ def test_a_run_without_room_for_an_index_ends_with_its_result_and_report(
     invoke: Invoke, own_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_room(file: Path, *_: Any) -> None:
-        raise indexing.NotIndexedError(file, "for which the disk lacks 3 MB", "with more room")
+        raise indexing.NotIndexedError(file, "since the disk lacks 3 MB", "free some space")
 
     monkeypatch.setattr(stream, "index", no_room)
     code, out, err = invoke("folder", str(own_folder), "--save", "own.rrd", "--report", "page")
     assert code == 0, err
-    assert "own.rrd has no index, for which the disk lacks 3 MB" in err.replace("\n", " ")
+    assert "own.rrd has no index, since the disk lacks 3 MB" in err.replace("\n", " ")
     assert "Saved own.rrd" in out and "Kilobytes per frame" not in out
     assert out.splitlines()[-1].startswith("Verdict: ")
     assert Path("page/index.html").is_file()

@@ -97,7 +97,7 @@ def test_without_room_the_recording_stays_as_it_was(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(indexing.shutil, "disk_usage", lambda _: Full)
     stream.close()
-    assert stream.remark.startswith(f"{file} has no index, for which the disk lacks ")
+    assert stream.remark.startswith(f"{file} has no index, since the disk lacks ")
     assert len(rows(file, "small", "Scalars:scalars")) == FRAMES
     assert list(tmp_path.iterdir()) == [file]
 
@@ -113,7 +113,7 @@ def test_who_does_not_wait_for_the_index_keeps_the_recording(tmp_path: Path) -> 
 
     stream.close(advance)
     assert stream.remark == (
-        f"{file} has no index, as its making was interrupted, and is read like one that was cut off; to make it: "
+        f"{file} has no index, since indexing was interrupted, and opens more slowly; to add it, run: "
         f"rerun rrd optimize {file} -o NEW.rrd."
     )
     assert [expected for _, expected in told] == [before] * 3

@@ -199,7 +199,7 @@ def test_without_reference_nothing_claims_to_know_it(record: Callable[..., Any],
     assert "/overlay/corrected" in paths
     assert not {path for path in paths if "reference" in path or "error" in path or "truth" in path}
     (_, row), *_ = read(file, "table", "TextDocument:text")
-    assert "No reference" in row.as_py()[0]
+    assert "have no reference" in row.as_py()[0]
 
 
 def test_a_rejected_frame_is_shown_as_it_was(
@@ -222,7 +222,7 @@ def test_a_rejected_frame_is_shown_as_it_was(
     assert read(file, "fit/limit", "Scalars:scalars")[0][1].as_py() == pytest.approx([4.0 * scale])
     texts = [row.as_py()[0] for _, row in read(file, "table", "TextDocument:text")]
     assert texts[0].startswith("# Accepted\n\nPicture and scan fit together.\n")
-    assert "After stage 5 matches are expected to be 1.6 px off; at most 3.1 px are believed." in texts[0]
+    assert "Expected match error after stage 5: 1.6 px; results with at most 3.1 px are believed." in texts[0]
     assert texts[1].startswith(
         f"# Rejected\n\n{REASON}\n\n- **mirrored**: The picture looks mirrored. *(1.2 px, not 7.1 px)*\n"
     )

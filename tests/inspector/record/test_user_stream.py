@@ -142,7 +142,7 @@ def test_the_layout_can_be_sent_and_has_the_tabs_that_are_named(
 
 def test_a_tab_without_data_is_refused_by_name(observations: list[Observation]) -> None:
     seen, contents = observations[0], Contents.of(Detail.CUSTOM, frozenset({Part.SCENE}))
-    with pytest.raises(ConfigError, match=r"no tab 'Hourglass' for this trace; choose from Overview, 3D\."):
+    with pytest.raises(ConfigError, match=r"'Hourglass' is not a tab of this trace; choose from Overview, 3D\."):
         inspector.blueprint(seen.frame, seen.trace, tabs=["Hourglass"], contents=contents)
 
 

@@ -102,7 +102,7 @@ def test_the_command_writes_three_frames_or_the_one_asked_for(
     ("options", "code", "sentence"),
     [
         ([], 2, "Give --output DIR for pictures of the tabs, --animate FILE for an animation, or both."),
-        (["--animate", "x.mp4"], 3, "A moving picture is a .webp or a .gif file; choose such a name instead of x.mp4."),
+        (["--animate", "x.mp4"], 3, "x.mp4 is not a .webp or .gif file; give a name with one of these endings."),
         (["--animate", "x.gif", "--frame", "9"], 2, "has no frame 9, only 0 to 4."),
     ],
 )

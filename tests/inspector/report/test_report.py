@@ -136,10 +136,10 @@ def test_without_reference_it_says_change_and_agreement_only(unknown: RecordedRu
     run = moved(unknown, [0.2, 0.21, 0.22])
     page = page_of(run, tmp_path)
     assert headline(Figures.of(run)).startswith("Changed the calibration of fake/00 by 0.00°\u00a0/\u00a021\u00a0cm")
-    assert "3\u00a0frames agree on the result within 0.00°\u00a0/\u00a01.0\u00a0cm" in page
-    assert "No reference is known" in page
+    assert "3\u00a0frames agree within 0.00°\u00a0/\u00a01.0\u00a0cm" in page
+    assert "There is no reference" in page
     assert "Frames within" not in page
-    assert "corrected extrinsics, so the figures say how far the frames scatter" in page
+    assert "corrected extrinsics takes its place, so the figures show how much the frames scatter" in page
     grades = {finding.sentence.partition(":")[0]: finding.grade for finding in findings(Figures.of(run))}
     assert grades["Translation"] == "good"
 
