@@ -61,15 +61,14 @@ def overlays_tab(comparison: Comparison) -> View:
     """The tab with start and reference above each run's results, which include single frames if drives were solved."""
     start = entities.OVERLAY_MISCALIBRATED
     if comparison.one_start:
-        before = [_overlay(comparison, "Start of all runs", comparison.first.path(start))]
+        before = [_overlay(comparison, "Start of all runs", comparison.first.path(start), small=True)]
     else:
-        before = [_overlay(comparison, f"{run.name}: start", run.path(start)) for run in comparison.runs]
+        before = [_overlay(comparison, f"{run.name}: start", run.path(start), small=True) for run in comparison.runs]
     if any(run.run.has_reference for run in comparison.runs):
-        before.append(_overlay(comparison, "Reference (truth)", entities.OVERLAY_REFERENCE))
-    rows = [before, [_answer(comparison, run) for run in comparison.runs]]
-    if comparison.drives:
-        rows.append([_alone(comparison, run) for run in comparison.runs])
-    pictures = map(side_by_side, rows)
+        before.append(_overlay(comparison, "Reference (truth)", entities.OVERLAY_REFERENCE, small=True))
+    rows = [before, [_answer(comparison, run, small=True) for run in comparison.runs]]
+    rows.append([_alone(comparison, run, small=True) for run in comparison.runs if run.shows_drive])
+    pictures = map(side_by_side, filter(None, rows))
     shares = [SCREEN_HEIGHT - LEGEND_HEIGHT, LEGEND_HEIGHT]
     return rrb.Vertical(rrb.Vertical(*pictures), _point_legends(comparison), row_shares=shares, name="Before and after")
 
@@ -79,21 +78,21 @@ def side_by_side(views: list[rrb.Spatial2DView]) -> View:
     return rrb.Grid(*views, grid_columns=min(len(views), MOST_COLUMNS))
 
 
-def _answer(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
+def _answer(comparison: Comparison, run: ComparedRun, small: bool = False) -> rrb.Spatial2DView:
     if not run.shows_drive:
-        return _alone(comparison, run)
-    return _overlay(comparison, f"{run.name}: whole drive as one", run.path(entities.OVERLAY_DRIVE))
+        return _alone(comparison, run, small)
+    return _overlay(comparison, f"{run.name}: whole drive as one", run.path(entities.OVERLAY_DRIVE), small)
 
 
-def _alone(comparison: Comparison, run: ComparedRun) -> rrb.Spatial2DView:
-    return _overlay(comparison, f"{run.name}: each frame alone", run.path(entities.OVERLAY_CORRECTED))
+def _alone(comparison: Comparison, run: ComparedRun, small: bool = False) -> rrb.Spatial2DView:
+    return _overlay(comparison, f"{run.name}: each frame alone", run.path(entities.OVERLAY_CORRECTED), small)
 
 
-def _overlay(comparison: Comparison, name: str, points: str) -> rrb.Spatial2DView:
+def _overlay(comparison: Comparison, name: str, points: str, small: bool = False) -> rrb.Spatial2DView:
     """Points over the frame's image; all views show the same part, whatever lies outside the image."""
     cameras = [frame.camera for frame in comparison.first.frames]
     size = (max(camera.width for camera in cameras), max(camera.height for camera in cameras))
-    return overlay_view(name, points, size)
+    return overlay_view(name, points, size, small=small)
 
 
 def _point_legends(comparison: Comparison) -> View:

@@ -105,7 +105,7 @@ def view(layout: Layout) -> View:
     said: list[View] = [rrb.TextDocumentView(origin=entities.TABLE, name="This frame, stage by stage")]
     if layout.with_drive:
         said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The answer: whole drive as one"))
-    small = [overlay_view(name, path, layout.image) for name, path in names.items() if path in _SMALL]
+    small = [overlay_view(name, path, layout.image, small=True) for name, path in names.items() if path in _SMALL]
     heights = [min(_height(layout, 1.0 - LARGE_SHARE) + TITLE_HEIGHT, LARGEST_SMALL)] * len(small)
     return rrb.Horizontal(
         rrb.Vertical(*left, row_shares=shares),

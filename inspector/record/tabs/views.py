@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -15,6 +17,8 @@ SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
 LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
 LEGEND_SHARE = 0.06
 """Share of a page's height for its legend."""
+SMALL_POINT = 0.8
+"""Radius, in points of the screen, of points over a small picture."""
 DIMMED = 0.65
 """Opacity of the image under points, so that points stand out."""
 COLORED_BY = {
@@ -35,6 +39,7 @@ def overlay_view(
     image: tuple[int, int] | None = None,
     caption: bool = True,
     image_of: str = entities.IMAGE,
+    small: bool = False,
 ) -> rrb.Spatial2DView:
     """A view of points over the frame's image, with a caption above.
 
@@ -44,18 +49,23 @@ def overlay_view(
         image: size of the image, so that points outside do not widen the view.
         caption: whether to show the caption, which is not readable in a small view.
         image_of: entity of the image.
+        small: whether to draw smaller points, all of one size; points have a fixed size on the screen, and would cover
+            a small picture.
     """
     bounds = None
     if image is not None:
         top = -float(caption_strip(image).height) if caption else 0.0
         bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(top, image[1]))
+    overrides: dict[Any, Any] = {f"/{image_of}": rr.EncodedImage.from_fields(opacity=DIMMED)}
+    if small:
+        overrides[f"/{points}"] = rr.Points2D.from_fields(radii=rr.Radius.ui_points(SMALL_POINT))
     return rrb.Spatial2DView(
         origin="/",
         contents=[f"/{image_of}", f"/{points}/**", *([] if caption else [f"- /{entities.caption(points)}"])],
         name=name,
         visual_bounds=bounds,
         background=colors.GROUND,
-        overrides={f"/{image_of}": rr.EncodedImage.from_fields(opacity=DIMMED)},
+        overrides=overrides,
     )
 
 
