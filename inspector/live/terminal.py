@@ -42,7 +42,7 @@ HELP = {
     "1 to 5": "run only that stage",
     "m": "solve the drive from all frames",
     "z, Z": "undo, redo",
-    "0, 9, i": "go to the guess, to the reference, to a random pose",
+    "0, 9, i": "to guess, reference, random pose",
     "l": "set the pose to the last answer",
     "n, p, arrows": "next, previous frame",
     "x": "go to the worst frame",

@@ -65,7 +65,7 @@ class Picture:
             rrb.TextDocumentView(origin=KEYS, name="Keys of the terminal"),
         )
         return rrb.Horizontal(
-            with_legend(picture, point_legend(layout), "Picture"), words, column_shares=[0.7, 0.3], name=self.NAME
+            with_legend(picture, point_legend(layout), "Picture"), words, column_shares=[0.64, 0.36], name=self.NAME
         )
 
 
