@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from calibnet.cascade.upright import Upright
+from calibnet.datasets.clouds.plausibility import several
 from calibnet.datasets.frame import Frame, Frames, index_of
-from calibnet.datasets.plausibility import several
 from calibnet.geometry.visibility import as_one_scan
 
 

@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.clouds.bin import KITTI
+from calibnet.datasets.clouds.plausibility import of_scan
 from calibnet.datasets.clouds.scans import ending, full_scale_of, read_raw, read_scan
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import read_image
 from calibnet.datasets.images.lens import Picture
+from calibnet.datasets.images.plausibility import bit_depth, mosaic
 from calibnet.datasets.pairing import TIMES
-from calibnet.datasets.plausibility import bit_depth, mosaic, of_camera, of_extrinsic, of_scan, refuse
+from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera

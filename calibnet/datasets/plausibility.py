@@ -1,4 +1,6 @@
-"""Checks that cost nothing: whether a camera matrix, an extrinsic, a scan or a picture can be what it is taken to be.
+"""Checks that cost nothing: whether a camera matrix, a lens or an extrinsic can be what it is taken to be.
+
+Those of scans and of pictures are in `clouds.plausibility` and `images.plausibility`.
 
 Each returns what cannot be right in one sentence, with a short name for machines, or None. What no sensor could have is
 refused as it is read (`refuse`); what some sensor might have is kept beside the frame, and is the first suspect when
@@ -18,7 +20,6 @@ from calibnet.errors import ImplausibleError
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Extrinsic, Intrinsics
-from calibnet.geometry.visibility import is_accumulated
 
 VIEW_DEG = (8.0, 150.0)
 """Angle across the picture; beyond the second a pinhole camera spends its pixels on the corners."""
@@ -28,29 +29,14 @@ MIDDLE, CROPPED = (0.25, 0.75), (-0.5, 1.5)
 """Shares of width and height where the principal point lies, and where it may lie after a picture was cropped."""
 SAME_SHAPE, OTHER_SIZE, SURELY_OTHER = 0.1, 1.35, 1.8
 """A matrix is of another size where its factors across and down are alike within the first, and exceed the second."""
-NEAREST_M, FARTHEST_M = 0.5, 250.0
-"""Metres between which the median distance of a scan's points lies."""
 LONG_ARM_M, LONGEST_ARM_M = 5.0, 30.0
 """Distance between camera and LiDAR that only lorries have, and the largest; a lorry is 20 m long."""
 STEEP = 0.9
 """Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
-FLAT = 0.4
-"""A scene is this much lower than it is wide, whatever it is; else z is not up."""
 GRID, SEEN = 40, 0.5
 """Places across a rectified picture, and the share of them that at least shows something of any real lens."""
 BLACK = (0.05, 0.2)
 """Shares of a side by which a rectified picture may reach beyond the original on one side, and on the other."""
-DARK, DARKEST = 24, 15
-"""A picture that shines no brighter than the first seems to have lost its upper bits; the second is four bits of eight,
-which is all that 12 bits leave where the high byte of 16 is read."""
-WRAPPED, GREY = 0.01, 0.3
-"""Shares of neighbouring pixels half the range apart, and of grey pixels, where upper bits were cut off. Real pictures
-have 0.0005 of the former; 10 or 12 bits cut to their lower eight have 0.01 to 0.2, and black and white is not grey."""
-SAME_COLOUR = 0.85
-"""The difference of neighbouring pixels to that of the next but one: at most 0.61 in pictures of 13 cameras, and 1.02
-or more in the mosaics that their sensors would have given."""
-ENOUGH_POINTS, ROW_STEP = 10_000, 8
-"""Points of a scan, and rows of a picture from one to the next, that are looked at."""
 
 
 @dataclass(frozen=True)
@@ -102,11 +88,6 @@ def of_lens(camera: CameraModel) -> list[Implausible | None]:
 def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:
     """All checks of an extrinsic."""
     return [arm(camera_from_lidar), viewing_direction(camera_from_lidar)]
-
-
-def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
-    """All checks of a scan ``[N, 4]``."""
-    return [ranges(points), up(points), several(points)]
 
 
 def focal_length(camera: PinholeCamera) -> Implausible | None:
@@ -237,85 +218,3 @@ def viewing_direction(camera_from_lidar: Extrinsic) -> Implausible | None:
         )
         return Implausible("axes", text)
     return None
-
-
-def ranges(points: NDArray[np.float32]) -> Implausible | None:
-    """How far away the points are, in metres if all is well."""
-    middle = float(np.median(np.linalg.norm(some(points).astype(np.float64), axis=1)))
-    if NEAREST_M <= middle <= FARTHEST_M:
-        return None
-    seen = f"half of its points are more than {middle:.3g} m away" if middle > FARTHEST_M else (
-        f"half of its points are within {100 * middle:.3g} cm"
-    )  # fmt: skip
-    guess = "they seem to be in kilometres or scaled, so give metres"
-    if middle > FARTHEST_M:
-        guess = "they seem to be in millimetres or centimetres, or of a map, so give metres from the LiDAR"
-    return Implausible("units", f"{seen}; {guess}", certain=True)
-
-
-def up(points: NDArray[np.float32]) -> Implausible | None:
-    """Which axis of the scan is the vertical: the world is wider than high."""
-    low, high = np.percentile(some(points), (10, 90), axis=0)
-    spread = np.maximum(high - low, 1e-6)
-    flattest = int(spread.argmin())
-    if flattest == 2 or spread[flattest] > FLAT * spread[2]:
-        return None
-    text = (
-        f"the scan is flattest along its {'xy'[flattest]} axis ({spread[flattest]:.1f} m; {spread[2]:.1f} m along z); "
-        "give points with x forward, y left and z up"
-    )
-    return Implausible("axes", text)
-
-
-def several(points: NDArray[np.float32]) -> Implausible | None:
-    """Whether the cloud is a map rather than a scan."""
-    if not is_accumulated(points):
-        return None
-    text = (
-        "the cloud seems to be several scans put together, of which only what one scan would see is used; "
-        "give the one scan that was taken with the picture"
-    )
-    return Implausible("accumulated", text)
-
-
-def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
-    """Whether a picture ``[H, W, 3]`` lost its upper or its lower bits on the way to eight."""
-    rows = image[::ROW_STEP, :, 1].astype(np.int16)
-    if 0 < rows.max() <= DARK:
-        text = (
-            f"no pixel is brighter than {rows.max()} of 255; if the camera gives 10 or 12 bits, "
-            "shift the picture's values up before they are cut to eight"
-        )
-        return Implausible("bit-depth", text, certain=bool(rows.max() <= DARKEST))
-    jumps = float((np.abs(np.diff(rows, axis=1)) > 128).mean())
-    if jumps < WRAPPED or float(((rows > 64) & (rows < 192)).mean()) < GREY:
-        return None
-    text = (
-        "neighbouring pixels jump from black to white as where upper bits were cut off; "
-        "if the camera gives 10 or 12 bits, shift the picture's values down before they are cut to eight"
-    )
-    return Implausible("bit-depth", text)
-
-
-def mosaic(image: NDArray[np.uint8]) -> Implausible | None:
-    """Whether a grey picture ``[H, W, 3]`` is that of a Bayer sensor, before its colours were made.
-
-    The next pixel but one has the same colour there, and is more alike than the next one; never so in other pictures.
-    """
-    if not (image[::ROW_STEP, :, 0] == image[::ROW_STEP, :, 2]).all():
-        return None
-    green = image[..., 1].astype(np.int16)
-    for rows in (green[::ROW_STEP], green[:, ::ROW_STEP].T):
-        next_one, next_but_one = (np.abs(rows[:, step:] - rows[:, :-step]).mean() for step in (1, 2))
-        if not next_one > SAME_COLOUR * next_but_one > 0:
-            return None
-    text = (
-        "the picture seems to be raw, of a sensor with a Bayer pattern; name that in calibration.yaml, for instance "
-        "'bayer: rggb'"
-    )
-    return Implausible("bayer", text)
-
-
-def some(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Enough of the positions ``[N, 3]`` for a median."""
-    return points[:: max(1, len(points) // ENOUGH_POINTS), :3]

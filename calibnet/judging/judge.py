@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+from calibnet.datasets.clouds.plausibility import ranges, up
 from calibnet.datasets.frame import Frame
-from calibnet.datasets.plausibility import ROW_STEP, Implausible, bit_depth, of_camera, of_extrinsic, ranges, up
+from calibnet.datasets.images.plausibility import ROW_STEP, bit_depth
+from calibnet.datasets.plausibility import Implausible, of_camera, of_extrinsic
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.causes import PICTURE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.coefficients import Coefficients

@@ -17,13 +17,15 @@ from calibnet.datasets.bag.recording import BagRecording, Stamped
 from calibnet.datasets.bag.topics import found_topic
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted
 from calibnet.datasets.clouds.columns import CloudError, points_of
+from calibnet.datasets.clouds.plausibility import of_scan
 from calibnet.datasets.clouds.scans import clean_points, full_scale_of
 from calibnet.datasets.folder import DEPTHS_LOOKED_AT
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.development import Development, ImageError, Levels
 from calibnet.datasets.images.lens import Lens
+from calibnet.datasets.images.plausibility import bit_depth, mosaic
 from calibnet.datasets.pairing import MAX_TIME_DIFFERENCE_MS, WORTH_A_WARNING_MS
-from calibnet.datasets.plausibility import bit_depth, mosaic, of_scan, refuse
+from calibnet.datasets.plausibility import refuse
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 

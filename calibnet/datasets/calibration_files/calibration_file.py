@@ -58,7 +58,7 @@ class CalibrationFile:
         camera: None where the file tells only where the sensors are.
         camera_from_lidar: 4x4; None where the file knows no LiDAR.
         rig_from_camera: 4x4, where the camera sits on a rig of several; None where it does not say.
-        cloud_columns: names of the columns of ``.bin`` clouds; None where it does not say.
+        cloud_columns: names of the columns of ``.bin`` and text clouds; None where it does not say.
         bayer: pattern of a sensor whose pictures are not demosaiced, of `calibnet.datasets.images.development.BAYER`.
         prior: what is fixed or known beforehand of the extrinsic, as the options of the same names say it.
     """

@@ -14,8 +14,6 @@ from calibnet.geometry.camera_model import CameraModel, LensModel
 
 KNOWN = ("fix", "prior_translation", "prior_rotation")
 """What of the extrinsic is known beforehand, as the options of the same names say it."""
-COLUMN_NAMES = ("x", "y", "z", "intensity")
-"""Columns of ``.bin`` clouds that are read; others may have any name."""
 NEEDED = ("width", "height", "camera_matrix", "distortion")
 
 
@@ -76,7 +74,7 @@ def _columns(columns: Any, path: Path) -> tuple[str, ...]:
     names = tuple(map(str, columns)) if isinstance(columns, list) else ()
     if len(set(names)) != len(names) or not {"x", "y", "z"} <= set(names):
         raise DatasetError(
-            f"Calibration {path}: cloud_columns is {columns!r}; list the name of each column of a .bin cloud, for "
+            f"Calibration {path}: cloud_columns is {columns!r}; list the name of each column of a cloud, for "
             "instance [x, y, z, intensity, ring]."
         )
     return names

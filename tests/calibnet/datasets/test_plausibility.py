@@ -6,16 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
+from calibnet.datasets.clouds.plausibility import of_scan
 from calibnet.datasets.images.files import read_image
+from calibnet.datasets.images.plausibility import bit_depth, mosaic
 from calibnet.datasets.plausibility import (
     Implausible,
-    bit_depth,
     distortion,
     focal_length,
-    mosaic,
     of_camera,
     of_extrinsic,
-    of_scan,
     suspicion,
 )
 from calibnet.datasets.synthetic import SyntheticSequence

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibnet.datasets.plausibility import several
+from calibnet.datasets.clouds.plausibility import several
 from calibnet.datasets.synthetic import SyntheticSequence
 from calibnet.geometry.visibility import as_one_scan, is_accumulated
 from tests.support.pillars import CAR, PILLAR, WALL, scan
