@@ -171,9 +171,12 @@ class RigResult:
     def markdown(self) -> Iterator[str]:
         """The verdict and a table, for the viewer."""
         yield from (f"# {self.word.capitalize()}", "", self.headline, "")
+        reasons = [*dict.fromkeys(explained(camera.verdict) for camera in self.cameras)]
+        if len(reasons) == 1:  # one that holds for all belongs to the word; several are read beside the table
+            yield from (reasons.pop(), "")
         yield from markdown_table(*self.table())
         yield ""
-        for reason in dict.fromkeys(explained(camera.verdict) for camera in self.cameras):
+        for reason in reasons:
             yield from (reason, "")
 
     def as_dict(self) -> dict[str, object]:

@@ -84,7 +84,7 @@ def _word(
     moments = min(used, len({look.position for look in estimate.looks}) or used)
     if moments < FEWEST_JUDGED:
         needed = f"a drive needs {FEWEST_JUDGED} to be accepted, preferably of different places"
-        of_them = "" if moments == used else f" of {moments} moments"
+        of_them = "" if moments == used else f" of {moments} moment{'' if moments == 1 else 's'}"
         return _Said(CANNOT_TELL, f"{used} frames{of_them} agree, but {needed}.")
     predictors = drive_predictors(estimate)
     if predictors is None:

@@ -40,6 +40,8 @@ MOMENTS = 40
 POINTS = 40_000
 """Largest number of points of the cloud."""
 CLOUD, WORLD, TEXT = "rig/cloud", "rig", "rig/result"
+FEW_CAMERAS = 2
+"""Largest number of cameras whose images are large side by side."""
 LEFT_SHARE = 0.64
 """Share of the tab's width that the images take."""
 
@@ -122,9 +124,9 @@ def _log_camera(rec: Subtree, solved: CameraResult, frame: Frame) -> None:
     rec.log(entities.IMAGE, rr.Image(frame.as_taken.image).compress(jpeg_quality=JPEG_QUALITY))
     observation = Observation(frame, CascadeTrace(start, ()), solved.reference)
     overlays = FrameOverlays(observation, Contents.of(Detail.OVERVIEW))
-    overlays.log(rec, entities.OVERLAY_MISCALIBRATED, f"{solved.name}, {observation.start}", start)
-    name = f"{solved.name}, {verdict.word}"
-    overlays.log(rec, entities.OVERLAY_CORRECTED, name, verdict.camera_from_lidar, colors.VERDICTS[verdict.word])
+    overlays.log(rec, entities.OVERLAY_MISCALIBRATED, observation.start, start)
+    word, found = verdict.word, verdict.camera_from_lidar
+    overlays.log(rec, entities.OVERLAY_CORRECTED, word, found, colors.VERDICTS[word])
     if solved.reference is not None:
         overlays.log_reference(rec, entities.OVERLAY_REFERENCE, solved.reference)
 
@@ -156,7 +158,15 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
     """The layout: a tab with everything, and one for each camera."""
     sizes = [camera.solved.camera for camera in cameras]
     pictures = [
-        _below(camera, overlay_view(camera.solved.name, entities.OVERLAY_CORRECTED, (size.width, size.height)))
+        _below(
+            camera,
+            overlay_view(
+                camera.solved.name,
+                entities.OVERLAY_CORRECTED,
+                (size.width, size.height),
+                small=len(cameras) > FEW_CAMERAS,
+            ),
+        )
         for camera, size in zip(cameras, sizes, strict=True)
     ]
     grid = rrb.Grid(*pictures, grid_columns=_columns(len(pictures), sizes[0].width / sizes[0].height))
@@ -189,7 +199,7 @@ def _page(camera: Shown) -> View:
     names = {"As given": entities.OVERLAY_MISCALIBRATED}
     if camera.solved.reference is not None:
         names = {"Miscalibrated": entities.OVERLAY_MISCALIBRATED, "Reference (truth)": entities.OVERLAY_REFERENCE}
-    below = [_below(camera, overlay_view(name, path, size)) for name, path in names.items()]
+    below = [_below(camera, overlay_view(name, path, size, small=True)) for name, path in names.items()]
     found = _below(camera, overlay_view("Found", entities.OVERLAY_CORRECTED, size))
     side_by_side = size[0] < 2 * size[1]  # tall images leave room beside them
     layout = rrb.Horizontal if side_by_side else rrb.Vertical
