@@ -193,16 +193,23 @@ def _verified(task: Task, path: Path, started: float) -> Row:
                 found = verify_sequence(opening, labels=drive.labels, **{**options, **results})
         except Exception as error:
             failed = _failed(error)
+            failed = DriveFailed(_at_its_place(failed.sentence, path, drive), failed.lasting)
             _record_sentence(drive, folder, FAILED, "", failed.sentence)
             raise failed from None
         if found.summary is not None and found.summary.interrupted:
             raise KeyboardInterrupt
         columns = of_verdict(found.verdict) | {"given_camera_from_lidar": flat(found.given)}
+        columns["reason"] = _at_its_place(columns["reason"], path, drive)
         if not (folder / RECORDING).exists():
             _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])
         files = {"json": VERDICT, "report": PAGE, "recording": RECORDING}
         there = {name: f"{drive.folder}/{file}" for name, file in files.items() if (folder / file).exists()}
     return row_of(drive, **columns, **there, seconds=time.monotonic() - started)
+
+
+def _at_its_place(sentence: str, copy: Path, drive: Drive) -> str:
+    """A sentence about files of a drive that was copied, with their own address: the copy is gone."""
+    return sentence.replace(str(copy), drive.path.rstrip("/"))
 
 
 @contextmanager
