@@ -147,7 +147,8 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     in_order = keep_table(tasks, rows)
     seconds = time.monotonic() - started
     new = len(in_order) - (len(tasks) - len(pieces))
-    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {new} of them were checked or run now, in {seconds:.0f} s.")
+    now = f"{new} of them were checked or run now, in {seconds:.0f} s."
+    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {now}")
     for sentence in news(in_order):
         say(sentence)
     say(f"Table: {store.root}/{TABLE}")
