@@ -1,6 +1,6 @@
 """Camera-LiDAR extrinsic calibration with a five-stage cascade of learned networks.
 
-What a user needs is here by name and loaded when it is first used, so that importing the package itself costs nothing::
+The names of the public interface are imported when first used, so that importing the package itself costs nothing::
 
     import calibnet
 

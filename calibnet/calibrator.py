@@ -1,7 +1,7 @@
-"""What the cascade (`calibnet.cascade`) and every other method (`calibnet.methods`) can be asked to do.
+"""The interface of the cascade (`calibnet.cascade`) and of every other method (`calibnet.methods`).
 
 `Calibrator` corrects the extrinsic of one frame, `DriveCalibrator` also that of a whole drive, and `Explainer` also
-names what is wrong with a frame.
+finds the causes of a bad frame.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ class Calibrator(Protocol):
         """Correct ``initial``.
 
         Args:
-            frame: image, scan and camera; its own extrinsic must not be looked at.
+            frame: image, scan and camera; its own extrinsic must not be used.
             initial: ``camera_from_lidar`` to start from, 4x4.
-            detail: keep intermediate results in each `StageTrace.detail`, where the method has any to show.
+            detail: whether to keep intermediate results in each `StageTrace.detail`, if the method has any.
 
         Returns:
-            What happened stage by stage; a method without stages has one.
+            The trace, stage by stage; a method without stages has one stage.
 
         Raises:
-            CalibrationError: this frame cannot be calibrated.
+            CalibrationError: the frame cannot be calibrated.
         """
         ...
 
@@ -49,10 +49,10 @@ class DriveCalibrator(Calibrator, Protocol):
         """Correct ``initial``.
 
         Args:
-            frames: of one camera and LiDAR on one mount, at least one.
+            frames: at least one frame of one camera and LiDAR on one mount.
             initial: ``camera_from_lidar`` to start from, 4x4.
-            observer: called before each frame, and at the end if it likes, with the numbers of frames read and to be
-                read; a frame may be read more than once.
+            observer: called before each frame, and optionally at the end, with the number of frames read and the total;
+                a frame may be read more than once.
 
         Raises:
             CalibrationError: no frame could be calibrated.
@@ -61,21 +61,21 @@ class DriveCalibrator(Calibrator, Protocol):
 
 
 def drives_only(calibrator: object) -> bool:
-    """Whether a method calibrates whole drives only, not single frames: it says so by an attribute ``drives_only``."""
+    """Whether a method calibrates only whole drives, which it declares by an attribute ``drives_only``."""
     return isinstance(calibrator, DriveCalibrator) and bool(getattr(calibrator, "drives_only", False))
 
 
 @runtime_checkable
 class Explainer(Protocol):
-    """A method that can also find out what is wrong with a frame, at many times the price of calibrating it."""
+    """A method that can also find out what is wrong with a frame, at many times the cost of calibrating it."""
 
     def explain(self, frame: Frame, initial: Extrinsic, lags: Search | None = None) -> Verdict:
-        """The verdict on a frame, with the causes of what does not fit.
+        """The verdict on a frame, with causes.
 
         Args:
-            frame: image, scan and camera; its own extrinsic must not be looked at.
+            frame: image, scan and camera; its own extrinsic must not be used.
             initial: ``camera_from_lidar`` to start from, 4x4.
-            lags: of the scan, that are to be tried as well, where the frames beside it are known.
+            lags: search for a lag of the scan, if the neighbouring frames are known.
         """
         ...
 
@@ -87,14 +87,14 @@ def with_causes(
     verdict: Verdict,
     lags: Callable[[], Search | None] = lambda: None,
 ) -> Verdict:
-    """The verdict on a frame with causes, where it is not accepted, names none yet, and the method can find them.
+    """The verdict on a frame, to which causes are added if it is not accepted, has none, and the method can find them.
 
     Args:
-        calibrator: that gave the verdict.
+        calibrator: method that gave the verdict.
         frame: image, scan and camera.
-        initial: ``camera_from_lidar`` that it started from.
-        verdict: without causes.
-        lags: of the scan, worked out only where causes are looked for.
+        initial: initial ``camera_from_lidar`` of the method.
+        verdict: verdict without causes.
+        lags: makes the search for a lag of the scan, called only if causes are searched.
     """
     if verdict.word == ACCEPTED or verdict.causes or not isinstance(calibrator, Explainer):
         return verdict

@@ -16,10 +16,11 @@ class DatasetError(CalibnetError):
 
 
 class ImplausibleError(DatasetError):
-    """Input that can be read and cannot be right, for instance a focal length in millimetres.
+    """Input that can be read but cannot be right, for instance a focal length in millimetres.
 
     Attributes:
-        cause: its short name for machines, for instance ``"focal-length"``; see `calibnet.datasets.plausibility`.
+        cause: short name of the cause for machines, for instance ``"focal-length"``; see
+            `calibnet.datasets.plausibility`.
     """
 
     def __init__(self, message: str, cause: str = "") -> None:

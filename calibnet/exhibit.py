@@ -1,4 +1,4 @@
-"""What a method has to show of its work besides poses: pictures and curves with names, which any method can make."""
+"""Named pictures and curves by which any method can show its work."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from calibnet.geometry.types import Floats
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """A picture of what a method saw, computed or found in a frame.
+    """A picture of a method's work on a frame.
 
     Attributes:
-        name: for people, for instance ``"Masks"``; the same in every frame, and different within a stage.
-        picture: ``[H, W, 3]`` uint8 RGB, or ``[H, W]`` float32, a map with NaN where there is nothing.
-        limits: of a map, the values that are darkest and brightest, so that maps can be compared; None for its own.
+        name: name to show, for instance ``"Masks"``; the same in every frame, and unique within a stage.
+        picture: ``[H, W, 3]`` uint8 RGB, or a map ``[H, W]`` float32 with NaN where it has no value.
+        limits: values of a map that are drawn darkest and brightest, so that maps can be compared; None for its own.
     """
 
     name: str
@@ -30,8 +30,8 @@ class Curve:
     """A number over the steps of a search.
 
     Attributes:
-        name: for people, with its unit, for instance ``"Score of the best so far"``.
-        values: ``[N]``, one a step.
+        name: name to show, with the unit, for instance ``"Score of the best so far"``.
+        values: ``[N]``, one per step.
     """
 
     name: str

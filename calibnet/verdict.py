@@ -1,4 +1,4 @@
-"""What may be said of a calibration: accepted, rejected or cannot tell, and why."""
+"""The verdict on a calibration: accepted, rejected or cannot tell, with the reason."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CAUSES = (
     "bit-depth",
     "picture-size",
 )
-"""Names of what can be wrong with input, as JSON has them."""
+"""Names of possible causes in the input, as in JSON."""
 
 
 class Tolerance(NamedTuple):
@@ -62,12 +62,12 @@ FRAME_LIMITS, DRIVE_LIMITS = FRAME_TOLERANCES[0], DRIVE_TOLERANCES[0]
 
 @dataclass(frozen=True)
 class Cause:
-    """What is likely to be wrong with the input.
+    """A likely cause in the input.
 
     Attributes:
         name: one of `CAUSES`.
         text: a sentence for the user.
-        evidence: what was measured that says so.
+        evidence: the measurement that supports it.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Cause:
     evidence: str
 
     def as_dict(self) -> dict[str, str]:
-        """The form that JSON files hold."""
+        """The JSON object."""
         return {"name": self.name, "text": self.text, "evidence": self.evidence}
 
 
@@ -84,8 +84,8 @@ class BadFrame:
     """A frame that could not be used.
 
     Attributes:
-        frame: its number, `calibnet.datasets.frame.Frame.index`.
-        why: one sentence.
+        frame: number of the frame, `calibnet.datasets.frame.Frame.index`.
+        why: the reason, in one sentence.
     """
 
     frame: int
@@ -94,15 +94,15 @@ class BadFrame:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What may be said of a calibration.
+    """The verdict on a calibration.
 
     Attributes:
         word: accepted, rejected or cannot tell.
-        reason: a sentence for the user.
-        camera_from_lidar: the extrinsic that is judged, 4x4.
-        moved: rotation in degrees and translation in centimetres from the start to there.
-        causes: what is likely to be wrong with the input, the likeliest first.
-        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, None where there is nothing to state it from.
+        reason: the reason, a sentence for the user.
+        camera_from_lidar: the judged extrinsic, 4x4.
+        moved: rotation in degrees and translation in centimetres from the initial extrinsic to it.
+        causes: likely causes in the input, the likeliest first.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``; None if unknown.
         used: number of frames judged.
         skipped: frames that were left out.
         within: the finest tolerance that the extrinsic is certain enough to be within; None if there is none. That of
@@ -120,7 +120,7 @@ class Verdict:
     within: Tolerance | None = None
 
     def rotated(self, rotation: Rotation) -> Verdict:
-        """The same on the extrinsic of a camera turned by ``rotation [3, 3]``."""
+        """The verdict for a camera turned by ``rotation [3, 3]``."""
         extrinsic = transform(rotation, np.zeros(3)) @ self.camera_from_lidar
         return replace(self, camera_from_lidar=extrinsic, covariance=rotated(self.covariance, rotation))
 
@@ -135,7 +135,7 @@ class Verdict:
         return None if self.covariance is None else float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
 
     def as_dict(self) -> dict[str, Any]:
-        """The object that JSON files hold for a verdict, wherever it stands."""
+        """The JSON object, the same in all files."""
         sigma = None
         if self.covariance is not None:
             sigma = {

@@ -1,4 +1,4 @@
-"""What watching a drive tells: where its frames say that the extrinsic is, over time, and the moves of the mount."""
+"""The result of watching a drive: the extrinsic over time, and the moves of the mount."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from calibnet.geometry.types import Extrinsic, Floats, Vector6
 from calibnet.verdict import BadFrame
 
 WINDOW = 20
-"""Frames of the windowed estimate."""
+"""Number of frames of the windowed estimate."""
 SMALLEST_DEG, SMALLEST_CM = 0.15, 5.0
-"""What is less, in rotation and in translation, is no change of the mount."""
+"""Smallest rotation and translation that count as a change of the mount."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +20,10 @@ class Change:
     """A move of the mount.
 
     Attributes:
-        frame: index of the first frame after it; of a drift the first frame of all.
+        frame: number of the first frame after the move; for a drift, the first frame of all.
         offset: ``[6]``, ``(translation m, rotation rad)`` by which the extrinsic changes, in the camera frame.
-        confidence: probability that there is a change, by its own significance among all places where it could be.
-        until: index of the last frame of a drift, None for a step.
+        confidence: probability that there is a change, by its significance among all possible places.
+        until: number of the last frame of a drift; None for a step.
     """
 
     frame: int
@@ -43,21 +43,21 @@ class Change:
 
     @property
     def matters(self) -> bool:
-        """Whether it is large enough to be one of the mount."""
+        """Whether it is large enough to count as a move of the mount."""
         return self.rotation_deg >= SMALLEST_DEG or self.translation_cm >= SMALLEST_CM
 
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What the frames of a drive say over time.
+    """The extrinsic over time, from the frames of a drive.
 
     Attributes:
-        frames: ``[N]`` their indices.
-        offsets: ``[N, 6]`` what each says, ``(translation m, rotation rad)`` from the extrinsic of all.
+        frames: ``[N]`` numbers of the frames.
+        offsets: ``[N, 6]`` offset ``(translation m, rotation rad)`` of each frame's result from that of all.
         windowed: ``[N, 6]`` mean of the frames around each.
         sigma: ``[N, 6]`` standard deviation of that mean.
-        changes: in their order.
-        smallest: ``[6]`` standard deviations of the difference of two windows of frames: what can be told.
+        changes: the changes, in order.
+        smallest: ``[6]`` standard deviations of the difference of two windows of frames, the smallest detectable step.
     """
 
     frames: Floats
@@ -73,11 +73,11 @@ class Watched:
     """A drive that was watched.
 
     Attributes:
-        camera_from_lidar: that what frames say is relative to, 4x4; None where none could be found.
-        watch: what they say over time; None where nobody can tell.
-        reason: why nobody can tell; empty otherwise.
-        used: how many frames say something.
-        skipped: those that could not be read, or fit nothing.
+        camera_from_lidar: extrinsic to which offsets are relative, 4x4; None if none was found.
+        watch: the extrinsic over time; None if inconclusive.
+        reason: why it is inconclusive; empty otherwise.
+        used: number of usable frames.
+        skipped: frames that could not be read or do not fit.
     """
 
     camera_from_lidar: Extrinsic | None

@@ -1,4 +1,4 @@
-"""What every stage does around its network, ours and those of other papers: project the scan, apply the correction."""
+"""The steps around a network, ours or that of another paper: projecting the scan and extending the correction."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from calibnet.geometry.types import Extrinsic, Transform
 from calibnet.network.batch import LidarInput, lidar_input
 
 FEWEST_CELLS = 20
-"""Cells with a LiDAR point below which a pose of six parameters would be a guess."""
+"""Smallest number of cells with a LiDAR point from which six parameters can be estimated."""
 
 
 def projected(
     frame: Frame, before: Extrinsic, camera: PinholeCamera, scales: tuple[int, ...], stage: str
 ) -> LidarInput:
-    """The scan under an extrinsic, as a network sees it.
+    """The scan projected under an extrinsic, as input of a network.
 
     Args:
-        frame: its scan.
+        frame: frame with the scan.
         before: ``camera_from_lidar``, 4x4.
-        camera: of the network's input.
+        camera: camera of the network's input.
         scales: strides of the network's cells.
-        stage: names it, for messages.
+        stage: name of the stage, for messages.
 
     Raises:
-        CalibrationError: too few LiDAR points fall into the image.
+        CalibrationError: too few LiDAR points are inside the image.
     """
     lidar = lidar_input(frame.points, before, camera, scales)
     occupied = lidar.occupied.sum()
@@ -47,7 +47,7 @@ def projected(
 
 
 def extended(estimate: Tensor, gain: float, frame: Frame, stage: str) -> Transform:
-    """The correction ``[4, 4]`` that a network estimates, as a rigid transform that goes ``gain`` times as far.
+    """The correction ``[4, 4]`` that a network estimates, as a rigid transform scaled by ``gain``.
 
     Raises:
         CalibrationError: it is not finite.
@@ -55,7 +55,7 @@ def extended(estimate: Tensor, gain: float, frame: Frame, stage: str) -> Transfo
     correction: Transform = estimate.double().cpu().numpy()
     if not np.isfinite(correction).all():
         raise CalibrationError(
-            f"No finite correction of frame {frame.index} ({frame.source}) comes from {stage}; train its weights again "
+            f"The correction of frame {frame.index} ({frame.source}) by {stage} is not finite; train its weights again "
             "if this happens on every frame."
         )
     return scaled(orthonormal(correction), gain)

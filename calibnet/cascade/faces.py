@@ -1,7 +1,7 @@
-"""The looks of a stage through the faces of a wide lens, joined to one look by adding their normal equations.
+"""Joins the looks of a stage through the faces of a wide lens to one, by adding their normal equations.
 
-The faces are pinhole cameras in one place, a rigid rig whose pose is the camera's (`calibnet.drive.rig`): a motion
-along the optical axis of one, which it determines badly, moves the points across the image of another.
+The faces are pinhole cameras in one place, like a rigid rig whose pose is the camera's (`calibnet.drive.rig`): a motion
+along the optical axis of one, which it hardly sees, moves points across the image of another.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from calibnet.trace import StageTrace
 
 
 def joined(looks: Sequence[StageTrace], limit_px: float, model: CovarianceModel) -> StageTrace:
-    """Join looks of one stage through faces, all turned to the camera (`StageTrace.rotated`), to one.
+    """Join looks of one stage through faces, all rotated to the camera (`StageTrace.rotated`), to one.
 
-    Each is weighted by its covariance, as measured, which is larger than the one its network states. A face that does
-    not fit the scan, such as one filled by the bonnet, is left out where another one fits.
+    Each is weighted by its measured covariance, which is larger than the one that its network states. A face that does
+    not fit the scan, such as one filled by the bonnet, is left out if another one fits.
 
     Args:
-        looks: at least one; camera, details and matches are those of the first that is used.
+        looks: at least one look; camera, details and matches are those of the first one used.
         limit_px: largest match error at which a look is believed.
-        model: of the covariance that results of such looks were measured to have.
+        model: model of the measured covariance of looks.
     """
     fitting = [look for look in looks if not look.match_error_px > limit_px] or list(looks)
     first = fitting[0]

@@ -1,4 +1,4 @@
-"""A frame's image as the stages see it: resized and run through an image branch, once for all that share both."""
+"""A frame's image as input of the stages: resized and run through an image branch, once for all that share both."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from calibnet.runtime.clock import Clock
 
 
 class ImageViews:
-    """A frame's image as stages see it; those that share image size and image branch have one view.
+    """A frame's image for the stages; stages with the same image size and image branch share one view.
 
-    Its points are laid out one coordinate after the other, as every projection reads them.
+    Its points are stored coordinate by coordinate, as every projection reads them.
     """
 
     def __init__(self, frame: Frame, clock: Clock) -> None:
@@ -31,14 +31,14 @@ class ImageViews:
         cameras = map(stage.camera, seen)
         key = branch, *(size for camera in cameras for size in (camera.width, camera.height))
         if key not in self._views:
-            self.clock.skip()  # stages ran since the last view, and time themselves
+            self.clock.skip()  # stages measure their own time
             of_this_size = (view for known, view in self._views.items() if known[1:] == key[1:])
             self._views[key] = stage.view(self.frame, self.clock, next(of_this_size, None))
         return self._views[key]
 
 
 def image_branches(networks: Sequence[CalibrationNetwork]) -> list[int]:
-    """For each network the position of the first one whose image branch would compute the same features."""
+    """For each network, the position of the first one whose image branch computes the same features."""
     branches: list[int] = []
     for position, network in enumerate(networks):
         known = (earlier for earlier in sorted(set(branches)) if _same_image_branch(networks[earlier], network))
@@ -47,7 +47,7 @@ def image_branches(networks: Sequence[CalibrationNetwork]) -> list[int]:
 
 
 def _same_image_branch(one: CalibrationNetwork, other: CalibrationNetwork) -> bool:
-    """Whether two stages would compute the same image features: then they are computed once."""
+    """Whether two networks compute the same image features."""
     mine, theirs = (
         {name: tensor for name, tensor in network.features.state_dict().items() if name.startswith("image_")}
         for network in (one, other)

@@ -1,4 +1,4 @@
-"""Stages from the files of a set of weights, ready to run."""
+"""Loads stages from the files of a set of weights."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from calibnet.weights import load_network
 from calibnet.weights.manifest import Manifest
 
 _kept: dict[tuple[object, ...], Stage] | None = None
-"""Stages that are loaded already, after `keep_weights`; None where every cascade loads its own."""
+"""Loaded stages, after `keep_weights`; None if every cascade loads its own."""
 
 
 @dataclass(frozen=True)
 class SkippedStage:
-    """A stage that will not run, and why."""
+    """A stage that will not run, and the reason."""
 
     number: int
     range: MiscalibrationRange
@@ -32,12 +32,12 @@ class SkippedStage:
 
 
 def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
-    """The stage of a set of weights, ready to run; None where the set has none.
+    """Load a stage of a set of weights; None if the set lacks it.
 
     Args:
         number: 1 (coarsest) to 5 (finest).
-        manifest: of the set.
-        folder: where its files lie.
+        manifest: manifest of the set.
+        folder: folder of its files.
 
     Raises:
         WeightsError: the file cannot be used, or holds another stage.
@@ -61,7 +61,7 @@ def load_stage(number: int, manifest: Manifest, folder: Path) -> Stage | None:
 
 
 def keep_weights() -> None:
-    """From now on load each stage once in this process; for workers that calibrate one drive after the other."""
+    """Load each stage only once in this process from now on, for workers that calibrate many drives."""
     global _kept
     _kept = {} if _kept is None else _kept
 
@@ -71,9 +71,9 @@ def _loaded(number: int, manifest: Manifest, path: Path) -> Stage:
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     network = load_network(path).to(device)
     if network.range != range_:
-        raise WeightsError(f"{path} holds the weights of range {network.range}; give it its own name back.")
+        raise WeightsError(f"{path} has the weights of range {network.range}; restore its original name.")
     pack(network, fastest(device))
-    # the coarser stages' matches are coarse anyway, and the next stage looks again: only the finest one judges
+    # only the finest stage judges: matches of coarser ones are coarse anyway, and the next stage looks again
     limit = manifest.match_error_limit_px if is_finest(range_) else math.inf
     return Stage(number, range_, network, manifest.settings(range_), limit)
 
@@ -81,7 +81,7 @@ def _loaded(number: int, manifest: Manifest, path: Path) -> Stage:
 def load_stages(
     numbers: Iterable[int], preset: str, manifest: Manifest, folder: Path
 ) -> tuple[list[Stage], list[SkippedStage]]:
-    """Those stages of a set that have weights, and those that have none; raises as `load_stage` does."""
+    """Load stages of a set; returns those with weights and those without, and raises as `load_stage` does."""
     loaded, skipped = list[Stage](), list[SkippedStage]()
     for number in numbers:
         range_ = RANGES[number - 1]

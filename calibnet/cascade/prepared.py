@@ -1,4 +1,4 @@
-"""Frames as the networks were trained on them: one scan each, and an upright image."""
+"""Prepares frames like those that the networks were trained on, with a single scan and an upright image."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from calibnet.geometry.visibility import as_one_scan
 
 
 def prepared(frame: Frame, upright: Upright) -> Frame:
-    """The frame turned upright, its cloud reduced to one scan where it holds several; otherwise the frame itself."""
+    """The frame turned upright and with its cloud reduced to one scan, as far as needed."""
     if remark := several(frame.points):
-        known = any(other.name == remark.name for other in frame.remarks)  # to whoever read the frame
+        known = any(other.name == remark.name for other in frame.remarks)  # whoever read the frame has reported it
         remarks = frame.remarks if known else (*frame.remarks, remark)
         frame = replace(frame, points=as_one_scan(frame.points), remarks=remarks)
     return upright.frame(frame)
@@ -21,7 +21,7 @@ def prepared(frame: Frame, upright: Upright) -> Frame:
 
 @dataclass(frozen=True)
 class PreparedFrames:
-    """The frames of a drive, each prepared as it is read."""
+    """The frames of a drive, each prepared when it is read."""
 
     frames: Frames
     upright: Upright

@@ -34,7 +34,7 @@ from calibnet.weights.manifest import StageSettings
 class View(NamedTuple):
     """A frame's image at a stage's input size, ``[1, 3, H, W]``, and the features of its image branch.
 
-    Of a wide lens, ``faces`` has a view of each face, and image and features are those of the first.
+    For a wide lens, ``faces`` has a view of each face, and image and features are those of the first.
     """
 
     image: Tensor
@@ -48,11 +48,11 @@ class Stage:
 
     Attributes:
         number: 1 (coarsest) to 5 (finest).
-        range: what the network was trained for.
-        network: in evaluation mode.
-        settings: image size, looks and gain.
+        range: range that the network was trained for.
+        network: the network, in evaluation mode.
+        settings: its image size, looks and gain.
         match_error_limit_px: largest match error at which the stage is believed, in pixels of its image.
-        covariance_model: how far its results were measured to lie from the truth.
+        covariance_model: model of the measured covariance of its results.
     """
 
     number: int
@@ -64,7 +64,7 @@ class Stage:
 
     @property
     def device(self) -> torch.device:
-        """Where the network lies."""
+        """Device of the network."""
         return next(self.network.parameters()).device
 
     def camera(self, frame: Frame) -> PinholeCamera:
@@ -79,9 +79,9 @@ class Stage:
         """The frame's image as this stage sees it.
 
         Args:
-            frame: the whole of it, faces included.
-            clock: hears ``"resize"`` and ``"image_features"``.
-            of_this_size: a view of the frame that another stage has of the same size: then nothing is resized again.
+            frame: the frame, faces included.
+            clock: called with ``"resize"`` and ``"image_features"``.
+            of_this_size: another stage's view of the frame at the same size, to save resizing.
         """
         if frame.faces:
             known = of_this_size.faces if of_this_size else [None] * len(frame.faces)
@@ -103,16 +103,16 @@ class Stage:
     def correct(
         self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, pose_prior: PosePrior | None = None
     ) -> StageTrace:
-        """Look at a frame, and again from where that arrives, until the next stage can take over.
+        """Look at a frame repeatedly, each time from the previous result, until the next stage can take over.
 
-        The finest stage, which none follows, looks as often as it may.
+        The finest stage, which no other follows, uses all its looks.
 
         Args:
-            frame: scan and camera; its own extrinsic is not looked at.
+            frame: scan and camera; its own extrinsic is not used.
             view: its image, as `view` gives it.
             before: the extrinsic to correct.
-            detail: keep the intermediate results of the first look.
-            pose_prior: what is known of the extrinsic beforehand.
+            detail: whether to keep the intermediate results of the first look.
+            pose_prior: prior on the extrinsic.
 
         Raises:
             CalibrationError: the first look fails, see `look`.
@@ -123,7 +123,7 @@ class Stage:
                 break
             try:
                 look = self.look(frame, view, look.after, pose_prior=pose_prior)
-            except CalibrationError:  # too few points are left in the image: what was found before stands
+            except CalibrationError:  # too few points are left in the image, so the previous result is kept
                 break
             trace = trace.followed_by(look)
         return trace
@@ -132,12 +132,12 @@ class Stage:
     def look(
         self, frame: Frame, view: View, before: Extrinsic, detail: bool = False, pose_prior: PosePrior | None = None
     ) -> StageTrace:
-        """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
+        """Project the scan under an extrinsic, and correct it once; arguments as for `correct`.
 
-        Through a wide lens each of its faces is looked at, and what they say is joined to one correction.
+        For a wide lens, the corrections from all its faces are joined to one.
 
         Raises:
-            CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
+            CalibrationError: too few LiDAR points are inside the image, or the network's correction is not finite.
         """
         if frame.faces:
             trace = self._look_at_faces(frame, view, before, detail)
@@ -146,7 +146,7 @@ class Stage:
         return trace if pose_prior is None else with_prior(trace, pose_prior, self.covariance_model)
 
     def _look_at_faces(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
-        """One look through each face that shows enough of the scan, as one."""
+        """Join one look through each face that shows enough of the scan."""
         looks, failure = list[StageTrace](), None
         for face, of_face in zip(frame.faces, view.faces, strict=True):
             turn = transform(face.face_from_camera, np.zeros(3))
@@ -185,15 +185,15 @@ class Stage:
         )
 
     def is_settled(self, correction: Transform) -> bool:
-        """Whether a next stage can take over: what a look has corrected is within that stage's range."""
+        """Whether the next stage can take over, since the correction of a look is within that stage's range."""
         following = RANGES[RANGES.index(self.range) + 1 :] if self.range in RANGES else RANGES[-1:]
         return bool(following) and following[0].contains(correction)
 
 
 def with_prior(look: StageTrace, pose_prior: PosePrior, model: CovarianceModel) -> StageTrace:
-    """A look whose correction is fused with the user's prior; its information stays what the network states.
+    """A look whose correction is fused with the user's prior; its information stays that of the network.
 
-    The network's correction is weighted by its covariance, as measured, which is larger than the one it states.
+    The network's correction is weighted by its measured covariance, which is larger than the one that it states.
     """
     correction = pose_prior.corrected(look.correction, model.weight(look), look.before)
     return replace(look, correction=correction, after=correction @ look.before)

@@ -1,4 +1,4 @@
-"""From a network's tensors to the NumPy detail that the inspector shows; nothing is computed twice."""
+"""Converts a network's tensors to the NumPy detail that the inspector shows, without computing anything twice."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from calibnet.trace import ScaleTrace, StageDetail
 
 
 def stage_detail(config: NetworkConfig, lidar: LidarInput, cut: Cut, output: NetworkOutput) -> StageDetail:
-    """Read one frame's intermediate results off a forward pass made with ``keep_activations``.
+    """The intermediate results of one frame, from a forward pass with ``keep_activations``.
 
     Args:
-        config: of the network.
-        lidar: the scan as it was projected.
-        cut: rows that the network was spared; here they are, full of zeros.
-        output: of a batch of one.
+        config: configuration of the network.
+        lidar: the projected scan.
+        cut: rows that the network skipped, which are filled with zeros here.
+        output: output of a batch of one.
     """
     assert output.activations is not None
     scales = tuple(
@@ -53,9 +53,9 @@ def scale_trace(
     """The trace of one scale.
 
     Args:
-        stride: input pixels a cell.
+        stride: size of a cell in input pixels.
         window: side of the search window, in cells.
-        occupied: ``[H, w]``, cells that hold a point.
+        occupied: ``[H, w]``, cells with a point.
         cut: rows that the tensors lack.
         score: ``[D, h, w]``.
         logits: ``[D, h, w]``.

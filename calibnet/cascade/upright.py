@@ -1,8 +1,8 @@
-"""Turning the image upright where the camera is mounted on its side, upside down or at any other roll.
+"""Turns the image upright if the camera is mounted on its side, upside down or at any other roll.
 
-The networks were trained on upright images. The initial extrinsic tells the roll, since the LiDAR's z axis points up.
-The image is turned about its principal point, a pure rotation of the camera, so that nothing is lost by it; results of
-the stages are turned back.
+The networks were trained on upright images. The initial extrinsic gives the roll, since the LiDAR's z axis points up.
+The image is turned about its principal point, which is a pure rotation of the camera and loses nothing; results of the
+stages are turned back.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from calibnet.verdict import Verdict
 AnyResult = TypeVar("AnyResult", StageTrace, Verdict, DriveEstimate, CameraEstimate)
 
 TOLERATED_DEG = 8.0
-"""Roll in degrees up to which nothing is resampled: training had as much, and turning an image loses its corners."""
+"""Largest roll in degrees that is left as it is, as in training, since turning an image loses its corners."""
 BEYOND_RANGE_DEG = 3.0
-"""Degrees by which a roll must exceed the range searched to be the mount's and not an error of the guess."""
+"""Degrees by which a roll must exceed the range searched to be taken for that of the mount rather than an error."""
 LEVEL = 0.5
-"""Length in the image plane of an upward unit vector, below which the camera looks up or down and has no roll."""
+"""Length of an upward unit vector in the image plane below which the camera looks up or down and has no roll."""
 QUARTER = np.pi / 2
 QUARTER_TURN: Rotation = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FILLED = 1 / 3
-"""Rows and columns at the border of a turned picture that hold less than this share of the fullest are cut off."""
+"""Smallest share of filled pixels of a row or column at the border of a turned image, relative to the fullest."""
 
 
 @dataclass(frozen=True)
 class Upright:
-    """How a camera is turned about its optical axis to stand upright: not at all, for most.
+    """Rotation of a camera about its optical axis that makes it upright, which is none for most.
 
     Attributes:
-        quarters: quarter turns, clockwise in the picture; exact.
-        rest: radians beyond them, likewise clockwise; the picture is resampled.
+        quarters: quarter turns, clockwise in the image, which are exact.
+        rest: further clockwise rotation in radians, for which the image is resampled.
     """
 
     quarters: int = 0
@@ -51,7 +51,7 @@ class Upright:
 
     @classmethod
     def of(cls, camera_from_lidar: Extrinsic, searched: MiscalibrationRange) -> Upright:
-        """The turn that a guess of the extrinsic asks for, which may be wrong by the range that is searched."""
+        """The rotation for a guess of the extrinsic, which may be wrong by the range that is searched."""
         turn = -roll_of(camera_from_lidar)
         quarters = round(turn / QUARTER)
         rest = turn - quarters * QUARTER
@@ -59,12 +59,12 @@ class Upright:
         return cls(quarters, rest if abs(rest) > tolerated else 0.0)
 
     def __bool__(self) -> bool:
-        """Whether anything is turned."""
+        """Whether the image is turned at all."""
         return bool(self.quarters or self.rest)
 
     @cached_property
     def rotation(self) -> Rotation:
-        """``[3, 3]``, upright camera from real camera."""
+        """``[3, 3]``, rotation from the real to the upright camera."""
         quarter = np.linalg.matrix_power(QUARTER_TURN, self.quarters % 4)
         return rotation_from_vector([0.0, 0.0, self.rest]) @ quarter
 
@@ -73,7 +73,7 @@ class Upright:
         return transform(self.rotation, np.zeros(3)) @ camera_from_lidar if self else camera_from_lidar
 
     def frame(self, frame: Frame) -> Frame:
-        """A frame as the upright camera has it."""
+        """A frame as taken by the upright camera."""
         if not self:
             return frame
         image, camera = turned_by_quarters(frame.image, frame.camera, self.quarters % 4)
@@ -81,12 +81,12 @@ class Upright:
             image, camera = turned(image, camera, rotation_from_vector([0.0, 0.0, self.rest]))
         faces = tuple(
             face._replace(face_from_camera=face.face_from_camera @ self.rotation.T) for face in frame.faces
-        )  # which stand level as they are
+        )  # faces are level already
         extrinsic = self.extrinsic(frame.camera_from_lidar)
         return replace(frame, image=image, camera=camera, camera_from_lidar=extrinsic, faces=faces)
 
     def undo(self, trace: CascadeTrace, initial: Extrinsic) -> CascadeTrace:
-        """A run on the upright frame as one on the real frame, which started from ``initial``."""
+        """The trace of a run on the upright frame, as one on the real frame that started from ``initial``."""
         if not self:
             return trace
         stages, wider = (tuple(map(self.real, part)) for part in (trace.stages, trace.wider))
@@ -94,20 +94,20 @@ class Upright:
         return replace(trace, initial=initial, stages=stages, wider=wider, verdict=verdict)
 
     def real(self, result: AnyResult) -> AnyResult:
-        """What was found of the upright camera, of the real one."""
+        """A result for the upright camera as one for the real camera."""
         return result.rotated(self.rotation.T) if self else result
 
 
 def roll_of(camera_from_lidar: Extrinsic) -> float:
-    """Radians by which what stands upright leans clockwise in the picture; 0 where the camera looks up or down."""
-    right, down = camera_from_lidar[:2, 2]  # of the LiDAR's upward axis
+    """Radians by which upright objects lean clockwise in the image; 0 if the camera looks up or down."""
+    right, down = camera_from_lidar[:2, 2]  # image coordinates of the LiDAR's upward axis
     return float(np.arctan2(right, -down)) if np.hypot(right, down) >= LEVEL else 0.0
 
 
 def turned_by_quarters(
     image: NDArray[np.uint8], camera: PinholeCamera, quarters: int
 ) -> tuple[NDArray[np.uint8], PinholeCamera]:
-    """Turn a picture ``[H, W, 3]`` clockwise by so many quarters, and its camera with it."""
+    """Turn an image ``[H, W, 3]`` and its camera clockwise by quarter turns."""
     matrix, width, height = camera.matrix, camera.width, camera.height
     for _ in range(quarters):
         pixels = np.array([[0.0, -1.0, height - 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -118,10 +118,10 @@ def turned_by_quarters(
 def turned(
     image: NDArray[np.uint8], camera: PinholeCamera, rotation: Rotation
 ) -> tuple[NDArray[np.uint8], PinholeCamera]:
-    """A picture ``[H, W, 3]`` and its camera turned about the camera's centre.
+    """An image ``[H, W, 3]`` and its camera, turned about the camera's centre.
 
-    A turned picture is a tilted one in a larger, and mostly empty, upright frame: of that the part is kept that is
-    mostly filled. Beyond its border the picture goes on as it is there, as a border of any other kind would be an edge.
+    A turned image is tilted within a larger, partly empty, upright frame, of which the mostly filled part is kept.
+    Outside its border the image is continued, since any other border would be an edge.
     """
     homography = camera.matrix @ rotation @ np.linalg.inv(camera.matrix)
     right, bottom = camera.width - 0.5, camera.height - 0.5
@@ -144,6 +144,6 @@ def turned(
 
 
 def mostly(filled: NDArray[np.integer]) -> slice:
-    """From the first to the last of the rows, or columns, that hold a fair share of what the fullest does."""
+    """The range of rows, or columns, from the first to the last one that is filled relative to the fullest."""
     full = np.flatnonzero(filled >= FILLED * filled.max())
     return slice(int(full[0]), int(full[-1]) + 1)

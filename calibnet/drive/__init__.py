@@ -1,1 +1,1 @@
-"""One extrinsic from all frames of a drive."""
+"""Solves one extrinsic from all frames of a drive."""

@@ -1,9 +1,9 @@
-"""Change-point detection on what single frames of a drive say: where the mount moved, by how much, and how surely.
+"""Change-point detection on the results of a drive's frames: where the mount moved, by how much, and how surely.
 
-What frames say (`calibnet.trace.DriveLook`) scatters, and the errors of neighbouring frames are correlated, since they
-see the same things. So noise is measured twice: from frame to frame, and over blocks, whose means scatter more than
-those of independent errors. Changes are found by penalised least-squares segmentation (PELT, of the library ruptures),
-or by a slope where that explains more; each is then tested for significance.
+The results of frames (`calibnet.trace.DriveLook`) scatter, and the errors of neighbouring frames are correlated, since
+they see the same objects. Noise is therefore measured from frame to frame and over blocks, whose means scatter more
+than those of independent errors. Changes are found by penalised least-squares segmentation (PELT, from the library
+ruptures), or by a slope if that explains more; each is then tested for significance.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from calibnet.trace import DriveLook
 from calibnet.watch import WINDOW, Change, Watch
 
 SHORTEST = 8
-"""Frames between two changes, and before the first and after the last: fewer are an outlier rather than a mount."""
+"""Smallest number of frames between two changes, before the first and after the last; fewer are outliers."""
 BLOCK = 10
-"""Frames of the blocks over which errors that neighbours share are measured."""
+"""Number of frames of the blocks over which correlated errors are measured."""
 USUAL_EXCESS, USUAL_BLOCKS = 4.0, 4
-"""How many times larger than of independent errors the variance of a long mean is taken to be, and how many blocks that
-counts for against what the drive itself says; a short drive says little."""
+"""Usual ratio of the variance of a long mean to that of independent errors, and the number of blocks for which it
+counts against the drive's own ratio, which is uncertain for a short drive."""
 FALSE_ALARM = 1e-3
-"""Probability, a drive, of a change where there is none, if errors were as they are modelled."""
+"""Probability per drive of a false change, if errors are as modelled."""
 OUTLIER = 3.0
-"""Standard deviations from its neighbours beyond which a frame counts no more than at that distance."""
+"""Distance from its neighbours in standard deviations to which an outlier is reduced."""
 
 
 def watch(looks: Sequence[DriveLook]) -> Watch:
     """Find the changes of a drive.
 
     Args:
-        looks: what its frames say, in their order, all relative to one extrinsic; `SHORTEST` twice at least.
+        looks: results of its frames in order, all relative to one extrinsic; at least twice `SHORTEST`.
 
     Raises:
-        ValueError: there are fewer.
+        ValueError: there are too few.
     """
     if len(looks) < 2 * SHORTEST:
-        raise ValueError(f"{len(looks)} frames are too few to tell a change; {2 * SHORTEST} are needed.")
+        raise ValueError(f"{len(looks)} frames are too few to detect a change; {2 * SHORTEST} are needed.")
     frames = np.array([look.frame for look in looks])
     said = tempered(np.array([look.offset for look in looks]))
     covariance = scatter(said)
@@ -59,7 +59,7 @@ def watch(looks: Sequence[DriveLook]) -> Watch:
 
 
 def windowed(said: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]:
-    """Means ``[N, 6]`` of the frames around each, and of how many ``[N]``; none reaches across a change.
+    """Means ``[N, 6]`` of the frames around each, and their numbers ``[N]``; no window crosses a change.
 
     Args:
         said: ``[N, 6]``.
@@ -74,7 +74,7 @@ def windowed(said: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]
 
 
 def tempered(said: Floats) -> Floats:
-    """What frames say ``[N, 6]``, with those that are far from all around them brought nearer."""
+    """The results of frames ``[N, 6]``, with outliers moved closer to their neighbours."""
     half = WINDOW // 2
     around = np.array([np.median(said[max(0, at - half) : at + half + 1], axis=0) for at in range(len(said))])
     away = said - around
@@ -83,7 +83,7 @@ def tempered(said: Floats) -> Floats:
 
 
 def scatter(said: Floats) -> Matrix6:
-    """Covariance ``[6, 6]`` of a single frame, by differences from the frame before, which no step moves."""
+    """Covariance ``[6, 6]`` of a single frame, from differences between neighbours, which steps hardly affect."""
     steps = np.diff(said, axis=0)
     most = OUTLIER * np.maximum(1.4826 * np.median(np.abs(steps), axis=0), 1e-9)
     kept = np.clip(steps, -most, most)
@@ -92,10 +92,10 @@ def scatter(said: Floats) -> Matrix6:
 
 
 def long_run_excess(white: Floats) -> float:
-    """How many times larger the variance of a mean of many frames is than of as many independent ones, at least 1.
+    """Ratio of the variance of a mean of many frames to that of independent ones, at least 1.
 
     Args:
-        white: ``[N, 6]`` what frames say, in standard deviations from frame to frame.
+        white: ``[N, 6]`` results of frames, in standard deviations from frame to frame.
     """
     blocks = len(white) // BLOCK
     usual = USUAL_EXCESS * USUAL_BLOCKS
@@ -109,13 +109,13 @@ def long_run_excess(white: Floats) -> float:
 
 
 def _changes(frames: Floats, said: Floats, white: Floats, covariance: Matrix6) -> tuple[Change, ...]:
-    """Steps, or a drift, that are significant and matter.
+    """Steps, or a drift, that are significant and large enough.
 
     Args:
-        frames: ``[N]`` indices.
+        frames: ``[N]`` numbers of the frames.
         said: ``[N, 6]``.
-        white: ``[N, 6]`` the same, with the variance of long means 1.
-        covariance: ``[6, 6]`` of a frame, as long means have it.
+        white: ``[N, 6]`` the same results, scaled so that the variance of long means is 1.
+        covariance: ``[6, 6]`` of a frame, from long means.
     """
     count = len(said)
     level = math.log(count / FALSE_ALARM)
@@ -144,6 +144,6 @@ def _squares(white: Floats) -> float:
 
 
 def _confidence(moved: Vector6, covariance: Matrix6, places: int) -> float:
-    """That a move is none of chance, at any of so many places."""
+    """Probability that a move is not due to chance at any of ``places``."""
     square = float(moved @ np.linalg.solve(covariance, moved))
     return max(0.0, 1.0 - places * float(chi2.sf(square, 6)))

@@ -1,10 +1,9 @@
-"""The extrinsic that the frames of a drive agree on: they share one mount, so they are solved together.
+"""The consensus of a drive: the weighted least-squares extrinsic of all its frames, which share one mount.
 
 Every frame contributes normal equations: a correction and its information matrix. Their sum, with robust weights
 (Cauchy) for frames that disagree with the others, gives the estimate; the scatter of the frames about it scales its
-covariance. Of each frame 42 numbers are kept, so memory does not grow with images or scans. Errors that the networks
-make in all frames alike are not averaged out by this; aligning edges of some frames corrects them
-(`calibnet.alignment`).
+covariance. Only 42 numbers are kept per frame, so memory does not grow with images or scans. Errors that the networks
+make in all frames do not average out; aligning edges of some frames corrects them (`calibnet.alignment`).
 """
 
 from __future__ import annotations
@@ -21,18 +20,19 @@ from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Transform, Vecto
 from calibnet.trace import Estimate
 
 OUTLIER = 3.0
-"""Distance, relative to the median frame's, at which a frame's weight is one half (Cauchy weights)."""
+"""Distance relative to that of the median frame at which a frame's weight is one half (Cauchy weights)."""
 FIRM = 1000.0
-"""Information of a frame whose network states none, relative to that of the range: so large that the estimate is the
-mean of the frames, and is not drawn to the initial extrinsic."""
+"""Information of a frame whose network states none, relative to that of the range; large, so that the estimate is the
+mean of the frames and is not drawn to the initial extrinsic."""
 FARTHEST_TRANSLATION_M, FARTHEST_ROTATION_DEG = 0.3, 0.6
-"""Standard deviations of the estimate, over all axes, beyond which edges would be aligned with wrong ones nearby."""
+"""Largest standard deviations of the estimate, over all axes, at which edges are aligned, since beyond these they would
+match wrong edges nearby."""
 REWEIGHTINGS = 10
-"""Iterations of the reweighting; weights settle after three or four."""
+"""Number of reweighting iterations; weights converge after three or four."""
 
 
 class Consensus:
-    """Frames' corrections of one common extrinsic, and what they agree on."""
+    """Corrections of one extrinsic by several frames, and their estimate."""
 
     def __init__(
         self,
@@ -41,15 +41,15 @@ class Consensus:
         pose_prior: PosePrior | None = None,
         common_error: Matrix6 | None = None,
     ) -> None:
-        """Start with no frame.
+        """Start without frames.
 
         Args:
-            before: ``camera_from_lidar`` that all corrections are relative to.
-            range_: that the stage was trained for. Every frame's information contains the range's own; the estimate
-                counts it once.
-            pose_prior: what is known of the extrinsic beforehand, counted once as well.
-            common_error: covariance of what the networks get wrong in all frames alike; added to that of the frames
-                where they are weighed against the prior, and where edges are aligned.
+            before: ``camera_from_lidar`` to which all corrections apply.
+            range_: range of the stage. Every frame's information contains that of the range; the estimate counts it
+                once.
+            pose_prior: prior on the extrinsic, counted once as well.
+            common_error: covariance of the error that the networks make in all frames; added to that of the frames when
+                they are weighed against the prior and when edges are aligned.
         """
         self.before, self.range, self.pose_prior = before, range_, pose_prior
         self.common_error = np.zeros((6, 6)) if common_error is None else common_error
@@ -60,12 +60,12 @@ class Consensus:
         return len(self._vectors)
 
     def add(self, correction: Transform, information: Matrix6 | None) -> None:
-        """Take in one frame: its correction, and its information; None where the network states none."""
+        """Add the correction of one frame and its information, None if the network states none."""
         self._vectors.append(pose_vector(correction))
         self._informations.append(FIRM * self.range.information if information is None else information)
 
     def estimate(self) -> Estimate:
-        """The estimate from the frames so far and from what is known beforehand.
+        """The estimate from the frames so far and the prior.
 
         Raises:
             ValueError: there are none.
@@ -76,9 +76,9 @@ class Consensus:
         return Estimate(pose_from_vector(mean) @ self.before, covariance, len(self))
 
     def agreed(self) -> tuple[Vector6, Matrix6]:
-        """The correction of all frames, without what is known beforehand, and its covariance."""
+        """The correction from all frames without the prior, and its covariance."""
         if not self._vectors:
-            raise ValueError("There is no frame to estimate from.")
+            raise ValueError("There are no frames to estimate from.")
         vectors, informations = np.array(self._vectors), np.array(self._informations)
         weights = np.ones(len(vectors))
         for _ in range(REWEIGHTINGS):
@@ -93,15 +93,14 @@ class Consensus:
         return mean, covariance
 
     def aligned(self, evidence: Sequence[Evidence], starts: Sequence[Estimate] = ()) -> Estimate:
-        """The estimate from the frames and the evidence of some of them, their edges and reflectance.
+        """The estimate from the frames and from the evidence of some of them, their edges and reflectance.
 
-        Its covariance includes the common error of the networks, as far as the evidence does not determine it. Frames
-        that scatter farther than edges can be matched are not aligned.
+        Its covariance includes the common error of the networks as far as the evidence does not determine it. Frames
+        that scatter too far for edges to be matched are not aligned.
 
         Args:
-            evidence: of any of the frames, gathered under ``before``.
-            starts: where the alignment starts, of which the best result is taken; at what the frames agree on by
-                default.
+            evidence: evidence of some frames, gathered under ``before``.
+            starts: starting points of the alignment, of which the best result is used; by default the consensus.
         """
         known = self.estimate()
         others = [pose_vector(one.camera_from_lidar @ invert(self.before)) for one in starts]

@@ -1,4 +1,4 @@
-"""Readings of frames counted for whoever watches the progress."""
+"""Counts readings of frames, for progress."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from calibnet.datasets.frame import Frame, Frames, index_of
 
 
 class Readings:
-    """Tells an observer, if there is one, how many frames have been read of all that will be."""
+    """Tells an observer, if any, the number of frames read and the total."""
 
     def __init__(self, observer: Callable[[int, int], None] | None, total: int) -> None:
-        """Begin to count ``total`` readings."""
+        """Start counting ``total`` readings."""
         self.observer, self.total, self.done = observer, total, 0
 
     def one_more(self) -> None:
-        """A frame is about to be read."""
+        """Note that a frame is about to be read."""
         self._tell()
         self.done += 1
 
     def end(self) -> None:
-        """All are read, and the work on them is done."""
+        """Note that all frames are read and processed."""
         self.done = self.total
         self._tell()
 
@@ -30,7 +30,7 @@ class Readings:
 
 
 class Observed:
-    """Frames of which each reading is counted."""
+    """Frames whose readings are counted."""
 
     def __init__(self, frames: Frames, readings: Readings) -> None:
         self.frames, self.readings = frames, readings

@@ -1,9 +1,9 @@
-"""One pose of a rig of several cameras whose poses relative to each other are known.
+"""Solves one pose of a rig of several cameras whose relative poses are known.
 
-What one camera determines badly, such as the way ahead, another one that looks to the side determines well. The frames
-of each camera are solved together as those of a drive are. The result, with its covariance and the common error of the
-networks, is one measurement of the rig's pose (`calibnet.drive.rig_pose`); the cameras' normal equations are added in
-the rig's frame. In the end edges of all cameras are aligned by that one pose.
+What one camera determines badly, such as the distance ahead, another one that looks sideways determines well. The
+frames of each camera are solved together like those of a drive. The result, with its covariance and the common error of
+the networks, is one measurement of the rig's pose (`calibnet.drive.rig_pose`); the cameras' normal equations are added
+in the rig's frame. At the end, edges of all cameras are aligned by that one pose.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from calibnet.verdict import BadFrame
 
 @dataclass(frozen=True, eq=False)
 class CameraEstimate:
-    """What was found of one camera of a rig.
+    """The result of one camera of a rig.
 
     Attributes:
-        name: of the camera.
+        name: name of the camera.
         camera_from_lidar: 4x4.
-        covariance: ``[6, 6]`` of it, in the camera's frame.
-        frames: that went into it; without any it is where the rig says.
-        match_error_px: the median error that the last look expects of its matches; not a number without frames.
-        alone: ``[6]``, from there to where its own frames alone say that it is; None without frames.
-        alone_covariance: ``[6, 6]`` of what they say.
+        covariance: covariance ``[6, 6]``, in the camera's frame.
+        frames: number of frames used; with none, the camera's pose is that of the rig.
+        match_error_px: median match error that the last look expects; NaN without frames.
+        alone: ``[6]``, offset from there to the result of its own frames; None without frames.
+        alone_covariance: covariance ``[6, 6]`` of the result of its own frames.
     """
 
     name: str
@@ -67,7 +67,7 @@ class CameraEstimate:
     alone_covariance: Matrix6 | None = field(default=None, repr=False)
 
     def rotated(self, rotation: Rotation) -> CameraEstimate:
-        """The same of a camera turned by ``rotation [3, 3]``."""
+        """The result for a camera turned by ``rotation [3, 3]``."""
         return replace(
             self,
             camera_from_lidar=transform(rotation, np.zeros(3)) @ self.camera_from_lidar,
@@ -79,16 +79,16 @@ class CameraEstimate:
 
 @dataclass(frozen=True, eq=False)
 class RigEstimate(DriveEstimate):
-    """The pose of a rig; its ``camera_from_lidar`` is ``rig_from_lidar``, and its covariance in the rig's frame.
+    """The pose of a rig: ``camera_from_lidar`` is ``rig_from_lidar``, with the covariance in the rig's frame.
 
     Attributes:
-        cameras: of the rig, in their order.
+        cameras: results of the cameras, in order.
     """
 
     cameras: tuple[CameraEstimate, ...] = field(repr=False, default=())
 
     def inflated(self, factor: float) -> Self:
-        """The same with every covariance so many times as large, those of the cameras too."""
+        """The estimate with every covariance multiplied by ``factor``, those of the cameras too."""
         cameras = tuple(
             replace(
                 one,
@@ -109,17 +109,17 @@ def solve_rig(
     pose_prior: PosePrior | None = None,
     tolerance: Matrix6 | None = None,
 ) -> RigEstimate:
-    """Correct ``rig_from_lidar``, as `calibnet.drive.solve.solve_drive` does with one camera.
+    """Correct ``rig_from_lidar``, as `calibnet.drive.solve.solve_drive` does for one camera.
 
-    A camera of whose frames none can be used is left out, and its frames count as skipped.
+    A camera without usable frames is left out, and its frames count as skipped.
 
     Args:
-        stages: coarse to fine.
-        cameras: of the rig; each frame is read in the last look, and some before.
+        stages: stages, coarse to fine.
+        cameras: cameras of the rig; each frame is read in the last look, and some before.
         initial: ``rig_from_lidar`` to start from.
-        common_error: covariance of what the networks get wrong in all frames of one camera alike.
+        common_error: covariance of the error that the networks make in all frames of one camera.
         observer: called before each frame is read and at the end, with how many are read so far, and in all.
-        pose_prior: what is known of the rig's pose beforehand.
+        pose_prior: prior on the rig's pose.
         tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for a rigid rig.
 
     Raises:
@@ -165,7 +165,7 @@ def solve_rig(
 def _agreed(
     cameras: Sequence[RigCamera], look_at: Callable[[RigCamera], Consensus], common_error: Matrix6
 ) -> list[CameraConsensus]:
-    """What the frames of each camera agree on in one look, without cameras of which no frame can be used."""
+    """The consensus of each camera's frames in one look, without cameras that have no usable frames."""
     found = list[CameraConsensus]()
     failure: CalibnetError | None = None
     for camera in cameras:
@@ -179,19 +179,19 @@ def _agreed(
 
 
 def _look_at_some(stage: DriveStage, rig: Extrinsic, places: dict[str, Transform], camera: RigCamera) -> Consensus:
-    """Look at some frames of a camera, which is at its place on the rig (``camera_from_rig``)."""
+    """Look at some frames of a camera at its place on the rig (``camera_from_rig``)."""
     some = evenly_spaced(len(camera.frames), FRAMES_UNTIL_LAST_LOOK)
     return agree(DriveLooks(stage, camera.frames, some, places[camera.name] @ rig))
 
 
 class _LastLook:
-    """The last look, at all frames, and what it leaves behind.
+    """The last look, at all frames, and its results.
 
     Attributes:
         skipped: frames that could not be read or calibrated.
-        looks: of all cameras, as looks of the rig.
-        of_camera: the looks of each camera by its name, in its own frame.
-        terms: edges and reflectance of the frames to align, as terms of the rig's pose.
+        looks: looks of all cameras, as looks of the rig.
+        of_camera: looks of each camera by its name, in its own frame.
+        terms: edges and reflectance of the frames to align, as functions of the rig's pose.
     """
 
     def __init__(self, stage: DriveStage, rig: Extrinsic, places: dict[str, Transform], aligned: int) -> None:
@@ -220,7 +220,7 @@ class _LastLook:
 
 
 def in_rig(look: DriveLook, camera_from_rig: Transform) -> DriveLook:
-    """A camera's look as one of the rig that it is on."""
+    """A camera's look as one of its rig."""
     offset = pose_vector(invert(camera_from_rig) @ pose_from_vector(look.offset) @ camera_from_rig)
     to_camera = adjoint(camera_from_rig)
     information = None if look.information is None else to_camera.T @ look.information @ to_camera
@@ -234,7 +234,7 @@ def _of_cameras(
     looks: dict[str, list[DriveLook]],
     tolerance: Matrix6 | None,
 ) -> Iterator[CameraEstimate]:
-    """What was found of each camera."""
+    """The results of the cameras."""
     by_name = {one.camera.name: one for one in agreed}
     for camera in cameras:
         one = by_name.get(camera.name)

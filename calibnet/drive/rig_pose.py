@@ -1,9 +1,9 @@
-"""The pose of a rig that its cameras agree on, and where each camera is on it.
+"""The pose of a rig from those of its cameras, and the place of each camera on it.
 
 The frames of a camera measure the pose of that camera. Where the camera's place on the rig is known exactly, this is a
 measurement of the rig's pose; where it is known within a tolerance, the tolerance is added to its covariance, and the
-camera itself ends between its own measurement and its place on the rig. With no tolerance the rig is rigid; with an
-infinite one each camera is calibrated on its own.
+camera itself ends between its own measurement and its place on the rig. Without a tolerance the rig is rigid; with an
+infinite one, each camera is calibrated on its own.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from calibnet.geometry.types import Extrinsic, Matrix6, Transform, Vector6
 
 @dataclass(frozen=True, eq=False)
 class CameraConsensus:
-    """What the frames of one camera of a rig agree on.
+    """The consensus of one camera of a rig.
 
     Attributes:
-        camera: of the rig, where it is expected on it.
-        camera_from_lidar: 4x4, as its frames have it.
-        covariance: ``[6, 6]`` of that, with what the networks get wrong in all its frames alike.
+        camera: camera of the rig, with its nominal place.
+        camera_from_lidar: extrinsic from its own frames, 4x4.
+        covariance: covariance ``[6, 6]`` of the extrinsic, including the error that all its frames share.
     """
 
     camera: RigCamera
@@ -36,7 +36,7 @@ class CameraConsensus:
 
     @classmethod
     def of(cls, camera: RigCamera, consensus: Consensus, common_error: Matrix6) -> CameraConsensus:
-        """From a consensus and the covariance of errors that all its frames share."""
+        """Make it from a consensus and the covariance of the error that all its frames share."""
         mean, covariance = consensus.agreed()
         return cls(camera, pose_from_vector(mean) @ consensus.before, covariance + common_error)
 
@@ -45,13 +45,13 @@ class CameraConsensus:
         return pose_vector(self.camera_from_lidar @ invert(self.camera.camera_from_rig @ rig))
 
     def placed(self, rig: Extrinsic, tolerance: Matrix6 | None) -> Transform:
-        """``camera_from_rig``, as it is most likely within the tolerance."""
+        """The most likely ``camera_from_rig`` within the tolerance."""
         if tolerance is None:
             return self.camera.camera_from_rig
         return pose_from_vector(self._share(tolerance) @ self.off(rig)) @ self.camera.camera_from_rig
 
     def spread(self, of_rig: Matrix6, tolerance: Matrix6 | None) -> Matrix6:
-        """Covariance ``[6, 6]`` of ``camera_from_lidar``, in the camera's frame, with that of the rig's pose."""
+        """Covariance ``[6, 6]`` of ``camera_from_lidar`` in the camera's frame, including that of the rig's pose."""
         to_camera = adjoint(self.camera.camera_from_rig)
         if tolerance is None:
             return np.asarray(to_camera @ of_rig @ to_camera.T, np.float64)
@@ -60,7 +60,7 @@ class CameraConsensus:
         return np.asarray(by_rig @ of_rig @ by_rig.T + own, np.float64)
 
     def _share(self, tolerance: Matrix6) -> Matrix6:
-        """Gain ``[6, 6]``: the share of a camera's offset from its place on the rig by which it is moved."""
+        """Gain ``[6, 6]``: the share of a camera's offset from its nominal place that is applied."""
         return np.asarray(tolerance @ inverse(tolerance + self.covariance), np.float64)
 
 
@@ -70,13 +70,13 @@ def rig_correction(
     pose_prior: PosePrior | None = None,
     tolerance: Matrix6 | None = None,
 ) -> tuple[Vector6, Matrix6]:
-    """The correction of a rig's pose that its cameras agree on, and its covariance.
+    """The correction of a rig's pose from all its cameras, and its covariance.
 
     Args:
-        cameras: what the frames of each agree on.
-        rig: ``rig_from_lidar`` that is corrected.
+        cameras: consensus of each camera.
+        rig: ``rig_from_lidar`` to correct.
         pose_prior: what is known of the rig's pose beforehand.
-        tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for none at all.
+        tolerance: covariance ``[6, 6]`` of each camera's pose on the rig, in its own frame; None for a rigid rig.
     """
     information, moment = np.zeros((6, 6)), np.zeros(6)
     for one in cameras:

@@ -1,4 +1,4 @@
-"""One extrinsic from all frames of a drive: first by the stages of the cascade, then by aligning edges."""
+"""Solves one extrinsic from all frames of a drive: first by the stages of the cascade, then by aligning edges."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
 FRAMES_UNTIL_LAST_LOOK = 24
-"""Frames, spread over the drive, that all looks but the last one see."""
+"""Number of frames, spread over the drive, used in all looks but the last."""
 LOOKS = 2
-"""Looks of each stage at a drive, each on scans projected anew; the last stage takes one more, at all frames."""
+"""Number of looks of each stage at a drive, each on scans projected anew; the last stage has one more, at all
+frames."""
 FRAMES_ALIGNED = 24
-"""Frames, spread over the drive, whose edges are aligned: each keeps 4 MB of pictures until the end."""
+"""Number of frames, spread over the drive, whose edges are aligned; each takes 4 MB until the end."""
 
 
 class DriveStage(Protocol):
-    """What a drive needs of a `calibnet.cascade.Stage`."""
+    """The part of `calibnet.cascade.Stage` that a drive needs."""
 
     @property
     def range(self) -> MiscalibrationRange:
-        """What its network was trained for."""
+        """Range that its network was trained for."""
         ...
 
     @property
     def match_error_limit_px(self) -> float:
-        """What error it may expect of its matches to be believed."""
+        """Largest match error at which it is believed, in pixels of its image."""
         ...
 
     def view(self, frame: Frame) -> Any:
@@ -61,18 +62,18 @@ def solve_drive(
 ) -> DriveEstimate:
     """Correct the extrinsic that all frames share.
 
-    Each stage looks at some frames from all over the drive, their consensus corrects the extrinsic, and this is
-    repeated on the scans projected anew; the last look is at all frames. After the finest stage, edges and reflectance
-    of some frames are aligned (`calibnet.alignment`), which corrects a few pixels at most. One frame is in memory at a
-    time, and 4 MB of each that is aligned.
+    Each stage looks at some frames spread over the drive, their consensus corrects the extrinsic, and this is repeated
+    on the scans projected anew; the last look is at all frames. After the finest stage, edges and reflectance of some
+    frames are aligned (`calibnet.alignment`), which corrects a few pixels at most. Only one frame is in memory at a
+    time, besides 4 MB of each aligned frame.
 
     Args:
         stages: coarse to fine.
-        frames: of one camera and LiDAR on one mount; each is read in the last look, and some before.
+        frames: frames of one camera and LiDAR on one mount; each is read in the last look, and some before.
         initial: ``camera_from_lidar`` to start from.
-        common_error: covariance of what the networks get wrong in all frames alike.
+        common_error: covariance of the error that the networks make in all frames.
         observer: called before each frame is read and at the end, with how many are read so far, and in all.
-        pose_prior: what is known of the extrinsic beforehand.
+        pose_prior: prior on the extrinsic.
 
     Raises:
         CalibrationError: no frame could be calibrated.
@@ -122,13 +123,13 @@ def solve_drive(
 
 
 def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
-    """What one look at one frame of a drive says, as the drive keeps it."""
+    """The result of one look at one frame, as kept for the drive."""
     lens = lens_gain(*misfits(look))
     return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px, lens)
 
 
 class FrameLook(NamedTuple):
-    """What one look says of the frame at a position of a drive."""
+    """A look at the frame at a position of a drive."""
 
     position: int
     frame: Frame
@@ -136,10 +137,10 @@ class FrameLook(NamedTuple):
 
 
 class DriveLooks:
-    """One look of a stage at each of some frames of a drive, made while it is iterated: one frame is in memory.
+    """One look of a stage at each of some frames of a drive, made during iteration so that one frame is in memory.
 
     Attributes:
-        skipped: frames so far that could not be read or calibrated.
+        skipped: frames that could not be read or calibrated so far.
     """
 
     def __init__(self, stage: DriveStage, frames: Frames, positions: Sequence[int], extrinsic: Extrinsic) -> None:
@@ -148,7 +149,7 @@ class DriveLooks:
         self.skipped = list[BadFrame]()
 
     def __iter__(self) -> Iterator[FrameLook]:
-        """The frames that can be calibrated.
+        """Iterate over the looks at frames that can be calibrated.
 
         Raises:
             CalibrationError: none could be calibrated.
@@ -172,7 +173,7 @@ class DriveLooks:
 
 
 def agree(looks: DriveLooks, pose_prior: PosePrior | None = None, common_error: Matrix6 | None = None) -> Consensus:
-    """The consensus of looks; arguments as of `Consensus`.
+    """The consensus of looks; arguments as for `Consensus`.
 
     Raises:
         CalibrationError: no frame could be calibrated.
@@ -185,10 +186,10 @@ def agree(looks: DriveLooks, pose_prior: PosePrior | None = None, common_error: 
 
 
 def believed(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
-    """The look, if it expects its matches to fit.
+    """The look, if its match error is within the limit.
 
     Raises:
-        CalibrationError: they do not.
+        CalibrationError: it is not.
     """
     if look.match_error_px > limit_px:
         usual = "check that they belong together and that the start is within the range of the first stage"

@@ -1,4 +1,4 @@
-"""Finding moves of the mount during a drive, also such large ones that no single extrinsic fits all frames."""
+"""Detects moves of the mount during a drive, even if they are so large that no single extrinsic fits all frames."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from calibnet.verdict import BadFrame
 from calibnet.watch import Watched
 
 FEWEST = 2 * SHORTEST
-"""Frames that a drive needs to be watched."""
+"""Smallest number of frames of a drive that can be watched."""
 TRUSTED = 0.6
-"""Share of the finest stage's range up to which one look measures how far a frame is from the drive's extrinsic."""
+"""Share of the finest stage's range within which one look measures a frame's distance from the drive's extrinsic."""
 BLIND_DEG, BLIND_CM = 1.0, 50.0
-"""If two windows of frames differ by so much by chance (three standard deviations), changes cannot be told."""
+"""Largest random difference between two windows of frames (three standard deviations) at which changes can be
+detected."""
 
 
 class Part:
-    """Some frames of a drive, from one position to before another."""
+    """Consecutive frames of a drive, from ``start`` to before ``stop``."""
 
     def __init__(self, frames: Frames, start: int, stop: int) -> None:
         self.frames, self.start, self.stop = frames, start, stop
@@ -48,19 +49,19 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class SolvedPart:
-    """A part, and what its frames agree on."""
+    """A part of a drive and its solution."""
 
     part: Part
     estimate: DriveEstimate
 
     @property
     def origin(self) -> Extrinsic:
-        """That its looks are relative to."""
+        """Extrinsic to which its looks are relative."""
         looked_from = self.estimate.looked_from
         return self.estimate.camera_from_lidar if looked_from is None else looked_from
 
     def relative_to(self, origin: Extrinsic) -> list[DriveLook]:
-        """What its frames say, relative to another extrinsic, at their positions in the whole drive."""
+        """Its looks relative to another extrinsic, with positions in the whole drive."""
         base = self.origin @ invert(origin)
         return [
             replace(
@@ -78,22 +79,22 @@ def watch_drive(
     initial: Extrinsic,
     observer: Callable[[int, int], None] | None = None,
 ) -> Watched:
-    """Find out whether the mount moved during a drive.
+    """Detect moves of the mount during a drive.
 
-    The drive is solved as one. Parts on which that fails, and parts that turn out to be far from the rest, are solved
-    by themselves, so that also moves beyond the range of the last stage are measured.
+    The drive is solved as one. Parts for which that fails, and parts that turn out to be far from the rest, are solved
+    by themselves, so that moves beyond the range of the last stage are measured too.
 
     Args:
-        calibrator: that solves drives and says what each frame says.
-        frames: in the order in which they were taken.
+        calibrator: method that solves drives and returns looks.
+        frames: frames in the order in which they were taken.
         initial: ``camera_from_lidar`` to start from.
-        observer: as `calibnet.drive.solve.solve_drive` has it, of one part after the other.
+        observer: as for `calibnet.drive.solve.solve_drive`, for one part after the other.
     """
     if len(frames) < FEWEST:
-        return Watched(None, None, f"{len(frames)} frames are too few to tell a change; {FEWEST} are needed.", 0)
+        return Watched(None, None, f"{len(frames)} frames are too few to detect a change; {FEWEST} are needed.", 0)
     parts = solved_parts(calibrator, Part(frames, 0, len(frames)), initial, observer)
     if not parts:
-        return Watched(None, None, "Picture and scan fit nowhere in the drive.", 0)
+        return Watched(None, None, "Image and scan do not fit together in any part of the drive.", 0)
     origin = max(parts, key=lambda part: part.estimate.frames).origin
     looks = {look.position: look for part in parts for look in part.relative_to(origin)}
     again = far_parts(calibrator, frames, looks, origin, observer)
@@ -103,34 +104,34 @@ def watch_drive(
 
 
 def watch_estimate(estimate: DriveEstimate, count: int) -> Watched:
-    """The same from a drive of ``count`` frames that is solved already: at no cost, and blind to where nothing fits.
+    """Detect moves in a drive of ``count`` frames that is already solved, without further computation.
 
-    Moves beyond what the last stage sees from the drive's extrinsic are found, but not measured.
+    Moves beyond the range of the last stage are detected but not measured, and parts that do not fit are ignored.
     """
     origin = estimate.camera_from_lidar if estimate.looked_from is None else estimate.looked_from
     return judge_looks({look.position: look for look in estimate.looks}, count, origin, estimate.skipped)
 
 
 def judge_looks(looks: dict[int, DriveLook], count: int, origin: Extrinsic, skipped: Iterable[BadFrame]) -> Watched:
-    """Whether what frames say changes over a drive, and whether so much can be told.
+    """Detect changes over a drive from its looks, if these suffice.
 
     Args:
-        looks: what they say relative to ``origin``, by position.
-        count: of the drive's frames.
+        looks: looks relative to ``origin``, by position.
+        count: number of the drive's frames.
         origin: ``camera_from_lidar``, 4x4.
-        skipped: frames that fit nowhere or could not be read.
+        skipped: frames that do not fit or could not be read.
     """
     in_order = [looks[position] for position in sorted(looks)]
     known = {look.frame for look in in_order}
     missing = tuple(bad for bad in skipped if bad.frame not in known)
     if len(in_order) < max(FEWEST, (count + 1) // 2):
-        reason = f"Only {len(in_order)} of {count} frames fit or can be read."
+        reason = f"Only {len(in_order)} of {count} frames can be read and fit."
         return Watched(origin, None, reason, len(in_order), missing)
     found = watch(in_order)
     blind = 3 * found.smallest
     turn, shift = float(np.degrees(np.linalg.norm(blind[3:]))), float(100 * np.linalg.norm(blind[:3]))
     if not found.changes and (turn > BLIND_DEG or shift > BLIND_CM):
-        reason = f"Frames scatter so much that a move of {turn:.1f}° or {shift:.0f} cm could not be told."
+        reason = f"Frames scatter so much that a move of {turn:.1f}° or {shift:.0f} cm could not be detected."
         return Watched(origin, found, reason, len(in_order), missing)
     return Watched(origin, found, "", len(in_order), missing)
 
@@ -138,7 +139,7 @@ def judge_looks(looks: dict[int, DriveLook], count: int, origin: Extrinsic, skip
 def solved_parts(
     calibrator: DriveCalibrator, part: Part, initial: Extrinsic, observer: Callable[[int, int], None] | None
 ) -> list[SolvedPart]:
-    """A drive as one, or its halves where half of its frames or more do not fit together, down to `SHORTEST` frames."""
+    """Solve a drive as one, or its halves if half of its frames do not fit together, down to `SHORTEST` frames."""
     try:
         solved = SolvedPart(part, calibrator.calibrate_drive(part, initial, observer))
         if 2 * solved.estimate.frames > len(part) or len(part) < FEWEST:
@@ -158,14 +159,14 @@ def far_parts(
     origin: Extrinsic,
     observer: Callable[[int, int], None] | None,
 ) -> list[SolvedPart]:
-    """Parts between changes that lie far from the extrinsic of all, or do not fit there, solved by themselves.
+    """Solve by themselves the parts between changes that are far from the extrinsic of all, or do not fit it.
 
     Args:
-        calibrator: that solves them.
-        frames: of the drive.
-        looks: what they say so far, by position.
-        origin: that this is relative to.
-        observer: as `watch_drive` has it.
+        calibrator: method that solves them.
+        frames: frames of the drive.
+        looks: looks so far, by position.
+        origin: extrinsic to which looks are relative.
+        observer: as for `watch_drive`.
     """
     if len(looks) < FEWEST:
         return []
@@ -182,13 +183,13 @@ def far_parts(
         if near or stop - start < SHORTEST:
             continue
         part = Part(frames, start, stop)
-        with contextlib.suppress(CalibrationError, DatasetError):  # what fits nowhere stays skipped
+        with contextlib.suppress(CalibrationError, DatasetError):  # frames that do not fit stay skipped
             solved.append(SolvedPart(part, calibrator.calibrate_drive(part, middle @ origin, observer)))
     return solved
 
 
 def runs(positions: list[int]) -> list[tuple[int, int]]:
-    """Unbroken runs of sorted positions, each from its first to before its end."""
+    """Runs of consecutive positions, each as its first position and the one after its last."""
     found: list[tuple[int, int]] = []
     for position in positions:
         if found and found[-1][1] == position:

@@ -1,4 +1,4 @@
-"""The rectified pinhole camera. Pixel centres lie at integer coordinates, as in OpenCV and KITTI."""
+"""The rectified pinhole camera. Pixel centres are at integer coordinates, as in OpenCV and KITTI."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PinholeCamera:
         return PinholeCamera(width, height, scale @ self.matrix)
 
     def fitted(self, height: float, width: float, multiple: int) -> PinholeCamera:
-        """The camera of the image resized to the area of ``height`` x ``width`` pixels, its own aspect kept.
+        """The camera of the image resized to the area of ``height`` x ``width`` pixels at its own aspect ratio.
 
         Both sides are rounded to multiples of ``multiple`` (the coarsest stride of a network), so the two focal
         lengths may scale by slightly different factors.

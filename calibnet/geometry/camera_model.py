@@ -1,7 +1,7 @@
-"""A camera as it is, lens included: where points are seen in its own pictures, before anything is rectified.
+"""A camera with its lens: projects points into its own images, without rectification.
 
-The models are those that ROS and Kalibr name. All map the ray to a point onto a plane at distance 1, each in its own
-way, and that plane onto pixels by the camera matrix.
+The models are those of ROS and Kalibr. Each maps the ray to a point onto a plane at distance 1, and the camera matrix
+maps that plane to pixels.
 """
 
 from __future__ import annotations
@@ -26,21 +26,22 @@ COEFFICIENTS: dict[LensModel, tuple[int, ...]] = {
     "omnidirectional": (5,),
     "double_sphere": (2,),
 }
-"""How many coefficients each model has. OpenCV's: k1 k2 p1 p2, then k3, then k4 k5 k6, then s1 to s4, then tau_x tau_y.
-Equidistant (Kannala-Brandt, ``cv2.fisheye``): k1 to k4. Omnidirectional (Mei): xi k1 k2 p1 p2. Double sphere: xi alpha.
+"""Possible numbers of coefficients of each model. OpenCV's: k1 k2 p1 p2, then k3, then k4 k5 k6, then s1 to s4, then
+tau_x tau_y. Equidistant (Kannala-Brandt, ``cv2.fisheye``): k1 to k4. Omnidirectional (Mei): xi k1 k2 p1 p2. Double
+sphere: xi alpha.
 """
 
 OWN_COEFFICIENTS: dict[LensModel, tuple[str, ...]] = {"omnidirectional": ("xi",), "double_sphere": ("xi", "alpha")}
-"""The first coefficients of models that files give under names of their own, apart from the distortion."""
+"""Leading coefficients that files give under names of their own, apart from the distortion."""
 
 SAMPLES = 2_000
-"""Steps in which it is searched where a lens begins to fold its picture back onto itself."""
+"""Number of steps in the search for the angle at which a lens begins to fold its image back onto itself."""
 WIDEST_PLANE = 20.0
-"""Tangent of the angle from the axis up to which a lens of OpenCV's is searched; it is 87 degrees."""
+"""Largest tangent of the angle from the axis in the search for OpenCV's lenses, which is 87 degrees."""
 
 
 class Seen(NamedTuple):
-    """Where a camera sees points: ``pixels [N, 2]``, and ``valid [N]``, whether the lens can show them at all."""
+    """Projected points: ``pixels [N, 2]``, and ``valid [N]``, whether the lens can show them at all."""
 
     pixels: Floats
     valid: NDArray[np.bool_]
@@ -48,14 +49,14 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CameraModel:
-    """Size of the picture in pixels, 3x3 camera matrix, and the lens.
+    """A camera: image size in pixels, 3x3 camera matrix, and lens.
 
     Attributes:
-        width: of the picture.
-        height: of the picture.
-        matrix: from the lens's plane to pixels; for ``omnidirectional`` its focal length is Mei's gamma.
-        model: of the lens.
-        coefficients: as `COEFFICIENTS` says; zeros where the pictures are rectified.
+        width: width of the image.
+        height: height of the image.
+        matrix: maps the lens's plane to pixels; for ``omnidirectional``, its focal length is Mei's gamma.
+        model: model of the lens.
+        coefficients: coefficients as in `COEFFICIENTS`; zeros for rectified images.
     """
 
     width: int
@@ -66,12 +67,12 @@ class CameraModel:
 
     @classmethod
     def of(cls, camera: PinholeCamera) -> CameraModel:
-        """The camera of pictures that are rectified."""
+        """The camera of rectified images."""
         return cls(camera.width, camera.height, camera.matrix)
 
     @property
     def is_pinhole(self) -> bool:
-        """Whether straight lines are straight in its pictures."""
+        """Whether straight lines are straight in its images."""
         return self.model in ("plumb_bob", "rational_polynomial") and not self.coefficients.any()
 
     @property
@@ -91,7 +92,7 @@ class CameraModel:
         return self.coefficients[len(self.named) :]
 
     def same(self, other: CameraModel) -> bool:
-        """Whether the other is of the same size, matrix and lens."""
+        """Whether the other camera has the same size, matrix and lens."""
         return (
             (self.width, self.height, self.model) == (other.width, other.height, other.model)
             and np.array_equal(self.matrix, other.matrix)
@@ -99,7 +100,7 @@ class CameraModel:
         )
 
     def see(self, points: NDArray[np.floating]) -> Seen:
-        """Where points ``[N, 3]`` of the camera frame fall, inside the picture or beyond its border."""
+        """Project points ``[N, 3]`` of the camera frame, inside or outside the image."""
         plane, valid = _PLANES[self.model](points.astype(np.float64), self.coefficients)
         fx, skew, cx = self.matrix[0]
         fy, cy = self.matrix[1, 1:]
@@ -108,8 +109,8 @@ class CameraModel:
 
 
 def _of_opencv(points: Floats, coefficients: Floats) -> Seen:
-    """OpenCV's model, which has no meaning behind the camera or where its polynomial falls again."""
-    import cv2  # not above: geometry is imported by much that reads no picture
+    """OpenCV's model, which is not valid behind the camera or where its polynomial decreases."""
+    import cv2  # imported late, since much that imports geometry needs no images
 
     ahead = points[:, 2] > 1e-9
     normalized = np.where(ahead[:, None], points[:, :2] / np.where(ahead, points[:, 2], 1.0)[:, None], 0.0)
@@ -137,14 +138,14 @@ def _equidistant(points: Floats, coefficients: Floats) -> Seen:
     off_axis = np.hypot(points[:, 0], points[:, 1])
     angle = np.arctan2(off_axis, points[:, 2])
     angles = np.linspace(0.0, np.pi, SAMPLES)
-    straight_behind = (off_axis < 1e-9) & (points[:, 2] <= 0)  # every direction of the picture at once
+    straight_behind = (off_axis < 1e-9) & (points[:, 2] <= 0)  # it maps to every direction of the image
     valid = (angle <= _last_rising(angles, _bent(angles, coefficients))) & ~straight_behind
     scale = _bent(angle, coefficients) / np.maximum(off_axis, 1e-12)
     return Seen(points[:, :2] * scale[:, None], valid)
 
 
 def _bent(angle: Floats, coefficients: Floats) -> Floats:
-    """Distance from the centre, on the plane, of what is seen so many radians off the axis."""
+    """Distance from the centre, on the plane, of a point at an angle from the axis in radians."""
     k1, k2, k3, k4 = coefficients
     square = angle**2
     bent: Floats = angle * (1 + square * (k1 + square * (k2 + square * (k3 + square * k4))))
@@ -164,7 +165,7 @@ def _omnidirectional(points: Floats, coefficients: Floats) -> Seen:
 
 
 def _double_sphere(points: Floats, coefficients: Floats) -> Seen:
-    """Usenko et al. 2018."""
+    """The double sphere model, Usenko et al. 2018."""
     xi, alpha = coefficients
     x, y, z = points.T
     first = np.maximum(np.linalg.norm(points, axis=1), 1e-12)
@@ -186,6 +187,6 @@ _PLANES: dict[LensModel, Callable[[Floats, Floats], Seen]] = {
 
 
 def _last_rising(at: Floats, values: Floats) -> float:
-    """The last of the places up to which values rise all the way."""
+    """The last position up to which values increase throughout."""
     falls = np.flatnonzero(np.diff(values) <= 0)
     return float(at[falls[0]] if len(falls) else at[-1])

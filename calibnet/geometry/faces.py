@@ -1,7 +1,7 @@
-"""Pinhole cameras in the place of a lens that is wider than one: the faces through which the networks see.
+"""Replaces a wide lens by several pinhole cameras in its place, the faces through which the networks see.
 
-They stand level, whichever way the lens is tilted, and share its width evenly, as the pictures did that the networks
-have learnt from. A lens that looks up or down has no horizon to stand on: it is seen through the faces of a cube.
+Faces are level, however the lens is tilted, like the training images, and share its width evenly. A lens that looks up
+or down has no horizon, and is replaced by the faces of a cube.
 """
 
 from __future__ import annotations
@@ -18,32 +18,33 @@ from calibnet.geometry.se3 import rotation_from_vector
 from calibnet.geometry.types import Extrinsic, Floats, Rotation, Vector3
 
 WIDE_DEG = 115.0
-"""Degrees across up to which one pinhole, `calibnet.geometry.rectification.central`, shows all that is of use."""
+"""Largest horizontal field of view in degrees for which one pinhole, `calibnet.geometry.rectification.central`,
+suffices."""
 FACE_DEG = 80.0
-"""Degrees across of a face at most, without its margin; KITTI's pictures have 82."""
+"""Largest horizontal field of view of a face in degrees, without its margin; KITTI's images have 82."""
 MARGIN_DEG = 4.0
-"""That a face sees beyond its share to either side, so that what is displaced over its border is still found."""
+"""Margin of a face to either side in degrees, so that points displaced over its border are still found."""
 HIGHEST_DEG = 35.0
-"""Degrees above and below the horizon that a face sees."""
+"""Field of view of a face above and below the horizon, in degrees."""
 STEP_DEG = 0.5
-"""Step in which the angle is searched up to which the lens sees."""
+"""Step of the search for the lens's field of view, in degrees."""
 SEEN = 0.5
-"""Share of a direction's heights that the lens has to see for the direction to count."""
+"""Share of the elevations of a direction that the lens must see for the direction to count."""
 NARROWEST_DEG = 15.0
-"""A face of which less is left, in either direction, is none."""
+"""Smallest field of view of a face in either direction, in degrees."""
 LEVEL = 0.5
-"""Length of the optical axis along the horizon below which a lens looks up or down."""
+"""Horizontal part of the optical axis below which a lens looks up or down."""
 
 
 def faces(
     camera: CameraModel, camera_from_lidar: Extrinsic, images: Sequence[NDArray[np.uint8]] = ()
 ) -> tuple[Rectification, ...]:
-    """The faces of a lens, the one nearest to its axis first; none for a lens that one pinhole can show.
+    """The faces of a lens, the one nearest to its axis first; none for a lens that one pinhole can replace.
 
     Args:
-        camera: with its lens.
-        camera_from_lidar: a guess, 4x4, that says where the horizon is; the LiDAR's z axis points up.
-        images: some pictures ``[H, W, 3]`` of the camera, by which borders that are always black are cut off.
+        camera: camera with its lens.
+        camera_from_lidar: a guess, 4x4, which gives the horizon, since the LiDAR's z axis points up.
+        images: some images ``[H, W, 3]`` of the camera, by which borders that are always black are cut off.
     """
     lit = images or [np.full((camera.height, camera.width, 3), 255, np.uint8)]
     turn = level(camera_from_lidar[:3, 2])
@@ -65,7 +66,7 @@ def faces(
 
 
 def level(up: Vector3) -> Rotation | None:
-    """``[3, 3]``, camera that stands level from the camera; None where that looks up or down.
+    """``[3, 3]``, rotation from the camera to a level one; None if it looks up or down.
 
     Args:
         up: ``[3]``, upward unit vector in the camera frame.
@@ -78,12 +79,12 @@ def level(up: Vector3) -> Rotation | None:
 
 
 def across(camera: CameraModel, level_from_camera: Rotation) -> float:
-    """Degrees along the horizon that a lens sees."""
+    """Horizontal field of view of a lens in degrees."""
     return sum(_reaches(camera, level_from_camera))
 
 
 def _reaches(camera: CameraModel, turn: Rotation) -> tuple[float, float]:
-    """Degrees along the horizon that the lens sees without a gap, to the left and to the right of ahead."""
+    """Degrees along the horizon that the lens sees without a gap, to the left and to the right of its axis."""
     azimuths = np.arange(0.0, 180.0, STEP_DEG)
     heights = np.radians(np.linspace(-HIGHEST_DEG, HIGHEST_DEG, 15))
 
@@ -98,7 +99,7 @@ def _reaches(camera: CameraModel, turn: Rotation) -> tuple[float, float]:
 
 
 def _shown(camera: CameraModel, rays: Floats) -> NDArray[np.bool_]:
-    """Which rays ``[N, 3]`` of the camera frame the picture shows."""
+    """Whether the image shows each ray ``[N, 3]`` of the camera frame."""
     seen = camera.see(rays)
     u, v = seen.pixels.T
     inside: NDArray[np.bool_] = (u > -0.5) & (u < camera.width - 0.5) & (v > -0.5) & (v < camera.height - 0.5)
@@ -106,7 +107,7 @@ def _shown(camera: CameraModel, rays: Floats) -> NDArray[np.bool_]:
 
 
 def _face(camera: CameraModel, turn: Rotation, half: tuple[float, float]) -> Rectification:
-    """A pinhole, turned, of so many degrees to either side and up and down, as fine as the lens is in its middle."""
+    """A turned pinhole of a given half field of view across and up, with the lens's resolution at its centre."""
     focal = _fineness(camera, turn)
     across, high = (float(np.tan(np.radians(degrees))) for degrees in half)
     width, height = max(1, round(2 * focal * across)), max(1, round(2 * focal * high))
@@ -115,7 +116,7 @@ def _face(camera: CameraModel, turn: Rotation, half: tuple[float, float]) -> Rec
 
 
 def _fineness(camera: CameraModel, turn: Rotation) -> float:
-    """Pixels a radian that the lens has where a face looks, of both directions the geometric mean."""
+    """Resolution of the lens at the centre of a face in pixels per radian, the geometric mean of both directions."""
     small = 1e-3
     ahead, right, down = camera.see(np.array([[0, 0, 1.0], [small, 0, 1], [0, small, 1]]) @ turn).pixels
     (a, b), (c, d) = (right - ahead) / small, (down - ahead) / small
@@ -136,6 +137,6 @@ def _about_y(degrees: float) -> Rotation:
 
 
 def _cube() -> list[Rotation]:
-    """Ahead and to the four sides."""
+    """The rotations of five faces: ahead and to the four sides."""
     sides = [[0.0, 90.0, 0.0], [0.0, -90.0, 0.0], [90.0, 0.0, 0.0], [-90.0, 0.0, 0.0]]
     return [np.eye(3), *(rotation_from_vector(np.radians(side)) for side in sides)]

@@ -1,4 +1,4 @@
-"""The median of several extrinsics of one mount: outliers, up to half of them, hardly move it."""
+"""The median of several extrinsics of one mount, which is robust against up to half of them being outliers."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from calibnet.geometry.se3 import rotation_from_vector, rotation_vector, transfo
 from calibnet.geometry.types import Extrinsic, Floats, Rotation
 
 ITERATIONS = 200
-"""At most; Weiszfeld's iteration mostly settles within a few dozen."""
+"""Largest number of iterations; Weiszfeld's iteration mostly converges within a few dozen."""
 SETTLED = 1e-13
-"""Move of the median, in the points' unit, below which it has settled."""
+"""Change of the median, in the points' unit, below which it has converged."""
 SMOOTHING = 1e-4
-"""A point's pull stops growing at this share of the median distance: at the point itself it would be infinite."""
+"""Smallest distance in a point's weight, relative to the median distance, since the weight is infinite at the point."""
 SMALLEST = 1e-12
-"""The distance at which it stops where all points are the same, in their unit."""
+"""Smallest distance in a point's weight if all points are the same, in their unit."""
 RECENTRINGS = 3
-"""Iterations in which rotation vectors are taken relative to the median so far: only about it are they distances."""
+"""Iterations in which rotation vectors are taken relative to the current median, about which they are distances."""
 
 
 def median_pose(extrinsics: Sequence[Extrinsic]) -> Extrinsic:
@@ -31,7 +31,7 @@ def median_pose(extrinsics: Sequence[Extrinsic]) -> Extrinsic:
         4x4; its rotation is the geodesic L1 median, its translation the geometric median.
 
     Raises:
-        ValueError: there are none.
+        ValueError: there are no extrinsics.
     """
     if not extrinsics:
         raise ValueError("There are no extrinsics to take the median of.")

@@ -24,7 +24,7 @@ SMALLEST_SIGMA = np.float32(1e-4)
 
 @dataclass(frozen=True, order=True)
 class MiscalibrationRange:
-    """Largest angle and offset, on every axis, of miscalibrations that are drawn uniformly.
+    """Largest angle and offset, on every axis, of uniformly drawn miscalibrations.
 
     Attributes:
         rotation_deg: ± degrees about each axis.
@@ -36,20 +36,20 @@ class MiscalibrationRange:
 
     @classmethod
     def parse(cls, text: str) -> MiscalibrationRange:
-        """Read ``"20/1.5"``: degrees, a slash, metres."""
+        """Parse ``"20/1.5"``: degrees, a slash, metres."""
         try:
             rotation, translation = (float(part) for part in text.split("/"))
         except ValueError:
-            raise ConfigError(f"Range {text!r} is not of the form DEGREES/METRES, for instance 5/0.5.") from None
+            raise ConfigError(f"Range {text!r} is not of the form DEGREES/METRES; write for instance 5/0.5.") from None
         if not (0.0 <= rotation <= 45.0 and 0.0 <= translation <= 10.0):
-            raise ConfigError(f"Range {text!r} is outside 0..45 degrees and 0..10 metres.")
+            raise ConfigError(f"Range {text!r} is not within 45 degrees and 10 metres; give a smaller one.")
         return cls(rotation, translation)
 
     def contains(self, delta: Transform, margin: float = 1.0) -> bool:
-        """Whether a miscalibration, 4x4, stays within so many times this range on every axis, in the camera frame.
+        """Whether a miscalibration, 4x4, is within ``margin`` times this range on every axis, in the camera frame.
 
-        An extrinsic is miscalibrated by ``extrinsic @ invert(truth)``. The inverse of that, the correction, may lie
-        within another range: its translation is turned.
+        The miscalibration of an extrinsic is ``extrinsic @ invert(truth)``. Its inverse, the correction, may be within
+        another range, since its translation is rotated.
         """
         found = range_of(delta)
         return found.rotation_deg <= margin * self.rotation_deg and found.translation_m <= margin * self.translation_m
@@ -59,14 +59,14 @@ class MiscalibrationRange:
 
     @property
     def label(self) -> str:
-        """For people, for instance ``"±5°/0.5 m"``."""
+        """The range for people, for instance ``"±5°/0.5 m"``."""
         return f"±{self.rotation_deg:g}°/{self.translation_m:g} m"
 
     @property
     def information(self) -> Matrix6:
-        """Inverse covariance ``[6, 6]`` of ``(translation m, rotation rad)``: what is known before anything is seen.
+        """Inverse covariance ``[6, 6]`` of ``(translation m, rotation rad)`` before any measurement.
 
-        Of a uniform distribution within ± a the variance is a²/3. In single precision, as the pose head counts it.
+        The variance of a uniform distribution within ± a is a²/3. Computed in single precision, as in the pose head.
         """
         sigma = np.array([self.translation_m] * 3 + [math.radians(self.rotation_deg)] * 3) / 3**0.5
         return np.diag(1 / np.square(np.maximum(sigma.astype(np.float32), SMALLEST_SIGMA))).astype(np.float64)

@@ -1,7 +1,7 @@
 """The user's prior on an extrinsic: axes that are fixed, and standard deviations of the initial guess.
 
-A car maker knows from drawings where a camera is, and wants its rotation only. A prior is an inverse covariance that is
-added to that of the measurement, so that the axes it leaves open take the values that fit best under it.
+A car maker may know from drawings where a camera is, and need only its rotation. A prior is an inverse covariance that
+is added to that of the measurement, so that the other axes take the values that fit best under it.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """How well the initial extrinsic is known, axis by axis, whichever extrinsic that is.
+    """How well an initial extrinsic is known, axis by axis.
 
     Attributes:
-        information: ``[6]``, inverse variances of offsets x, y, z in m and rotations pitch, yaw, roll in rad; 0 where
-            nothing is known.
-        words: the same for people, for instance ``"known to 2 cm; roll fixed"``; empty where nothing is known.
+        information: ``[6]``, inverse variances of offsets x, y, z in m and rotations pitch, yaw, roll in rad; 0 if
+            unknown.
+        words: the prior in words, for instance ``"known to 2 cm; roll fixed"``; empty if nothing is known.
     """
 
     information: Floats = field(default_factory=lambda: np.zeros(6), repr=False)
@@ -53,11 +53,11 @@ class Prior:
             rotation_rad: standard deviation of its rotation, about each axis.
 
         Raises:
-            ConfigError: an axis has another name, all are fixed, or a deviation is not above 0.
+            ConfigError: an axis has another name, all are fixed, or a deviation is not positive.
         """
         for axis in fixed:
             if axis not in AXES:
-                raise ConfigError(f"{axis!r} is no axis that can be fixed; choose from {', '.join(AXES)}.")
+                raise ConfigError(f"{axis!r} is not an axis; choose from {', '.join(AXES)}.")
         if set(fixed) >= set(AXES):
             raise ConfigError("With all six axes fixed there is nothing to calibrate; leave one free.")
         information, words = np.zeros(6), []
@@ -67,7 +67,7 @@ class Prior:
                 continue
             if not sigma > 0:
                 raise ConfigError(
-                    f"A standard deviation of {sigma:g} {unit} is not above 0; use --fix for what is exact."
+                    f"A standard deviation of {sigma:g} {unit} is not positive; use --fix for exact axes."
                 )
             information[[PLACE[axis] for axis in axes]] = 1 / max(sigma, EXACT) ** 2
             words.append(f"known to {100 * sigma:g} cm" if unit == "m" else f"known to {np.degrees(sigma):.3g}°")
@@ -81,7 +81,7 @@ class Prior:
         return bool(self.information.any())
 
     def about(self, initial: Extrinsic) -> PosePrior:
-        """The same about one initial extrinsic, 4x4."""
+        """The prior about one initial extrinsic, 4x4."""
         return PosePrior(initial, self.information)
 
 
@@ -90,10 +90,10 @@ class PosePrior:
     """A `Prior` about one extrinsic.
 
     Attributes:
-        initial: ``camera_from_lidar`` that the prior is centred on, 4x4.
+        initial: centre of the prior, a ``camera_from_lidar``, 4x4.
         information: see `Prior`.
-        real_from_camera: ``[3, 3]``, rotation to the camera whose axes the user means, where extrinsics are those of a
-            rotated camera (`calibnet.cascade.upright`); the identity by default.
+        real_from_camera: ``[3, 3]``, rotation to the user's camera if extrinsics are those of a rotated camera
+            (`calibnet.cascade.upright`); the identity by default.
     """
 
     initial: Extrinsic = field(repr=False)
@@ -101,17 +101,17 @@ class PosePrior:
     real_from_camera: Rotation = field(default_factory=lambda: np.eye(3), repr=False)
 
     def turned(self, camera_from_real: Rotation) -> PosePrior:
-        """The same prior on extrinsics of a rotated camera, ``camera_from_real @ camera_from_lidar``."""
+        """The prior on extrinsics of a rotated camera, ``camera_from_real @ camera_from_lidar``."""
         turn = transform(camera_from_real, np.zeros(3))
         return PosePrior(turn @ self.initial, self.information, self.real_from_camera @ camera_from_real.T)
 
     def fused(self, measured: Vector6, information: Matrix6, before: Extrinsic) -> tuple[Vector6, Matrix6]:
-        """The correction that is most likely by a measurement and the prior together, and its covariance.
+        """The most likely correction by a measurement and the prior together, and its covariance.
 
         Args:
             measured: ``[6]``, correction ``(translation m, rotation vector rad)`` of ``before``.
-            information: ``[6, 6]`` of it.
-            before: ``camera_from_lidar`` that is corrected, 4x4.
+            information: inverse covariance ``[6, 6]`` of it.
+            before: ``camera_from_lidar`` to correct, 4x4.
         """
         moved = before @ invert(self.initial)
         correction = np.asarray(measured, np.float64)
@@ -131,14 +131,14 @@ class PosePrior:
         """A measured correction of ``before``, 4x4, fused with the prior.
 
         Args:
-            correction: 4x4, as measured.
-            information: ``[6, 6]`` of it.
-            before: ``camera_from_lidar`` that is corrected, 4x4.
+            correction: measured correction, 4x4.
+            information: inverse covariance ``[6, 6]`` of it.
+            before: ``camera_from_lidar`` to correct, 4x4.
         """
         return pose_from_vector(self.fused(pose_vector(correction), information, before)[0])
 
     def narrowed(self, covariance: Matrix6, after: Extrinsic) -> Matrix6:
-        """The covariance ``[6, 6]`` of a result ``after`` once the prior is counted, which makes it smaller."""
+        """The covariance ``[6, 6]`` of a result ``after``, reduced by the prior."""
         return self.fused(np.zeros(6), inverse(covariance), after)[1]
 
     def _offset(self, correction: Vector6, moved: Transform) -> tuple[Vector6, Floats]:
@@ -156,11 +156,11 @@ class PosePrior:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How well a camera's pose on its rig is known: standard deviations, the same on every axis.
+    """Standard deviations to which a camera's pose on its rig is known, the same on every axis.
 
     Attributes:
-        rotation_rad: about each axis.
-        translation_m: along each axis.
+        rotation_rad: standard deviation about each axis.
+        translation_m: standard deviation along each axis.
     """
 
     rotation_rad: float
@@ -168,7 +168,7 @@ class Tolerance:
 
     @property
     def covariance(self) -> Matrix6:
-        """``[6, 6]`` of ``(translation m, rotation rad)``."""
+        """Covariance ``[6, 6]`` of ``(translation m, rotation rad)``."""
         return np.diag([self.translation_m**2] * 3 + [self.rotation_rad**2] * 3)
 
     def __str__(self) -> str:
@@ -176,14 +176,14 @@ class Tolerance:
 
 
 def parse_tolerance(text: str) -> Tolerance:
-    """Read an angle and a length with a slash between them, for instance ``0.5deg/2cm``.
+    """Parse an angle and a length separated by a slash, for instance ``0.5deg/2cm``.
 
     Raises:
         ConfigError: the text is not of this form.
     """
     angle, stroke, length = text.partition("/")
     if not stroke:
-        raise ConfigError(f"{text!r} is not an angle and a length with their units, for instance 0.5deg/2cm.")
+        raise ConfigError(f"{text!r} is not an angle and a length with units; write for instance 0.5deg/2cm.")
     return Tolerance(parse_angle(angle), parse_length(length))
 
 
@@ -193,10 +193,10 @@ def inverse(matrix: Matrix6) -> Matrix6:
 
 
 def parse_axes(text: str) -> tuple[str, ...]:
-    """Read names of `AXES` with commas between them, or a YAML list of them as text.
+    """Parse names of `AXES`, separated by commas or as the text of a YAML list.
 
     Raises:
-        ConfigError: a name is not one of these, or all six are there.
+        ConfigError: a name is not that of an axis, or all six are given.
     """
     names = tuple(name for name in re.split(r"[\s,\[\]'\"]+", text.lower()) if name)
     Prior.of(names)
@@ -204,22 +204,22 @@ def parse_axes(text: str) -> tuple[str, ...]:
 
 
 def parse_length(text: str) -> float:
-    """Read a length with its unit, for instance ``2cm``, in metres.
+    """Parse a length with its unit, for instance ``2cm``, in metres.
 
     Raises:
         ConfigError: the text is not of this form.
     """
-    return _parse(text, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}, "a length with its unit, for instance 2cm")
+    return _parse(text, {"mm": 1e-3, "cm": 1e-2, "m": 1.0}, "a length with a unit; write for instance 2cm")
 
 
 def parse_angle(text: str) -> float:
-    """Read an angle with its unit, for instance ``0.5deg``, in radians.
+    """Parse an angle with its unit, for instance ``0.5deg``, in radians.
 
     Raises:
         ConfigError: the text is not of this form.
     """
     units = {"deg": np.pi / 180, "°": np.pi / 180, "mrad": 1e-3, "rad": 1.0}
-    return _parse(text, units, "an angle with its unit, for instance 0.5deg")
+    return _parse(text, units, "an angle with a unit; write for instance 0.5deg")
 
 
 def _parse(text: str, units: dict[str, float], wanted: str) -> float:

@@ -1,4 +1,4 @@
-"""Projection of a LiDAR scan into an image, with a z-buffer: the nearest point of a pixel wins."""
+"""Projects a LiDAR scan into an image, with a z-buffer that keeps the nearest point of each cell."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from calibnet.geometry.se3 import transform_points
 from calibnet.geometry.types import Extrinsic
 
 MINIMUM_DEPTH = 0.5
-"""Metres in front of the camera below which a point is the car itself or numerically useless."""
+"""Smallest depth in metres; closer points belong to the car itself or are numerically useless."""
 
 
 @dataclass(frozen=True)
 class Projection:
-    """The points of a scan that fall into an image.
+    """The points of a scan that are inside an image.
 
     Attributes:
         pixels: ``[M, 2]`` float32, sub-pixel ``(u, v)``.
@@ -33,9 +33,9 @@ class Projection:
     points: NDArray[np.float32]
 
     def far_to_near(self) -> NDArray[np.int64]:
-        """Rows by falling depth; those of one depth in the order of the scan.
+        """Rows by decreasing depth; rows of equal depth stay in the order of the scan.
 
-        The bits of positive numbers sort as they do. With the row behind them they are sorted in half the time.
+        The bits of positive floats sort like the numbers; combined with the row index they sort in half the time.
         """
         bits = self.depth.view(np.uint32).astype(np.uint64)
         keys = (np.uint64(0xFFFFFFFF) - bits) << np.uint64(32) | np.arange(len(bits), dtype=np.uint64)
@@ -45,12 +45,12 @@ class Projection:
     def sorted(self) -> Projection:
         """The same points, far to near."""
         order = self.far_to_near()
-        pixels, points = (rows.T.take(order, axis=1).T for rows in (self.pixels, self.points))  # as they lie in memory
+        pixels, points = (rows.T.take(order, axis=1).T for rows in (self.pixels, self.points))  # in memory order
         return Projection(pixels, self.depth[order], self.index[order], points)
 
 
 def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera) -> Projection:
-    """Project points ``[N, >=3]`` of the LiDAR frame; keep those in front of and inside the image."""
+    """Project points ``[N, >=3]`` of the LiDAR frame; keeps those in front of the camera and inside the image."""
     x, y, depth = transform_points(camera_from_lidar, points[:, :3]).T
     in_front = np.flatnonzero(depth > MINIMUM_DEPTH)
     x, y, depth = (coordinate[in_front] for coordinate in (x, y, depth))
@@ -64,9 +64,9 @@ def project(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: P
 
 
 def project_through(points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: CameraModel) -> Projection:
-    """Project points ``[N, >=3]`` of the LiDAR frame into pictures as they are taken, through the lens.
+    """Project points ``[N, >=3]`` of the LiDAR frame through the lens into the unrectified image.
 
-    Of a lens that is no pinhole the depth is the distance from the camera, since it may see to the side.
+    For a lens that is not a pinhole, depth is the distance from the camera, since it may see sideways.
     """
     if camera.is_pinhole:
         return project(points, camera_from_lidar, camera.pinhole)
@@ -85,7 +85,7 @@ def nearest_per_cell(
     stride: int = 1,
     far_to_near: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
-    """Z-buffer at ``stride`` pixels a cell; ``far_to_near`` saves the sorting where several are made.
+    """Z-buffer with cells of ``stride`` pixels; passing ``far_to_near`` saves sorting if several are made.
 
     Returns ``[h, w]`` int64: for every cell the row in ``projection`` of its nearest point, or -1.
     """
@@ -93,14 +93,14 @@ def nearest_per_cell(
     if far_to_near is None:
         far_to_near = projection.far_to_near()
     winner = np.full(height * width, -1, dtype=np.int64)
-    winner[cells[far_to_near]] = far_to_near  # the last assignment wins: the nearest
+    winner[cells[far_to_near]] = far_to_near  # the last assignment wins, which is the nearest
     return winner.reshape(height, width)
 
 
 def cells_of_points(
     projection: Projection, camera: PinholeCamera | CameraModel, stride: int
 ) -> tuple[tuple[int, int], NDArray[np.int64]]:
-    """Height and width of an image of ``stride`` pixels a cell, and for each point its cell ``[M]``, row by row."""
+    """Height and width of an image in cells of ``stride`` pixels, and the cell ``[M]`` of each point, row by row."""
     height, width = -(-camera.height // stride), -(-camera.width // stride)
     column, row = np.floor((projection.pixels.T + 0.5) / stride).astype(np.int64)
     return (height, width), np.minimum(row, height - 1) * width + np.minimum(column, width - 1)
@@ -109,7 +109,7 @@ def cells_of_points(
 def depth_image(
     points: NDArray[np.float32], camera_from_lidar: Extrinsic, camera: PinholeCamera
 ) -> NDArray[np.float32]:
-    """Sparse depth ``[H, W]`` in metres, 0 where no point falls."""
+    """Sparse depth ``[H, W]`` in metres, 0 in pixels without a point."""
     projection = project(points, camera_from_lidar, camera)
     winner = nearest_per_cell(projection, camera)
     depth = np.append(projection.depth, np.float32(0.0))

@@ -36,14 +36,14 @@ def orthonormal(matrix: Transform) -> Transform:
 
 
 def transform_points(target_from_source: Transform, points: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Map points ``[N, 3]`` from source to target; the points' own precision is kept.
+    """Map points ``[N, 3]`` from source to target, in the points' own precision.
 
-    Not a matrix product: so slim a one gains nothing from the threads of BLAS, which then wait in a loop for
-    the next and take the cores from the network's convolutions, for a tenth of a second.
+    Not a matrix product, which is too slim to gain from the threads of BLAS; these would then spin for a tenth of a
+    second and take the cores from the network's convolutions.
     """
     matrix = target_from_source.astype(points.dtype, copy=False)
     x, y, z = points.T
-    moved = np.empty((3, len(points)), points.dtype)  # a coordinate after the other: as they are read next
+    moved = np.empty((3, len(points)), points.dtype)  # coordinate by coordinate, as they are read next
     for row, (a, b, c, offset) in zip(moved, matrix[:3], strict=True):
         row[:] = x * a + y * b + z * c + offset
     return moved.T
@@ -63,7 +63,7 @@ def rotation_from_euler_xyz(angles: ArrayLike) -> Rotation:
 
 
 def rotation_from_vector(vector: ArrayLike) -> Rotation:
-    """Rodrigues: the rotation by ``|vector|`` radians about ``vector``."""
+    """The rotation by ``|vector|`` radians about ``vector`` (Rodrigues)."""
     axis = np.asarray(vector, dtype=np.float64)
     angle = float(np.linalg.norm(axis))
     if angle < 1e-12:
@@ -74,10 +74,10 @@ def rotation_from_vector(vector: ArrayLike) -> Rotation:
 
 
 def rotation_jacobian(vector: ArrayLike) -> Floats:
-    """``J [3, 3]`` of a rotation vector: turning by ``J d`` after ``vector`` is turning by ``vector + d``, d small."""
+    """``J [3, 3]`` of a rotation vector: turning by ``vector``, then ``J d``, is turning by ``vector + d``, d small."""
     turn = np.asarray(vector, dtype=np.float64)
     angle, cross = float(np.linalg.norm(turn)), _cross(turn)
-    if angle < 1e-4:  # where the fractions below lose their digits
+    if angle < 1e-4:  # the fractions below lose precision here
         return np.eye(3) + cross / 2
     straight, bent = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     jacobian: Floats = np.eye(3) + straight * cross + bent * cross @ cross
@@ -85,12 +85,12 @@ def rotation_jacobian(vector: ArrayLike) -> Floats:
 
 
 def rotation_vector(rotation: NDArray[np.floating]) -> Vector3:
-    """The vector, in radians, of ``rotation_from_vector``; of a half turn one of the two that there are."""
+    """The vector, in radians, of ``rotation_from_vector``; for a half turn, one of two possible vectors."""
     sine_axis, angle = _sine_axis(rotation), rotation_angle(rotation)
     if angle < 3.0:
         sine = float(np.linalg.norm(sine_axis))
         return sine_axis * (angle / sine) if sine > 1e-12 else sine_axis
-    # near half a turn the sine has few digits left, but the even part is (1 - cos) times axis by axis
+    # near a half turn the sine loses precision, but the symmetric part is (1 - cos) times the axis' outer product
     even = 0.5 * (rotation + rotation.T) - np.cos(angle) * np.eye(3)
     axis = even[:, int(even.diagonal().argmax())]
     return np.asarray(np.copysign(angle, axis @ sine_axis) * axis / np.linalg.norm(axis), np.float64)
@@ -107,13 +107,13 @@ def pose_from_vector(vector: Vector6) -> Transform:
 
 
 def adjoint(camera_from_rig: Transform) -> Floats:
-    """``[6, 6]``: the small motion ``(translation, rotation)`` of a camera that one of the rig is."""
+    """``[6, 6]``, maps a small motion ``(translation, rotation)`` of a rig to that of its camera."""
     rotation = camera_from_rig[:3, :3]
     return np.block([[rotation, _cross(camera_from_rig[:3, 3]) @ rotation], [np.zeros((3, 3)), rotation]])
 
 
 def rotate6(rotation: Rotation) -> Floats:
-    """``[6, 6]``: turns vectors ``(translation, rotation)`` by a rotation ``[3, 3]``."""
+    """``[6, 6]``, rotates vectors ``(translation, rotation)`` by a rotation ``[3, 3]``."""
     return np.kron(np.eye(2), rotation).astype(np.float64)
 
 
@@ -148,7 +148,7 @@ def _cross(vector: Vector3) -> Floats:
 
 
 def _sine_axis(rotation: NDArray[np.floating]) -> Vector3:
-    """The rotation's axis, as long as the sine of its angle."""
+    """The rotation's axis, scaled by the sine of its angle."""
     return 0.5 * np.array(
         [
             rotation[2, 1] - rotation[1, 2],
@@ -160,7 +160,7 @@ def _sine_axis(rotation: NDArray[np.floating]) -> Vector3:
 
 @dataclass(frozen=True)
 class PoseError:
-    """Difference of an estimated extrinsic to the reference, in the camera frame.
+    """Difference between an estimated extrinsic and the reference, in the camera frame.
 
     ``roll`` turns about the camera's z (forward), ``pitch`` about x (right), ``yaw`` about y
     (down); per-axis values are signed.

@@ -1,4 +1,4 @@
-"""Names for arrays whose shape has a meaning; all of them are float64."""
+"""Type aliases for arrays of a certain shape; all are float64."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
-"""Double precision; the shape is given where it is used."""
+"""An array of any shape."""
 
 Transform: TypeAlias = NDArray[np.float64]
 """``[4, 4]``, a rigid ``target_from_source`` in metres: a miscalibration, a correction."""
@@ -29,4 +29,4 @@ Vector6: TypeAlias = NDArray[np.float64]
 """``[6]``: translation in metres, then rotation vector in radians."""
 
 Matrix6: TypeAlias = NDArray[np.float64]
-"""``[6, 6]`` over the components of a `Vector6`: a covariance, or an information, its inverse."""
+"""``[6, 6]`` over the components of a `Vector6`: a covariance, or an information matrix, its inverse."""

@@ -1,1 +1,1 @@
-"""What every part of the package needs of the machine: clock, precision, interruption, whole files."""
+"""Utilities for all parts of the package: clock, precision, interruption, reading and writing of files."""

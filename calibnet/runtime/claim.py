@@ -1,6 +1,6 @@
-"""A file that one process writes bit by bit, as a recording is: locked against others, and the earlier one put aside.
+"""A file that one process writes bit by bit, such as a recording: locked against others, with the earlier one kept.
 
-A run that is killed leaves what it had written under the file's own name, and what was there before under another.
+A killed run leaves what it has written under the file's own name, and the earlier file under another name.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 from calibnet.runtime.writing import Kind, OutputError, check_output, remove_partials
 
 PATIENCE_S = 0.2
-"""How long a lock is waited for: the last run that had it may just be ending."""
+"""Seconds to wait for a lock, whose last owner may just be ending."""
 
 
 class Claim:
@@ -25,19 +25,19 @@ class Claim:
 
     Attributes:
         path: the file.
-        earlier: where a file of the same kind lies that was there before; None without one.
+        earlier: path of an earlier file of the same kind; None without one.
     """
 
     def __init__(self, path: Path, kind: Kind, patience_s: float = PATIENCE_S) -> None:
-        """Claim a file that is new or of the same kind; nothing of it changes before `begin`.
+        """Claim a file that is new or of the same kind; it does not change before `begin`.
 
         Args:
             path: the file.
-            kind: what it holds.
-            patience_s: how long another process that writes it is waited for.
+            kind: kind of its content.
+            patience_s: seconds to wait for another process that writes it.
 
         Raises:
-            OutputError: it may not be written (see `check_output`), or another process is writing it.
+            OutputError: it must not be written (see `check_output`), or another process is writing it.
         """
         self.path, self.kind = path, kind
         self.earlier: Path | None = None
@@ -47,29 +47,29 @@ class Claim:
 
     @classmethod
     def of_new(cls, path: Path, kind: Kind) -> Claim:
-        """Claim a file that is not there yet: ``path``, or with a number before its ending, ``demo-2.rrd``."""
+        """Claim a file that does not exist yet: ``path``, or a name with a number such as ``demo-2.rrd``."""
         for number in itertools.count(1):
             candidate = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
             if os.path.lexists(candidate):
                 continue
             with contextlib.suppress(BusyError):
-                claim = cls(candidate, kind, patience_s=0)  # the next name is as good
+                claim = cls(candidate, kind, patience_s=0)  # the next name will do as well
                 if not os.path.lexists(candidate):
                     return claim
-                claim.release()  # another run has just ended
-        raise AssertionError("numbers do not end")
+                claim.release()  # another run has just finished
+        raise AssertionError("unreachable: there is always another number")
 
     def begin(self) -> Path:
-        """Put an earlier file aside and make an empty one in its place; returns its path.
+        """Rename an earlier file and make an empty one in its place; returns its path.
 
-        What a killed run left half written beside it, see `write_whole`, goes.
+        Partial files of killed runs, see `write_whole`, are removed.
 
         Raises:
-            OutputError: it may not be written any more.
-            OSError: it cannot be.
+            OutputError: it must no longer be written.
+            OSError: it cannot be written.
         """
         check_output(self.path, self.kind)
-        remove_partials(self.path)  # of a run that was killed at its end: we have the lock
+        remove_partials(self.path)  # left by a run that was killed; safe, since we have the lock
         if self.path.exists():
             earlier = self.path.with_stem(f"{self.path.stem}.earlier-{secrets.token_hex(4)}")
             self.path.rename(earlier)
@@ -78,7 +78,7 @@ class Claim:
         return self.path
 
     def complete(self) -> bool:
-        """Remove the earlier file, as the new one is whole; returns whether there was one."""
+        """Remove the earlier file, since the new one is complete; returns whether there was one."""
         replaced, self.earlier = self.earlier, None
         if replaced is not None:
             with contextlib.suppress(OSError):
@@ -86,26 +86,26 @@ class Claim:
         return replaced is not None
 
     def release(self) -> None:
-        """Let others write the file; an earlier one stays where it was put."""
+        """Let others write the file; an earlier one keeps its new name."""
         lock, self._lock = self._lock, None
         if lock is not None:
             _unlock(lock)
 
 
 class BusyError(OutputError):
-    """Another process writes the file."""
+    """Another process is writing the file."""
 
 
 @contextlib.contextmanager
 def locked(path: Path, patience_s: float = PATIENCE_S) -> Iterator[None]:
-    """Be the only process that writes a file, which is replaced as a whole again and again, while this lasts.
+    """A context in which only this process writes a file, which is replaced as a whole repeatedly.
 
     Args:
         path: the file.
-        patience_s: how long another process is waited for.
+        patience_s: seconds to wait for another process.
 
     Raises:
-        BusyError: another process has it, for longer than that.
+        BusyError: another process has it for longer.
         OutputError: the folder cannot be written.
     """
     lock = _lock(path, patience_s)
@@ -129,10 +129,10 @@ def _lock(path: Path, patience_s: float) -> FileLock:
 
 
 def _unlock(lock: FileLock) -> None:
-    """Release a lock and leave no file of it.
+    """Release a lock and remove its file.
 
-    The file goes while the lock is still held, and all work under it is done. Whoever had opened it before then gets a
-    lock on a file without a name, which filelock (from 3.21 on) notices, and it opens a new one.
+    The file is removed while the lock is still held, after all work under it. A process that had opened it before gets
+    a lock on a file without a name, which filelock (since 3.21) notices, and opens a new one.
     """
     with contextlib.suppress(OSError):
         Path(lock.lock_file).unlink()

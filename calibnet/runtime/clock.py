@@ -1,4 +1,4 @@
-"""Wall time of the parts of a stage."""
+"""Measures the wall time of the parts of a stage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch import nn
 
 @contextmanager
 def after_each(parts: Mapping[str, nn.Module], done: Callable[[str], None]) -> Iterator[None]:
-    """Call ``done`` with the name of each module after each of its calls, while this lasts."""
+    """A context in which ``done`` is called with a module's name after each call of the module."""
     handles = [module.register_forward_hook(lambda *_, part=part: done(part)) for part, module in parts.items()]
     try:
         yield
@@ -30,13 +30,13 @@ class Clock:
         self.last = time.perf_counter()
 
     def skip(self) -> None:
-        """Everything since the last call was timed elsewhere."""
+        """Ignore the time since the last call, which was measured elsewhere."""
         self.last = time.perf_counter()
 
     def __call__(self, part: str) -> None:
-        """Everything since the last call was ``part``."""
+        """Add the time since the last call to ``part``."""
         if self.device.type == "cuda":
-            torch.cuda.synchronize(self.device)  # work is only queued there
+            torch.cuda.synchronize(self.device)  # GPU work is only queued
         now = time.perf_counter()
         self.parts[part] = self.parts.get(part, 0.0) + 1000 * (now - self.last)
         self.last = now

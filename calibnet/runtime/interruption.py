@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request to stop between two frames or steps, so that nothing ends half done."""
+"""Turns Ctrl-C and SIGTERM into a request to stop between two frames or steps, so that nothing ends half done."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopRequest:
-    """A context in which the first signal asks to stop and the second raises KeyboardInterrupt."""
+    """A context in which the first signal requests a stop and the second raises KeyboardInterrupt."""
 
     def __init__(self, acknowledgement: str = "") -> None:
         """Prepare; ``acknowledgement`` is printed at the first signal."""

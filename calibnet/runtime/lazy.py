@@ -1,4 +1,4 @@
-"""Names of a package that are loaded when they are first used, so that importing it costs nothing (PEP 562)."""
+"""Names of a package that are imported when first used, so that importing the package costs nothing (PEP 562)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 def lazy_names(
     package: str, modules: Mapping[str, str], *others: str
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """The functions ``__getattr__`` and ``__dir__`` of a package.
+    """Make the functions ``__getattr__`` and ``__dir__`` of a package.
 
     Args:
-        package: its name.
-        modules: the module that defines each name.
-        others: names that the package has itself.
+        package: name of the package.
+        modules: defining module of each name.
+        others: names that the package defines itself.
     """
 
     def load(name: str) -> Any:

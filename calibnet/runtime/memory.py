@@ -1,4 +1,4 @@
-"""Memory that is free, handed back to the system."""
+"""Returns free memory to the system."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from functools import cache
 
 
 def hand_back() -> None:
-    """Hand back what the C library keeps of memory that was freed; does nothing where that is not glibc.
+    """Return memory that the C library keeps after it was freed; does nothing without glibc.
 
-    Arrays of a frame are freed among small things that stay, and glibc keeps the gaps between these: some 0.1 MB more
-    with every frame of a run. It takes some milliseconds, and pages that are used again have to be cleared again.
+    Arrays of a frame are freed between small objects that stay, and glibc keeps the gaps: about 0.1 MB per frame of a
+    run. A call takes some milliseconds, and pages that are reused have to be cleared again.
     """
     trim = _trim()
     if trim is not None:

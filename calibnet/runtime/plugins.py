@@ -1,7 +1,7 @@
-"""What other packages add by entry points: datasets, heads, methods, their networks and export formats.
+"""Plugins of other packages by entry points: datasets, heads, methods, their networks and export formats.
 
 A package that registers ``[project.entry-points."calib_inspect.datasets"] mine = "my_package:MyDataset"`` in its
-``pyproject.toml`` is found by the name ``mine`` as if it were ours. Nothing of it is imported before it is asked for.
+``pyproject.toml`` is found by the name ``mine`` as if it were ours. It is imported only when requested.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ OURS = {"calibnet", "inspector"}
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
-    """What installed packages register, by name; of two with the same name, the one found first on the path.
+    """The entry points of installed packages by name; of two with the same name, the first on the path.
 
     Args:
         group: one of `GROUPS`.
     """
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
-        with contextlib.suppress(Exception):  # a package whose metadata cannot be read hides no other
+        with contextlib.suppress(Exception):  # a package with unreadable metadata must not hide others
             for entry in distribution.entry_points.select(group=f"{PREFIX}{group}"):
                 found.setdefault(entry.name, entry)
     return found
 
 
 def package_at_fault(error: BaseException) -> str:
-    """The package whose plugin an error was raised in, or beneath; empty where it was in none."""
+    """The package whose plugin raised an error, directly or indirectly; empty if none did."""
     modules = {frame.f_globals.get("__name__", "").partition(".")[0] for frame, _ in walk_tb(error.__traceback__)}
     entries = (entry for group in GROUPS for entry in plugins(group).values())
     return next((_package(entry) for entry in entries if entry.module.partition(".")[0] in modules - OURS), "")
@@ -46,11 +46,11 @@ def _package(entry: EntryPoint) -> str:
 
 @dataclass(frozen=True)
 class Registry:
-    """Things of one kind by name: our own, and those of `plugins`.
+    """Objects of one kind by name: our own, and those of `plugins`.
 
     Attributes:
-        group: of the entry points.
-        kind: what one of them is, for messages.
+        group: group of the entry points.
+        kind: name of the kind, for messages.
         own: name to ``module:object``; a plugin cannot take such a name.
     """
 
@@ -66,16 +66,16 @@ class Registry:
         return name in self.own or name in plugins(self.group)
 
     def load(self, name: str) -> Any:
-        """Import what has the name.
+        """Import the object of a name.
 
         Raises:
-            ConfigError: nothing has, or the package that registers it is broken.
+            ConfigError: there is none, or the package that registers it is broken.
         """
         if name in self.own:
             return EntryPoint(name, self.own[name], self.group).load()
         entry = plugins(self.group).get(name)
         if entry is None:
-            raise ConfigError(f"There is no {self.kind} {name!r}; choose one of {', '.join(self.names())}.")
+            raise ConfigError(f"{name!r} is not a {self.kind}; choose from {', '.join(self.names())}.")
         try:
             found = entry.load()
             if not callable(found):

@@ -1,4 +1,4 @@
-"""The fastest precision of convolutions on a device: bf16 where the hardware has it, else single."""
+"""The fastest precision of convolutions on a device: bf16 if the hardware supports it, else single."""
 
 from __future__ import annotations
 
@@ -21,5 +21,5 @@ def fastest(device: torch.device) -> torch.dtype:
 
 
 def autocast(device: torch.device) -> torch.autocast:
-    """Autocast to bf16 where that is faster, and nothing elsewhere."""
+    """Autocast to bf16 if that is faster, else disabled."""
     return torch.autocast(device.type, torch.bfloat16, enabled=has_fast_bf16(device))

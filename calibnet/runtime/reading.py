@@ -1,7 +1,7 @@
-"""The one place that opens what a user gives: regular files only, of a size that can be meant, never waited for.
+"""Opens all files that a user names: only regular files of plausible size, and never one that blocks.
 
-A path may name a fifo that nobody writes to, a device without an end, or a sparse file of 40 GB. What is opened here is
-also known to `calibnet.runtime.writing`, which never replaces what the same run reads.
+A path may name a fifo without a writer, an endless device, or a sparse file of 40 GB. Files opened here are known to
+`calibnet.runtime.writing`, which never replaces what the same run reads.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from calibnet.errors import CalibnetError, DatasetError
 
 MEGABYTE = 1 << 20
 TEXT_BYTES = 16 * MEGABYTE
-"""Largest list of times or frames; a calibration, a manifest or a preset has `SETTINGS_BYTES` at most."""
+"""Largest size of a list of times or frames; that of a calibration, manifest or preset is `SETTINGS_BYTES`."""
 SETTINGS_BYTES = MEGABYTE // 4
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
-"""How the file begins that stands where Git LFS has not fetched one."""
+"""First bytes of a pointer file that Git LFS left in place of the real one."""
 DEEPEST = 24
-"""Levels that YAML and JSON of ours are nested at most; real ones have four."""
+"""Largest depth of nesting in YAML and JSON; real files have four levels."""
 
 Identity = tuple[int, int]
-"""Device and inode: what two paths to the same file have in common."""
+"""Device and inode, which are the same for two paths to one file."""
 Loaded = TypeVar("Loaded")
 
 _inputs: set[Identity] | None = None
@@ -42,7 +42,7 @@ class TooLargeError(OSError):
 
 @contextmanager
 def protecting_inputs() -> Iterator[None]:
-    """Remember, within this context, which files are read, so that none of them is replaced (`is_input`)."""
+    """A context that remembers which files are read, so that none of them is replaced (`is_input`)."""
     global _inputs
     before, _inputs = _inputs, set()
     try:
@@ -52,7 +52,7 @@ def protecting_inputs() -> Iterator[None]:
 
 
 def register_input(path: Path) -> None:
-    """Remember a file that will be read later; one that is not there is nobody's input."""
+    """Remember a file that will be read later; a missing one is ignored."""
     if _inputs is not None:
         try:
             _inputs.add(_identity(path.stat()))
@@ -66,15 +66,15 @@ def is_input(status: os.stat_result) -> bool:
 
 
 def open_file(path: Path, largest: int | None = None, remember: bool = True) -> BinaryIO:
-    """Open a regular file to read; whatever else has the name is an error at once.
+    """Open a regular file for reading; anything else raises an error at once.
 
     Args:
         path: the file; links are followed.
-        largest: bytes that such a file can have.
-        remember: it is an input of the run.
+        largest: largest plausible size in bytes.
+        remember: whether it is an input of the run.
 
     Raises:
-        OSError: it is missing, cannot be read, is no regular file, or is too large (`TooLargeError`).
+        OSError: it is missing, cannot be read, is not a regular file, or is too large (`TooLargeError`).
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
@@ -98,7 +98,7 @@ def require_file(path: Path, what: str, largest: int | None, error: type[Calibne
     """Check a file that a library will open by its name.
 
     Raises:
-        CalibnetError: of type ``error``; the file cannot be read, is no regular file, or is too large.
+        CalibnetError: of type ``error``; the file cannot be read, is not a regular file, or is too large.
     """
     try:
         open_file(path, largest).close()
@@ -113,13 +113,13 @@ def read_file(
 
     Args:
         path: the file.
-        what: what it is, to begin the sentence with, for instance ``"Scan"``.
-        largest: bytes that such a file can have.
-        error: type of the error.
-        remedy: end of the sentence: what to do about a file that cannot be read.
+        what: kind of file, the first words of the message, for instance ``"Scan"``.
+        largest: largest plausible size in bytes.
+        error: type of the error to raise.
+        remedy: end of the message, on what to do about it.
 
     Raises:
-        CalibnetError: of type ``error``; the file cannot be read, is no regular file, or is too large.
+        CalibnetError: of type ``error``; the file cannot be read, is not a regular file, or is too large.
     """
     try:
         with open_file(path, largest) as file:
@@ -127,7 +127,7 @@ def read_file(
             data = file.read(size + 1)  # not `largest`, which would be allocated at once
             if len(data) > size:
                 data += file.read(max(0, largest + 1 - len(data)))
-        if len(data) > largest:  # it grows while it is read
+        if len(data) > largest:  # it has grown in the meantime
             raise TooLargeError(0, _too_large(len(data), largest), str(path))
         if data.startswith(LFS_POINTER):
             raise OSError(0, "Git LFS left a pointer in its place; fetch it with 'git lfs pull'", str(path))
@@ -143,7 +143,7 @@ def read_text(
     error: type[CalibnetError] = DatasetError,
     remedy: str = "restore it",
 ) -> str:
-    """A file as UTF-8; a byte-order mark is dropped. As `read_file` otherwise."""
+    """A file as UTF-8 text without a byte-order mark; arguments and errors are those of `read_file`."""
     data = read_file(path, what, largest, error, remedy)
     try:
         return data.decode("utf-8-sig")
@@ -152,22 +152,22 @@ def read_text(
 
 
 def parse_yaml(text: str) -> Any:
-    """YAML without what settings have no use for: aliases, dates, keys given twice, more levels than `DEEPEST`.
+    """Parse YAML without what settings do not need: aliases, dates, duplicate keys, and more levels than `DEEPEST`.
 
     Raises:
-        ValueError: it is no such YAML; the message says why in a few words, and where if that is known.
+        ValueError: it is not such YAML; the message says why in a few words, and where if known.
     """
     try:
         return yaml.load(text, _PlainLoader)
     except yaml.MarkedYAMLError as problem:
         line = f", line {problem.problem_mark.line + 1}" if problem.problem_mark is not None else ""
         raise ValueError(f"{problem.problem or problem.context or 'malformed'}{line}") from None
-    except Exception as problem:  # what a tag asks for is converted by Python, with Python's errors
-        raise ValueError(f"a value cannot be what its tag says ({type(problem).__name__})") from None
+    except Exception as problem:  # tags are converted by Python, with Python's errors
+        raise ValueError(f"a value cannot be read ({type(problem).__name__})") from None
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Strict JSON, without NaN, infinity and keys given twice.
+    """Parse strict JSON, without NaN, infinity and duplicate keys.
 
     Raises:
         ValueError: it is none, or nested too deeply.
@@ -179,7 +179,7 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """TOML.
+    """Parse TOML.
 
     Raises:
         ValueError: it is none, or nested too deeply.
@@ -191,7 +191,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def kind_of(mode: int) -> str:
-    """What a path names, in words."""
+    """The kind of a file, in words."""
     kinds = {
         stat.S_IFDIR: "a folder",
         stat.S_IFIFO: "a fifo",
@@ -204,7 +204,7 @@ def kind_of(mode: int) -> str:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """See `parse_yaml`."""
+    """The loader of `parse_yaml`."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)
@@ -239,7 +239,7 @@ class _PlainLoader(yaml.SafeLoader):
 
 
 def _no_number(text: str) -> NoReturn:
-    raise ValueError(f"{text} is no number")
+    raise ValueError(f"{text} is not a number")
 
 
 def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

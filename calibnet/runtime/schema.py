@@ -1,4 +1,4 @@
-"""Values of a file held against what they have to be: a dataclass with types and bounds, checked by pydantic."""
+"""Checks values of a file against a dataclass with types and bounds, by pydantic."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 MOST_SAID = 3
-"""Values that are named of those that are wrong."""
+"""Largest number of invalid values named in a message."""
 
 
 def validated(kind: type[T], values: Any, origin: str, error: type[CalibnetError], remedy: str) -> T:
-    """An object of a type, made from what JSON, TOML or YAML says; nothing is converted that is not what it should be.
+    """Make an object of a type from values of JSON, TOML or YAML, without converting values of another type.
 
     Args:
-        kind: a dataclass, ``TypedDict`` or other type; bounds are those of `annotated_types`. A dataclass with
-            ``__pydantic_config__ = {"extra": "forbid"}`` has no other keys.
-        values: what the file says.
-        origin: begins the sentence: what file this is.
+        kind: a dataclass, ``TypedDict`` or other type, with bounds from `annotated_types`. A dataclass with
+            ``__pydantic_config__ = {"extra": "forbid"}`` allows no other keys.
+        values: values from the file.
+        origin: begin of the message, which names the file.
         error: type of the error.
-        remedy: ends the sentence.
+        remedy: end of the message.
 
     Raises:
-        CalibnetError: of type ``error``; the sentence names the first values that are wrong, and why.
+        CalibnetError: of type ``error``; the message names the first invalid values and the reasons.
     """
     from pydantic import ValidationError
     from pydantic_core import PydanticSerializationError
 
     try:
-        # as JSON: its lists are tuples where those are asked for, and its numbers are never texts
+        # as JSON, where lists become tuples if required, and numbers are never text
         return cast(T, _adapter(cast(Hashable, kind)).validate_json(json.dumps(values, default=str), strict=True))
     except ValidationError as problem:
         found = problem.errors(include_url=False, include_input=False)

@@ -1,7 +1,7 @@
-"""Foreign text (names of files, words of a recording) quoted where it leaves the program, so that it stays one text.
+"""Quotes foreign text, such as names of files or content of recordings, wherever it leaves the program.
 
-A folder may be called ``a⏎Tr: 1 0 0`` and a recording's title may hold the escape sequences of a terminal. On a
-terminal, in a comment of a file or in an attribute of XML such text would be read as content.
+A folder may be called ``a⏎Tr: 1 0 0``, and a recording's title may contain escape sequences. On a terminal, in a
+comment of a file or in an XML attribute, such text would be interpreted.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ import hashlib
 from urllib.parse import quote
 
 LONGEST = 2000
-"""Characters of a text that are shown; the rest says nothing more to a reader."""
+"""Largest number of characters of a text that are shown."""
 LONGEST_NAME = 100
-"""Characters of a file's name that is made from foreign text."""
+"""Largest number of characters of a file name made from foreign text."""
 
 
 def one_line(text: object, longest: int = LONGEST) -> str:
-    """A text in one line that a terminal shows as it is: whatever cannot be printed is written as an escape.
+    """A text as one printable line, in which unprintable characters are escaped.
 
     Args:
-        text: anything; its ``str`` is taken.
-        longest: characters that are kept; a longer text loses its middle.
+        text: any object, converted by ``str``.
+        longest: largest number of characters; a longer text loses its middle.
     """
     plain = str(text)
     if len(plain) > longest:
@@ -31,17 +31,17 @@ def one_line(text: object, longest: int = LONGEST) -> str:
 
 
 def lines(text: object) -> str:
-    """The same of a text whose lines are our own: what stands between newlines is quoted."""
+    """Do the same for each line of a text whose line breaks are our own."""
     return "\n".join(one_line(line, 10 * LONGEST) for line in str(text).split("\n"))
 
 
 def number_of(count: int, noun: str) -> str:
-    """``"1 drive"``, ``"2 drives"``."""
+    """A number and a noun, such as ``"1 drive"`` or ``"2 drives"``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def file_name(text: str) -> str:
-    """Foreign text as the name of one file or folder: no separator, nothing hidden, no parent, at most 100 characters.
+    """Foreign text as the name of one file or folder: without separators, not hidden, at most 100 characters.
 
     Different texts have different names.
     """

@@ -1,4 +1,4 @@
-"""How many threads this process computes with, where several processes share a machine."""
+"""The number of threads of this process, where several processes share a machine."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 
 def limit_threads(count: int) -> None:
-    """Let torch and OpenCV use so many threads; what else follows OMP_NUM_THREADS has to be told before it starts."""
+    """Limit the threads of torch and OpenCV; libraries that follow OMP_NUM_THREADS must be limited before they load."""
     import cv2
     import torch
 
@@ -15,5 +15,5 @@ def limit_threads(count: int) -> None:
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,7 +1,7 @@
-"""The one place that writes what a user keeps: whole or not at all, and never over what may not be lost.
+"""Writes all output files, whole or not at all, and never over files that must not be lost.
 
-An output is a new name or a regular file of the kind that is written: no device, fifo or link, nothing that the same
-run reads (`calibnet.runtime.reading`), and without ``--overwrite`` no file of another kind.
+An output is a new file or replaces a regular file of the same kind: not a device, fifo or link, not an input of the
+same run (`calibnet.runtime.reading`) and, without ``--overwrite``, not a file of another kind.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.reading import is_input, kind_of, open_file
 
 HEAD_BYTES = 1 << 20
-"""How much of an existing file is read to tell its kind."""
+"""Number of bytes of an existing file that are read to find its kind."""
 
 
 class OutputError(ConfigError):
@@ -30,7 +30,7 @@ class OutputError(ConfigError):
 
 
 class Kind(StrEnum):
-    """What a file is, in words."""
+    """Kinds of files, in words."""
 
     RECORDING = "a recording"
     JSON = "a JSON file"
@@ -53,7 +53,7 @@ _overwriting = False
 
 @contextmanager
 def keeping_others() -> Iterator[None]:
-    """A context in which files of another kind stay, until `allow_overwriting` is called."""
+    """A context in which files of another kind are not replaced, unless `allow_overwriting` is called."""
     global _overwriting
     before, _overwriting = _overwriting, False
     try:
@@ -63,27 +63,27 @@ def keeping_others() -> Iterator[None]:
 
 
 PARTIAL, LONGEST_NAME = ".partial", 100
-"""Ending of what is being written, and the longest name of an output that it is called after."""
+"""Suffix of partial files, and the largest part of an output's name that they use."""
 
 
 def allow_overwriting() -> None:
-    """Let outputs replace files of any kind; still nothing that is read, no link and no device."""
+    """Let outputs replace files of any kind, but not inputs, links or devices."""
     global _overwriting
     _overwriting = True
 
 
 def check_output(path: Path, kind: Kind | None) -> bool:
-    """Find out, before the work and again before the writing, whether an output may be written.
+    """Check, before the work and again before writing, whether an output may be written.
 
     Args:
         path: the file.
-        kind: what will be written; None for a file of our own bookkeeping, which is read and replaced.
+        kind: kind of the output; None for a file of our own bookkeeping, which is read and replaced.
 
     Returns:
-        Whether a file is there that will be replaced.
+        Whether an existing file will be replaced.
 
     Raises:
-        OutputError: it may not.
+        OutputError: it must not be written.
     """
     try:
         status = path.lstat()
@@ -92,12 +92,12 @@ def check_output(path: Path, kind: Kind | None) -> bool:
     except OSError as error:
         raise OutputError(f"{path} cannot be written ({error.strerror}); choose another path.") from None
     if not stat.S_ISREG(status.st_mode):
-        advice = "name the file itself" if stat.S_ISLNK(status.st_mode) else "give a new name or a file to replace"
-        raise OutputError(f"{path} is not a file but {kind_of(status.st_mode)}, which is not written to; {advice}.")
+        advice = "give the file itself" if stat.S_ISLNK(status.st_mode) else "give a new name or a file to replace"
+        raise OutputError(f"{path} is {kind_of(status.st_mode)}, not a file; {advice}.")
     if kind is None:
         return True
     if is_input(status):
-        raise OutputError(f"{path} is read by this run and is not replaced; choose another path for the output.")
+        raise OutputError(f"{path} is an input of this run; choose another path for the output.")
     found = kind_of_file(path)
     if found not in (kind, Kind.EMPTY) and not _overwriting:
         raise OutputError(f"{path} is not {kind} but {found}; choose another path, or add --overwrite to replace it.")
@@ -105,18 +105,18 @@ def check_output(path: Path, kind: Kind | None) -> bool:
 
 
 def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind | None = None) -> bool:
-    """Write beside ``path`` and move into place; several processes may write the same file.
+    """Write to a partial file beside ``path`` and move it into place; several processes may write the same file.
 
     Args:
-        path: the file; what it held stays until the new content is complete. Its folder is created if need be.
-        write: the content, or what writes it to the path it is given.
+        path: the file, which is kept until the new content is complete; its folder is created if missing.
+        write: the content, or a function that writes it to a given path.
         kind: see `check_output`.
 
     Returns:
         Whether a file was replaced.
 
     Raises:
-        OutputError: the file may not be replaced.
+        OutputError: the file must not be replaced.
         OSError: it cannot be written; nothing is left behind.
     """
     partial: Path | None = None
@@ -128,7 +128,7 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
             partial.write_bytes(write)
         else:
             write(partial)
-        partial.chmod(mode)  # safetensors makes a file of its own there, and keeps it to its owner
+        partial.chmod(mode)  # safetensors makes a file of its own, readable by its owner only
         _settle(partial)
         replaced = check_output(path, kind)
         partial.replace(path)
@@ -136,7 +136,7 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
         if partial is not None:
             with contextlib.suppress(OSError):
                 partial.unlink()
-        said = re.search(r"\(os error (\d+)\)", str(error))  # libraries in Rust have errors of their own for all
+        said = re.search(r"\(os error (\d+)\)", str(error))  # libraries in Rust raise errors of their own
         if said and isinstance(error, Exception):
             raise OSError(int(said[1]), os.strerror(int(said[1])), str(path)) from None
         if isinstance(error, OSError):
@@ -146,7 +146,7 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
 
 
 def _begin(path: Path) -> tuple[Path, int]:
-    """An empty file of a new name beside ``path``, with the permissions of a file that is simply opened."""
+    """An empty file of a new name beside ``path``, with the usual permissions of a new file."""
     while True:
         partial = path.with_name(f"{_before(path)}{secrets.token_hex(4)}{PARTIAL}")
         with contextlib.suppress(FileExistsError):
@@ -158,7 +158,7 @@ def _begin(path: Path) -> tuple[Path, int]:
 
 
 def remove_partials(path: Path) -> None:
-    """Remove what `write_whole` was writing ``path`` to when it was killed; only who has its lock may do that."""
+    """Remove partial files that a killed `write_whole` left beside ``path``; the caller must have its lock."""
     for left in path.parent.glob(f"{glob.escape(_before(path))}{'[a-z0-9_]' * 8}{PARTIAL}"):
         with contextlib.suppress(OSError):
             left.unlink()
@@ -170,7 +170,7 @@ def _before(path: Path) -> str:
 
 
 def _settle(path: Path) -> None:
-    """Bring a file to the disk, so that a power cut after it has taken another's place does not lose both."""
+    """Flush a file to the disk, so that a power cut after it replaced another one does not lose both."""
     descriptor = os.open(path, os.O_RDWR)
     try:
         os.fsync(descriptor)
@@ -179,7 +179,7 @@ def _settle(path: Path) -> None:
 
 
 def kind_of_content(head: bytes) -> Kind:
-    """What a file is, told by how it begins."""
+    """The kind of a file, by its first bytes."""
     if not head:
         return Kind.EMPTY
     for start, kind in _STARTS.items():
@@ -211,9 +211,9 @@ _STARTS = {
 
 
 def kind_of_file(path: Path) -> Kind:
-    """What a file is; a file that cannot be read is something else."""
+    """The kind of a file; a file that cannot be read is of another kind."""
     try:
         with open_file(path, remember=False) as file:
             return kind_of_content(file.read(HEAD_BYTES))
     except OSError:
-        return Kind.OTHER  # what cannot be read is not known to be ours
+        return Kind.OTHER  # it may not be ours

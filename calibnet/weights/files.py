@@ -1,4 +1,4 @@
-"""Reading and writing one stage's weights."""
+"""Reads and writes the weights of one stage."""
 
 from __future__ import annotations
 
@@ -22,28 +22,28 @@ if TYPE_CHECKING:
     from calibnet.network.network import CalibrationNetwork
 
 LARGEST_BYTES = 1 << 30
-"""Largest file of weights; ours have 10 MB."""
+"""Largest size of a weights file; ours have 10 MB."""
 HEADER = "calib-inspect"
 MOVED = {"zooms", "rounds", "gains", "largest_match_error"}
-"""Keys of older headers that act no more: how a network is used is said by its manifest."""
+"""Keys of older headers that have no effect, since the manifest determines how a network is used."""
 
 
 def weights_path(preset: str, range_: MiscalibrationRange, folder: Path | None = None) -> Path:
-    """Where the weights of a preset's stage lie: in ``folder``, or in the package."""
+    """Path of the weights of a preset's stage, in ``folder`` or in the package."""
     return (folder or PACKAGE) / load_manifest(preset, folder).file(range_)
 
 
 class Saveable(Protocol):
-    """What a weights file says of its network, whose layers may be anything."""
+    """A network, of any kind, that a weights file can store."""
 
     @property
     def config(self) -> DataclassInstance:
-        """What it is built from."""
+        """Configuration from which it is built."""
         ...
 
     @property
     def range(self) -> MiscalibrationRange:
-        """What it was trained for."""
+        """Range that it was trained for."""
         ...
 
 
@@ -68,19 +68,19 @@ def save_network(path: Path, network: Saveable, state: dict[str, Tensor], record
 
 
 def _unique(state: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Drop the second name of tensors that two modules share: safetensors stores each once."""
+    """Drop the second name of tensors that two modules share, since safetensors stores each once."""
     seen: set[int] = set()
     return {name: t for name, t in state.items() if not (t.data_ptr() in seen or seen.add(t.data_ptr()))}  # type: ignore[func-returns-value]
 
 
 @dataclass(frozen=True)
 class Header:
-    """What a weights file says of itself.
+    """Header of a weights file.
 
     Attributes:
-        config: of the network, as a preset has it.
-        range: of the stage, as degrees and metres.
-        record: of its training.
+        config: configuration of the network, as in a preset.
+        range: range of the stage, in degrees and metres.
+        record: training record.
     """
 
     config: dict[str, Any]
@@ -92,12 +92,12 @@ def read_header(path: Path) -> Header:
     """The header of a weights file.
 
     Raises:
-        WeightsError: the file is missing, cut short or not ours.
+        WeightsError: the file is missing, truncated or not ours.
     """
     from safetensors import SafetensorError, safe_open
 
     if not path.exists():
-        raise WeightsError(f"There are no weights at {path}; train them with `calib-inspect train`.")
+        raise WeightsError(f"Weights {path} do not exist; train them with `calib-inspect train`.")
     require_file(path, "Weights", LARGEST_BYTES, WeightsError, "train them with `calib-inspect train`")
     try:
         with safe_open(path, framework="pt") as file:
@@ -121,10 +121,10 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def load_network(path: Path) -> CalibrationNetwork:
-    """Build the network a weights file describes and fill it; in evaluation mode, float32.
+    """Build the network of a weights file and load its weights; in evaluation mode, float32.
 
     Raises:
-        WeightsError: the file is missing, cut short, foreign or does not fit its own config.
+        WeightsError: the file is missing, truncated, foreign or does not fit its own config.
     """
     import torch
     from safetensors.torch import load_file
@@ -136,7 +136,7 @@ def load_network(path: Path) -> CalibrationNetwork:
     values = {key: value for key, value in header.config.items() if key not in MOVED}
     try:
         config, range_ = parse_config(values, f"The header of {path}"), MiscalibrationRange.parse(header.range)
-        with torch.device("meta"):  # its size costs no memory there
+        with torch.device("meta"):  # which takes no memory
             promised = CalibrationNetwork(config, range_).state_dict()
     except ConfigError as error:
         where = "" if str(path) in str(error) else f"{path}: "
@@ -145,13 +145,13 @@ def load_network(path: Path) -> CalibrationNetwork:
         ) from None
     stored = load_file(path)
     tensors = {name: tensor.float() for name, tensor in stored.items() if not tensor.is_complex()}
-    if config.share_extractor:  # stored once
+    if config.share_extractor:  # stored only once
         for name in [name for name in tensors if name.startswith("features.image_trunk.")]:
             tensors[name.replace("image_trunk", "lidar_trunk")] = tensors[name]
     if {name: tensor.shape for name, tensor in promised.items()} != {name: t.shape for name, t in tensors.items()}:
         raise WeightsError(f"{path} does not fit the network of this version; train it again.")
     if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
-        raise WeightsError(f"{path} holds numbers that are not finite; copy or train it again.")
+        raise WeightsError(f"{path} contains numbers that are not finite; copy or train it again.")
     network = CalibrationNetwork(config, range_)
     network.load_state_dict(tensors)
     return network.eval()

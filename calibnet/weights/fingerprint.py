@@ -1,4 +1,4 @@
-"""Telling one set of weights from another."""
+"""Fingerprints that identify a set of weights."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from calibnet.runtime.reading import open_file
 from calibnet.weights.manifest import Manifest, load_manifest
 
 LENGTH = 16
-"""Hexadecimal digits: enough to tell sets apart, short enough to read."""
+"""Number of hexadecimal digits of a fingerprint."""
 
 
 def fingerprint(folder: Path, manifest: Manifest, range_: MiscalibrationRange) -> str:
-    """What a stage's answers depend on, as a few digits: its file and how it is used; empty without a file."""
+    """A digest of everything that a stage's results depend on, its file and settings; empty without a file."""
     path = folder / manifest.file(range_)
     if not path.is_file():
         return ""
@@ -28,7 +28,7 @@ def fingerprint(folder: Path, manifest: Manifest, range_: MiscalibrationRange) -
 
 
 def fingerprints(preset: str, folder: Path, ranges: Iterable[MiscalibrationRange]) -> dict[MiscalibrationRange, str]:
-    """Those of some stages of the weights in a folder.
+    """Fingerprints of some stages of the weights in a folder.
 
     Raises:
         WeightsError: a stage has no weights there.
@@ -41,10 +41,10 @@ def fingerprints(preset: str, folder: Path, ranges: Iterable[MiscalibrationRange
 
 
 def digest_of_set(preset: str, folder: Path) -> str:
-    """What every answer of a set of weights depends on: its manifest, what is fitted to it, and all its files.
+    """A digest of all that results of a set of weights depend on: manifest, fitted coefficients and files.
 
     Raises:
-        WeightsError: there is no file of that preset.
+        WeightsError: there is no file of this preset.
     """
     files = sorted(path for path in folder.glob(f"{glob.escape(preset)}*") if path.suffix in (".toml", ".safetensors"))
     if not files:
@@ -55,6 +55,6 @@ def digest_of_set(preset: str, folder: Path) -> str:
 
 @lru_cache(maxsize=32)
 def _digest(path: Path, changed: int) -> str:
-    """Digest of a file's bytes; read again when the file has changed."""
+    """Digest of a file's bytes, computed again if the file has changed."""
     with open_file(path) as file:
         return hashlib.sha256(file.read()).hexdigest()

@@ -1,7 +1,7 @@
-"""What acts when a set of weights runs, in one readable file: ``PRESET.toml`` beside its safetensors.
+"""The manifest of a set of weights: how it is used, in one readable file, ``PRESET.toml`` beside its safetensors.
 
-The networks' tensors are in the safetensors; how they are used (image size, looks, gain, which matches are believed)
-is here and nowhere else, to be read and changed in any editor.
+The networks' tensors are in the safetensors; how they are used (image size, looks, gain, largest match error) is only
+here, to be read and changed in any editor.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import write_whole
 
 PACKAGE = Path(__file__).parent
-"""Where the weights that ship with the package lie."""
+"""Folder of the weights that ship with the package."""
 
 
 def _is_name(text: str) -> bool:
-    """Whether a text names a file, and no folder on the way to one."""
+    """Whether a text is a file name without folders."""
     return Path(text).name == text and text.isprintable()
 
 
 @dataclass(frozen=True)
 class StageSettings:
-    """How the network of a stage is used.
+    """Settings with which the network of a stage is used.
 
     Attributes:
-        image_size: width and height of the stage's image, relative to the preset's input size. A wide range is about
-            coarse things, and its search window has to reach far; a narrow one is about fractions of a cell.
-        looks: how often the stage looks at most, each time at the scan projected anew.
-        gain: what its corrections are multiplied by. Trained to be least wrong on average, a network falls short
-            where it is unsure; most of what is left then lies in the direction in which it has gone.
+        image_size: width and height of the stage's image, relative to the preset's input size. A wide range needs a
+            search window that reaches far; a narrow one needs fractions of a cell.
+        looks: largest number of looks of the stage, each at the scan projected anew.
+        gain: factor on its corrections. Trained to minimise the average error, a network undershoots where it is
+            uncertain, so that most of the remaining error is in the direction of its correction.
     """
 
     image_size: float = 1.0
@@ -58,15 +58,15 @@ class StageSettings:
 
 @dataclass(frozen=True)
 class StageEntry:
-    """A stage of a set.
+    """Entry of a stage in a manifest.
 
     Attributes:
-        range: what its network was trained for.
-        file: name of its weights, in the manifest's folder.
-        settings: how it is used.
-        run: number or name of the training run that made it.
-        recipe: that run in a sentence.
-        validation: figures of one look on the validation frames, as `calibnet.training.validation` measures them.
+        range: range that its network was trained for.
+        file: name of its weights file, in the manifest's folder.
+        settings: settings with which it is used.
+        run: number or name of its training run.
+        recipe: the training run in a sentence.
+        validation: errors of one look on the validation frames, as measured by `calibnet.training.validation`.
     """
 
     range: MiscalibrationRange
@@ -79,15 +79,15 @@ class StageEntry:
 
 @dataclass(frozen=True)
 class Manifest:
-    """A set of weights: the stages of one preset, and what holds for all of them.
+    """A set of weights: the stages of one preset, and settings common to all of them.
 
     Attributes:
         preset: name of the network's preset.
-        match_error_limit_px: error, in pixels of its image, that the finest stage may expect of its matches; beyond
-            it, picture and scan are taken not to fit together.
-        common_rotation_deg: standard deviation, an axis, of what the networks get wrong in all frames of a drive alike.
-        common_translation_m: likewise of the translation.
-        stages: in any order.
+        match_error_limit_px: largest match error, in pixels of its image, that the finest stage may expect; beyond it,
+            image and scan are taken not to fit together.
+        common_rotation_deg: standard deviation per axis of the error that the networks make in all frames of a drive.
+        common_translation_m: the same for the translation.
+        stages: entries of the stages, in any order.
     """
 
     preset: str
@@ -97,21 +97,21 @@ class Manifest:
     stages: tuple[StageEntry, ...] = ()
 
     def settings(self, range_: MiscalibrationRange) -> StageSettings:
-        """How the stage of a range is used; as it comes where the set has no such stage."""
+        """Settings of the stage of a range; the defaults if the set has no such stage."""
         return next((entry.settings for entry in self.stages if entry.range == range_), StageSettings())
 
     def file(self, range_: MiscalibrationRange) -> str:
-        """Name of the weights of a stage."""
+        """Name of the weights file of a stage."""
         return next((entry.file for entry in self.stages if entry.range == range_), file_name(self.preset, range_))
 
     @property
     def common_error(self) -> Matrix6:
-        """Covariance of what the networks get wrong in all frames of a drive alike."""
+        """Covariance of the error that the networks make in all frames of a drive."""
         sigma = [self.common_translation_m] * 3 + [float(np.radians(self.common_rotation_deg))] * 3
         return np.diag(np.square(sigma))
 
     def with_stage(self, entry: StageEntry) -> Manifest:
-        """The set with this stage added, or in the place of the one with its range."""
+        """The set with this stage added, or replacing the one with its range."""
         others = [stage for stage in self.stages if stage.range != entry.range]
         return replace(self, stages=tuple(sorted([*others, entry], key=lambda stage: stage.range, reverse=True)))
 
@@ -132,23 +132,23 @@ class Manifest:
 
 
 def file_name(preset: str, range_: MiscalibrationRange) -> str:
-    """What the weights of a stage are called where no manifest says otherwise."""
+    """Default name of the weights file of a stage."""
     return f"{preset}-{range_.rotation_deg:g}deg-{range_.translation_m:g}m.safetensors"
 
 
 def manifest_path(preset: str, folder: Path | None = None) -> Path:
-    """Where the manifest of a preset's weights lies: in ``folder``, or in the package."""
+    """Path of the manifest of a preset's weights, in ``folder`` or in the package."""
     return (folder or PACKAGE) / f"{preset}.toml"
 
 
 def load_manifest(preset: str, folder: Path | None = None) -> Manifest:
     """The manifest of a preset's weights.
 
-    A folder without one is used as the weights that ship with the package are; where there are none of this preset
+    A folder without one is used with the settings of the package's own weights; if the package has none of this preset
     either, every stage looks once, at the preset's input size.
 
     Raises:
-        WeightsError: a manifest is malformed; the message names the file and the key.
+        WeightsError: the manifest is malformed; the message names the file and the key.
     """
     path = next(
         (path for path in (manifest_path(preset, folder), manifest_path(preset)) if os.path.lexists(path)), None
@@ -156,20 +156,20 @@ def load_manifest(preset: str, folder: Path | None = None) -> Manifest:
     if path is None:
         return Manifest(preset)
     text = read_text(path, "Manifest of weights", error=WeightsError)
-    origin, remedy = f"{path} is no manifest of weights", "compare it with the one that ships with the package"
+    origin, remedy = f"{path} is not a manifest of weights", "compare it with the one that ships with the package"
     try:
         read = validated(_ManifestFile, parse_toml(text), origin, WeightsError, remedy)
         stages = tuple(stage.entry() for stage in read.stages)
     except (ValueError, ConfigError) as error:
         raise WeightsError(f"{origin} ({one_line(error, 200)}); {remedy}.") from None
     if read.preset != preset:
-        raise WeightsError(f"{path} is the manifest of preset {read.preset!r}, not of {preset}; rename or mend it.")
+        raise WeightsError(f"{path} is the manifest of preset {read.preset!r}, not of {preset}; rename or correct it.")
     return Manifest(read.preset, read.match_error_limit_px, read.common_rotation_deg, read.common_translation_m, stages)
 
 
 @dataclass(frozen=True)
 class _StageInFile:
-    """A stage as the file has it."""
+    """A stage as in the file."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 
@@ -190,7 +190,7 @@ class _StageInFile:
 
 @dataclass(frozen=True)
 class _ManifestFile:
-    """The file."""
+    """The content of the file."""
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
 

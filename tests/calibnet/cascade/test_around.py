@@ -25,7 +25,7 @@ def test_too_few_points_name_frame_and_stage() -> None:
 
 def test_a_correction_that_is_not_finite_is_a_sentence() -> None:
     estimate = torch.full((4, 4), float("nan"))
-    with pytest.raises(CalibrationError, match=r"^No finite correction of frame \d+ \(.*\) comes from stage 4; train"):
+    with pytest.raises(CalibrationError, match=r"^The correction of frame \d+ \(.*\) by stage 4 is not finite; train"):
         extended(estimate, 1.0, FRAME, "stage 4")
 
 

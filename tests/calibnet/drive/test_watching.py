@@ -98,11 +98,11 @@ def test_a_step_of_any_size_is_found_and_measured(at: int, degrees: float) -> No
 
 def test_what_cannot_be_told_says_why() -> None:
     few = watch_drive(Solver(), Moving(12, 99, STILL), REFERENCE)
-    assert few.watch is None and few.reason == "12 frames are too few to tell a change; 16 are needed."
+    assert few.watch is None and few.reason == "12 frames are too few to detect a change; 16 are needed."
     unread = watch_drive(Solver(), Moving(40, 99, STILL, bad=(*range(0, 40, 2), 1, 3)), REFERENCE)
-    assert unread.watch is None and unread.reason == "Only 18 of 40 frames fit or can be read."
+    assert unread.watch is None and unread.reason == "Only 18 of 40 frames can be read and fit."
     nothing = watch_drive(Solver(), Moving(40, 99, STILL, bad=tuple(range(40))), REFERENCE)
-    assert nothing.reason == "Picture and scan fit nowhere in the drive."
+    assert nothing.reason == "Image and scan do not fit together in any part of the drive."
 
 
 def test_a_drive_that_is_solved_tells_it_at_no_cost() -> None:
@@ -113,7 +113,7 @@ def test_a_drive_that_is_solved_tells_it_at_no_cost() -> None:
     (change,) = watched.watch.changes
     assert abs(change.frame - 30) <= 2 and change.rotation_deg == pytest.approx(0.7, abs=0.12)
     half = watch_estimate(replace(solved, looks=solved.looks[:29]), 60)
-    assert half.watch is None and half.reason == "Only 29 of 60 frames fit or can be read."
+    assert half.watch is None and half.reason == "Only 29 of 60 frames can be read and fit."
 
 
 def test_runs_of_positions() -> None:

@@ -90,7 +90,7 @@ def test_nothing_known_is_false_and_words_say_what_is():
     assert Prior.of(["z", "roll"], 0.02, np.radians(0.5)).words == "known to 2 cm; known to 0.5°; roll, z fixed"
 
 
-@pytest.mark.parametrize(("fixed", "problem"), [(["w"], "'w' is no axis"), (AXES, "all six axes fixed")])
+@pytest.mark.parametrize(("fixed", "problem"), [(["w"], "'w' is not an axis"), (AXES, "all six axes fixed")])
 def test_what_cannot_be_fixed(fixed, problem):
     with pytest.raises(ConfigError, match=problem):
         Prior.of(fixed)
@@ -104,7 +104,7 @@ def test_texts():
     assert parse_axes("x, y,z") == ("x", "y", "z")
     assert parse_axes("['roll', 'x']") == ("roll", "x")
     for parse, text in ((parse_length, "2"), (parse_length, "2deg"), (parse_angle, "-1deg"), (parse_angle, "0deg")):
-        with pytest.raises(ConfigError, match="with its unit, for instance"):
+        with pytest.raises(ConfigError, match="with a unit; write for instance"):
             parse(text)
-    with pytest.raises(ConfigError, match="'q' is no axis"):
+    with pytest.raises(ConfigError, match="'q' is not an axis"):
         parse_axes("x,q")

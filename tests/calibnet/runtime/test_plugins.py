@@ -54,7 +54,7 @@ def test_a_broken_package_is_one_sentence() -> None:
 
 
 def test_an_unknown_name_lists_those_there_are() -> None:
-    with pytest.raises(ConfigError, match="There is no dataset 'tay'; choose one of folder, broken, toy"):
+    with pytest.raises(ConfigError, match="'tay' is not a dataset; choose from folder, broken, toy"):
         DATASETS.load("tay")
 
 

@@ -125,7 +125,7 @@ def test_what_the_run_reads_is_never_replaced(tmp_path: Path) -> None:
         allow_overwriting()
         read_file(file, "JSON", 100)
         for path in (file, hard):
-            with pytest.raises(OutputError, match="is read by this run"):
+            with pytest.raises(OutputError, match="is an input of this run"):
                 write_whole(path, b"{}", Kind.JSON)
 
 
@@ -138,11 +138,11 @@ def test_links_devices_and_fifos_are_not_written_to(tmp_path: Path) -> None:
     with keeping_others():
         allow_overwriting()
         for path, words in (
-            (tmp_path / "link", "is not a file but a link, which is not written to; name the file itself"),
-            (tmp_path / "dangling", "but a link"),
-            (tmp_path / "fifo", "but a fifo"),
-            (Path("/dev/null"), "but a device"),
-            (tmp_path, "but a folder"),
+            (tmp_path / "link", "is a link, not a file; give the file itself"),
+            (tmp_path / "dangling", "is a link, not a file"),
+            (tmp_path / "fifo", "is a fifo, not a file"),
+            (Path("/dev/null"), "is a device, not a file"),
+            (tmp_path, "is a folder, not a file"),
         ):
             for kind in (Kind.JSON, None):
                 with pytest.raises(OutputError, match=words):

@@ -76,7 +76,7 @@ def test_a_stage_trained_anew_takes_the_place_of_the_old_one() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("preset = ", "no manifest"),
+        ("preset = ", "not a manifest"),
         ('preset = "paper"', "of preset 'paper', not of compact"),
         ('preset = "compact"\nlimit = 3', "limit"),
         ('preset = "compact"\n[[stages]]\nfile = "x"', "range"),

@@ -273,4 +273,4 @@ def test_a_folder_takes_its_guess_from_another_file(invoke: Invoke, own_folder: 
     assert code == 0, err
     assert "x, y, z fixed" in err
     code, _, err = invoke("folder", str(own_folder), "--headless", "--fix", "x,q")
-    assert code == 2 and "'q' is no axis" in err
+    assert code == 2 and "'q' is not an axis" in err

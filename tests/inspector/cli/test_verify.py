@@ -239,5 +239,5 @@ def test_what_is_read_is_no_output_which_is_said_before_the_work(
     guess.write_text(json.dumps({"camera_from_lidar": REFERENCE.tolist()}))
     before = guess.read_bytes()
     code, _, err = invoke("folder", str(own_folder), "--guess", "guess.json", "--json", "guess.json")
-    assert code == 3 and "guess.json is read by this run and is not replaced" in err
+    assert code == 3 and "guess.json is an input of this run" in err
     assert guess.read_bytes() == before

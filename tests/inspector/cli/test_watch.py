@@ -24,7 +24,7 @@ from tests.support.folder import write_folder
 STEP = Watched(REFERENCE, watch(looks(moved(noise(100), 50, YAW))), "", 100, (BadFrame(7, "It is cut short."),))
 DRIFT = Watched(REFERENCE, watch(looks(noise(300) + np.linspace(0, 1, 300)[:, None] * 2 * YAW)), "", 300)
 STILL = Watched(REFERENCE, watch(looks(noise(100))), "", 100)
-BLIND = Watched(None, None, "12 frames are too few to tell a change; 16 are needed.", 0)
+BLIND = Watched(None, None, "12 frames are too few to detect a change; 16 are needed.", 0)
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (STEP, 1, ["Frame 50: the mount moved by 0.5", "Changed: the mount moved once (100 frames, 1 skipped)."]),
         (DRIFT, 1, ["Frames 0 to 299: the mount drifts by 1.", "Changed: the mount moved once (300 frames)."]),
         (STILL, 0, ["No change (100 frames). A step of 0."]),
-        (BLIND, 4, ["Cannot tell. 12 frames are too few to tell a change; 16 are needed."]),
+        (BLIND, 4, ["Cannot tell. 12 frames are too few to detect a change; 16 are needed."]),
     ],
     ids=["step", "drift", "still", "blind"],
 )

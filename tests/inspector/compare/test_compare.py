@@ -152,7 +152,7 @@ def test_the_runs_themselves_are_never_overwritten(files: dict[str, Path], capsy
     before = files["B"].read_bytes()
     code, _, err = call(capsys, files["A"], files["B"], "--save", files["B"])
     assert code == 3
-    assert "is read by this run" in err
+    assert "is an input of this run" in err
     assert files["B"].read_bytes() == before
 
 

@@ -76,7 +76,7 @@ def test_the_file_says_what_is_known(write_layout, write_calibration):
     layout.calibration.write_text(write_calibration(fix="[x, y, z]", prior_rotation="0.5deg"))
     assert layout.open().prior.words == "known to 0.5°; x, y, z fixed"
     layout.calibration.write_text(write_calibration(prior_translation=2))
-    with pytest.raises(DatasetError, match=r"calibration\.yaml: '2' is not a length with its unit"):
+    with pytest.raises(DatasetError, match=r"calibration\.yaml: '2' is not a length with a unit"):
         layout.open()
 
 

@@ -1,0 +1,65 @@
+"""Checks of a scan: its unit, its vertical axis, and whether it is one scan."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibnet.datasets.plausibility.implausible import Implausible
+from calibnet.geometry.visibility import is_accumulated
+
+NEAREST_M, FARTHEST_M = 0.5, 250.0
+"""Metres between which the median distance of a scan's points lies."""
+FLAT = 0.4
+"""A scene is this much lower than it is wide, whatever it is; else z is not up."""
+ENOUGH_POINTS = 10_000
+"""Number of points of a scan that are examined."""
+
+
+def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
+    """All checks of a scan ``[N, 4]``."""
+    return [ranges(points), up(points), several(points)]
+
+
+def ranges(points: NDArray[np.float32]) -> Implausible | None:
+    """How far away the points are, in metres if all is well."""
+    middle = float(np.median(np.linalg.norm(some(points).astype(np.float64), axis=1)))
+    if NEAREST_M <= middle <= FARTHEST_M:
+        return None
+    seen = f"half of its points are more than {middle:.3g} m away" if middle > FARTHEST_M else (
+        f"half of its points are within {100 * middle:.3g} cm"
+    )  # fmt: skip
+    guess = "they seem to be in kilometres or scaled, so give metres"
+    if middle > FARTHEST_M:
+        guess = "they seem to be in millimetres or centimetres, or of a map, so give metres from the LiDAR"
+    return Implausible("units", f"{seen}; {guess}", certain=True)
+
+
+def up(points: NDArray[np.float32]) -> Implausible | None:
+    """Which axis of the scan is the vertical: the world is wider than high."""
+    low, high = np.percentile(some(points), (10, 90), axis=0)
+    spread = np.maximum(high - low, 1e-6)
+    flattest = int(spread.argmin())
+    if flattest == 2 or spread[flattest] > FLAT * spread[2]:
+        return None
+    text = (
+        f"the scan is flattest along its {'xy'[flattest]} axis ({spread[flattest]:.1f} m; {spread[2]:.1f} m along z); "
+        "give points with x forward, y left and z up"
+    )
+    return Implausible("axes", text)
+
+
+def several(points: NDArray[np.float32]) -> Implausible | None:
+    """Whether the cloud is a map rather than a scan."""
+    if not is_accumulated(points):
+        return None
+    text = (
+        "the cloud seems to be several scans put together, of which only what one scan would see is used; "
+        "give the one scan that was taken with the picture"
+    )
+    return Implausible("accumulated", text)
+
+
+def some(points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Enough of the positions ``[N, 3]`` for a median."""
+    return points[:: max(1, len(points) // ENOUGH_POINTS), :3]

@@ -1,0 +1,124 @@
+"""The record of a run on a drive: the estimate from all its frames, and the looks at each of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+
+from calibnet.geometry import transform
+from calibnet.geometry.se3 import rotate6, rotated
+from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Vector6
+from calibnet.trace.frames import CascadeTrace
+from calibnet.verdict import BadFrame, Verdict
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """An extrinsic estimated from several frames.
+
+    Attributes:
+        camera_from_lidar: the extrinsic, 4x4.
+        covariance: ``[6, 6]`` of ``(translation m, rotation rad)``, a perturbation in the camera frame. From networks
+            alone, it is the one that they state, scaled to the scatter of the frames; if edges were aligned, it
+            includes the common error of the networks as far as the edges leave it open.
+        frames: number of frames used.
+    """
+
+    camera_from_lidar: Extrinsic = field(repr=False)
+    covariance: Matrix6 = field(repr=False)
+    frames: int
+
+    @property
+    def rotation_deg(self) -> float:
+        """Standard deviation of the rotation in degrees: the root of the summed variances of its axes."""
+        return float(np.degrees(np.sqrt(np.trace(self.covariance[3:, 3:]))))
+
+    @property
+    def translation_cm(self) -> float:
+        """Standard deviation of the translation in centimetres, likewise."""
+        return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    def rotated(self, rotation: Rotation) -> Self:
+        """The estimate for a camera turned by ``rotation [3, 3]``."""
+        extrinsic = transform(rotation, np.zeros(3)) @ self.camera_from_lidar
+        return replace(self, camera_from_lidar=extrinsic, covariance=rotated(self.covariance, rotation))
+
+
+@dataclass(frozen=True, eq=False)
+class DriveLook:
+    """The result of one frame of a drive in the last look, which starts from the same extrinsic for all frames.
+
+    Attributes:
+        frame: number of the frame.
+        position: position of the frame in the drive.
+        offset: ``[6]``, ``(translation m, rotation rad)`` from that extrinsic to the frame's own result.
+        information: inverse covariance ``[6, 6]`` of the offset as the network states it, or None.
+        match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
+        lens: logarithm of how much another lens lowers the cost of its matches, see `calibnet.judging.predictors`.
+    """
+
+    frame: int
+    position: int
+    offset: Vector6 = field(repr=False)
+    information: Matrix6 | None = field(default=None, repr=False)
+    match_error_px: float = math.nan
+    lens: float = math.nan
+
+    def rotated(self, rotation: Rotation) -> DriveLook:
+        """The estimate for a camera turned by ``rotation [3, 3]``."""
+        offset = rotate6(rotation) @ self.offset
+        return replace(self, offset=offset, information=rotated(self.information, rotation))
+
+
+@dataclass(frozen=True, eq=False)
+class DriveEstimate(Estimate):
+    """An extrinsic estimated from a drive, the result of `calibnet.cascade.Cascade.calibrate_drive`.
+
+    Attributes:
+        history: estimates from more and more frames of the last pass, each with the number of its latest frame; the
+            last one is the result.
+        skipped: frames that could not be read, or calibrated in the last look.
+        verdict: verdict on the estimate; None from a method without verdicts.
+        networks: estimate of the networks alone, if edges were aligned afterwards; its covariance has the scatter of
+            the frames, not their common error. None if nothing was aligned.
+        looks: results of the single frames, relative to ``looked_from``.
+        looked_from: initial ``camera_from_lidar`` of the last look; None from a method without looks.
+        traces: traces of the frames by their number, from a method that calibrates only whole drives; each goes from
+            the drive's initial extrinsic to its estimate, with exhibits of the frame.
+    """
+
+    history: tuple[tuple[int, Estimate], ...] = field(repr=False, default=())
+    skipped: tuple[BadFrame, ...] = ()
+    networks: Estimate | None = field(repr=False, default=None)
+    verdict: Verdict | None = None
+    looks: tuple[DriveLook, ...] = field(repr=False, default=())
+    looked_from: Extrinsic | None = field(repr=False, default=None)
+    traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)
+
+    def rotated(self, rotation: Rotation) -> Self:
+        """The estimate for a camera turned by ``rotation [3, 3]``, without the traces of a method of its own."""
+        turn = transform(rotation, np.zeros(3))
+        return replace(
+            super().rotated(rotation),
+            history=tuple((frame, so_far.rotated(rotation)) for frame, so_far in self.history),
+            networks=None if self.networks is None else self.networks.rotated(rotation),
+            verdict=None if self.verdict is None else self.verdict.rotated(rotation),
+            looks=tuple(look.rotated(rotation) for look in self.looks),
+            looked_from=None if self.looked_from is None else turn @ self.looked_from,
+        )
+
+    def inflated(self, factor: float) -> Self:
+        """The estimate with every covariance multiplied by ``factor``."""
+
+        def of(estimate: Estimate) -> Estimate:
+            return replace(estimate, covariance=factor * estimate.covariance)
+
+        return replace(
+            self,
+            covariance=factor * self.covariance,
+            history=tuple((frame, of(so_far)) for frame, so_far in self.history),
+            networks=None if self.networks is None else of(self.networks),
+        )
