@@ -68,7 +68,8 @@ class Stream:
         rec = rr.RecordingStream(
             application_id, recording_id=recording_id, batcher_config=batching, send_properties=is_new
         )
-        if not is_new and hasattr(self._blueprint, "time_panel"):  # else a viewer plays it at once, to its last frame
+        whole = not (is_new and sinks)  # a file that is complete, or what Rerun's viewer imports
+        if whole and hasattr(self._blueprint, "time_panel"):  # else a viewer plays it at once, to its last frame
             self._blueprint.time_panel.play_state = "Paused"
         with _passed_on(self._blueprint) as blueprint:
             if sinks:

@@ -60,6 +60,8 @@ CHOSEN_CELL = "chosen_cell"
 
 LEGEND_SLICES = "legend/slices"
 """Legend of the frames among the slices."""
+SLICES_SHOW = "one tile per displacement; bright = probable"
+"""What stands beside the legend, since titles of small views have no room for it."""
 LEGEND_WINDOW = "legend/window"
 """Legend of the marks in the search window."""
 TENSOR_DIMENSIONS = ("dy", "dx", "y", "x")
@@ -75,7 +77,7 @@ def log_once(rec: Subtree, layout: Layout) -> None:
     true = {"true": colors.REFERENCE} if layout.has_reference else {}
     if Part.TENSORS in layout.contents.parts:
         marks = {"tile of no displacement": colors.INITIAL, "won most cells": colors.FOUND}
-        log_names(rec, LEGEND_SLICES, marks | true)
+        log_names(rec, LEGEND_SLICES, marks | true | {SLICES_SHOW: colors.GROUND})
     if Part.VOLUMES in layout.contents.parts:
         log_map_legends(rec)
         log_names(
@@ -142,8 +144,7 @@ def _slices(stage: StageLayout) -> View:
 
 
 def _slices_view(number: int, grid: Grid) -> View:
-    every = f"{scale_name(grid)}: a tile for each displacement, dx → dy ↓; bright = probable"
-    return image_view(every, entities.of_scale(number, grid.stride, SLICES))
+    return image_view(scale_name(grid), entities.of_scale(number, grid.stride, SLICES))
 
 
 def _tensor_row(number: int, grid: Grid) -> View:
