@@ -98,8 +98,9 @@ ERROR_KINDS = {"rotation": "deg", "translation": "cm"}
 
 def camera_of_rig(name: str) -> str:
     """Entity prefix of one camera of a rig."""
-    escaped = "".join(one if one.isalnum() or one in "-_" else f"\\{one}" for one in name)
-    return f"cameras/{escaped}"
+    import rerun as rr  # commands that need no recording know these names too, and do not wait for it
+
+    return f"cameras/{rr.escape_entity_path_part(name)}"
 
 
 def overlay_stage(number: int) -> str:

@@ -79,8 +79,8 @@ class Folder(PairedSequence):
         self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
         assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None
         real, extrinsic = self.calibration.camera, self.calibration.camera_from_lidar
-        remarks = [*of_lens(real), *of_camera(central(real).pinhole), *of_extrinsic(extrinsic)]
-        refuse(remarks, f"Calibration {calibration_path(root)}")
+        refuse([*of_lens(real), *of_camera(central(real).pinhole)], f"Calibration {calibration_path(root)}")
+        refuse(of_extrinsic(extrinsic), f"Calibration {guess or calibration_path(root)}")
         paths = list(images.values())
         self._development = development_of(paths, real, self.calibration.bayer)
         self._lens = Lens.of(real, extrinsic, looked_at(paths, real, self._development))

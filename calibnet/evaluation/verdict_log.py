@@ -12,7 +12,9 @@ from multiprocessing import get_context, parent_process
 from pathlib import Path
 from signal import SIG_IGN, SIGINT, signal
 from threading import Thread
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from annotated_types import Interval
 
 from calibnet.datasets.frame import Sequence
 from calibnet.errors import ConfigError
@@ -23,6 +25,7 @@ from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.judging.lens_predictors import LensPredictors
 from calibnet.judging.predictors import Predictors
 from calibnet.runtime.reading import MEGABYTE, read_text
+from calibnet.runtime.schema import validated
 from calibnet.runtime.writing import check_output
 
 BATCH = 8
@@ -81,6 +84,13 @@ class Source:
         return STREAMS[self.kind](Cascade.load(self.preset, self.stages, self.weights), self.sequences(), self.seed)
 
 
+@dataclass(frozen=True)
+class _Line:
+    key: str
+    number: Annotated[int, Interval(ge=0)]
+    run: VerdictRun | None
+
+
 class RunLog:
     """A file of runs, one per line, with a key that says what they depend on; lines with other keys are ignored."""
 
@@ -97,11 +107,10 @@ class RunLog:
         text = read_text(path, "Log of runs", LARGEST, remedy="remove it") if path.is_file() else ""
         for line in text.splitlines():
             try:
-                entry = json.loads(line)
-                if entry["key"] == self.key:
-                    run = entry["run"]
-                    self.known[entry["number"]] = None if run is None else whole(VerdictRun(**run))
-            except (ValueError, KeyError, TypeError):
+                entry = validated(_Line, json.loads(line), "It", ConfigError, "run it again")
+                if entry.key == self.key:
+                    self.known[entry.number] = None if entry.run is None else whole(entry.run)
+            except (ValueError, KeyError, RecursionError, ConfigError):
                 continue  # cut short when it was written, or of another version: it is run again
 
     def add(self, number: int, run: VerdictRun | None) -> None:
@@ -114,11 +123,14 @@ class RunLog:
 
 
 def whole(run: VerdictRun) -> VerdictRun:
-    """The run, if its predictors are the current ones.
+    """The run, if its predictors are the current ones and its error and information have their six axes.
 
     Raises:
         KeyError: it has others.
     """
+    axes = [6] if run.information is None else [6, *map(len, run.information)]
+    if len(run.offset) != 6 or axes not in ([6], [6] * 7):
+        raise KeyError(f"run {run.number} has other axes")
     known = [{one.name for one in fields(kind)} for kind in (Predictors, LensPredictors, DrivePredictors)]
     if run.predictors is not None and run.predictors.keys() not in known:
         raise KeyError(f"run {run.number} was made with other predictors")

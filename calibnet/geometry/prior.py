@@ -196,9 +196,9 @@ def parse_axes(text: str) -> tuple[str, ...]:
     """Parse names of `AXES`, separated by commas or as the text of a YAML list.
 
     Raises:
-        ConfigError: a name is not that of an axis, or all six are given.
+        ConfigError: a name is not that of an axis or is missing, or all six are given.
     """
-    names = tuple(name for name in re.split(r"[\s,\[\]'\"]+", text.lower()) if name)
+    names = tuple(re.split(r"[\s'\"]*(?:,|\s)[\s'\"]*", text.lower().strip("[]'\" "))) if text.strip() != "[]" else ()
     Prior.of(names)
     return names
 

@@ -120,29 +120,39 @@ def write_whole(path: Path, write: bytes | Callable[[Path], object], kind: Kind 
         OSError: it cannot be written; nothing is left behind.
     """
     partial: Path | None = None
+    with naming(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            check_output(path, kind)
+            partial, mode = _begin(path)
+            if isinstance(write, bytes):
+                partial.write_bytes(write)
+            else:
+                write(partial)
+            partial.chmod(mode)  # safetensors makes a file of its own there, and keeps it to its owner
+            _settle(partial)
+            replaced = check_output(path, kind)
+            partial.replace(path)
+        except BaseException:
+            if partial is not None:
+                with contextlib.suppress(OSError):
+                    partial.unlink()
+            raise
+    return replaced
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """A context in which an error of the operating system is an `OSError` that names an output, whoever raises it."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        check_output(path, kind)
-        partial, mode = _begin(path)
-        if isinstance(write, bytes):
-            partial.write_bytes(write)
-        else:
-            write(partial)
-        partial.chmod(mode)  # safetensors makes a file of its own, readable by its owner only
-        _settle(partial)
-        replaced = check_output(path, kind)
-        partial.replace(path)
-    except BaseException as error:
-        if partial is not None:
-            with contextlib.suppress(OSError):
-                partial.unlink()
-        said = re.search(r"\(os error (\d+)\)", str(error))  # libraries in Rust raise errors of their own
-        if said and isinstance(error, Exception):
-            raise OSError(int(said[1]), os.strerror(int(said[1])), str(path)) from None
+        yield
+    except Exception as error:
+        told = re.search(r"\(os error (\d+)\)", str(error))  # libraries in Rust have errors of their own for all
+        if told:
+            raise OSError(int(told[1]), os.strerror(int(told[1])), str(path)) from None
         if isinstance(error, OSError):
             raise OSError(error.errno, error.strerror or str(error), str(path)) from None
         raise
-    return replaced
 
 
 def _begin(path: Path) -> tuple[Path, int]:

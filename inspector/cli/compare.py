@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from inspector.cli.errors import ExitCode, fail
+from inspector.cli.errors import ExitCode
 from inspector.cli.output import say
 from inspector.cli.recordings import RECORDING, open_run
+from inspector.cli.run import recording_to
 from inspector.cli.viewing import saved_lines, viewing_options
 
 if TYPE_CHECKING:
@@ -44,23 +44,17 @@ def compare(
 
     from inspector.compare.comparison import Comparison, check_names
     from inspector.compare.recording import record_comparison
-    from inspector.record.flushing import RecordingLostError
 
     check_names(called)
     outputs = viewing.outputs(f"compare-{'-'.join(called)}")
     comparison = Comparison.of([open_run(path) for path in recordings], called, common_frames)
-    try:
+    with recording_to(outputs):
         outputs.check()
         remark = record_comparison(comparison, outputs.open())
         if remark:
             say(remark, err=True)
         outputs.complete()
         return finish(comparison, outputs)
-    except RecordingLostError as error:
-        outputs.close()
-        os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
-    finally:
-        outputs.close()
 
 
 def lines(comparison: Comparison) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import os
 import re
@@ -9,7 +10,7 @@ import sys
 import warnings
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 
@@ -192,4 +193,15 @@ def main() -> None:
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # warnings are for developers; users get sentences of ours
     settle_environment()
-    sys.exit(run(cli))
+    leave(run(cli))
+
+
+def leave(code: int) -> NoReturn:
+    """End the process, at once where Rerun would wait for a writer that has given up."""
+    flushing = sys.modules.get("inspector.record.flushing")  # which was not imported where nothing was recorded
+    if flushing is not None and flushing.LOST:
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(code)
+    sys.exit(code)

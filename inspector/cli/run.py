@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.errors import ExitCode, fail
+from inspector.cli.errors import ExitCode
 from inspector.cli.output import say
 from inspector.cli.preparing import prepare
 from inspector.cli.viewing import next_lines, saved_lines
@@ -53,13 +52,8 @@ def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
 @contextmanager
 def recording_to(outputs: Outputs) -> Iterator[None]:
     """Close the outputs at the end, whatever happens."""
-    from inspector.record.flushing import RecordingLostError
-
     try:
         yield
-    except RecordingLostError as error:
-        outputs.close()
-        os._exit(fail(str(error)))  # Rerun would wait for its dead writer for ever at the interpreter's end
     finally:
         outputs.close()
 

@@ -14,8 +14,8 @@ from annotated_types import Len
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Extrinsic, Matrix6
 from calibnet.judging.verify import DRIVE
-from calibnet.runtime.reading import require_file
 from calibnet.runtime.schema import validated
+from calibnet.runtime.tables import read_rows
 from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import Kind, write_whole
 from calibnet.verdict import APART, CAUSES, Verdict, with_its_car
@@ -27,7 +27,7 @@ FAILED = "failed"
 ByCar = Literal["accepted", "rejected", "cannot tell", "apart", ""]
 ORDER = (FAILED, "rejected", APART, "cannot tell", "accepted")
 """All words for a drive, worst first."""
-LARGEST = 1 << 30
+REMEDY = "make it with `calib-inspect fleet`"
 
 Sixteen = Annotated[tuple[float, ...], Len(16, 16)]
 ThirtySix = Annotated[tuple[float, ...], Len(36, 36)]
@@ -194,16 +194,8 @@ def read_table(file: Path) -> list[Row]:
     Raises:
         DatasetError: it cannot be read, or is not the table of a fleet.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    require_file(file, "Table", LARGEST, DatasetError, "make it with `calib-inspect fleet`")
-    try:
-        rows = pq.read_table(file).to_pylist()
-    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        said = one_line(str(error), 200)
-        raise DatasetError(f"{file} is not a Parquet table ({said}); make it with `calib-inspect fleet`.") from None
-    return list(validated(tuple[Row, ...], rows, str(file), DatasetError, "make it with `calib-inspect fleet`"))
+    rows = read_rows(file, "Table", DatasetError, REMEDY)
+    return list(validated(tuple[Row, ...], rows, str(file), DatasetError, REMEDY))
 
 
 def flat(matrix: Extrinsic | Matrix6) -> tuple[float, ...] | None:

@@ -69,12 +69,11 @@ class LiveApp:
         await window.send_json(hello)
         self._session.opened()
         try:
-            while True:
-                message = json.loads(await window.receive_text())
-                answer = await self._session.act(message) if isinstance(message, dict) else None
+            while (received := await window.receive())["type"] == "websocket.receive":
+                answer = await self._session.hear(received.get("text") or received.get("bytes") or b"")
                 if answer is not None:
                     await window.send_json(answer)
-        except (WebSocketDisconnect, json.JSONDecodeError):
+        except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
             self._windows.discard(window)
@@ -83,7 +82,7 @@ class LiveApp:
         """Send the viewer the pieces of the recording that it lacks, and then each new one."""
         await viewer.accept()
         had = viewer.query_params.get("from", "0")
-        more, sent = asyncio.Event(), int(had) if had.isdecimal() else 0
+        more, sent = asyncio.Event(), int(had) if had.isdecimal() and len(had) < 10 else 0
         self._viewers.add(more)
         gone = asyncio.create_task(_until_gone(viewer))
         gone.add_done_callback(lambda _: more.set())

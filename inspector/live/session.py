@@ -12,6 +12,8 @@ from calibnet.calibrator import Calibrator
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.reading import parse_json
+from calibnet.runtime.text import one_line
 from inspector.live.accept import Target, doubts, verdict_on
 from inspector.live.answers import Answers
 from inspector.live.payload import palettes
@@ -21,6 +23,8 @@ from inspector.live.tries import Try
 from inspector.live.worker import Worker
 from inspector.live.workspace import Workspace
 
+MOST_QUOTED = 200
+"""Characters of a message that are said again."""
 Tell = Callable[[dict[str, Any]], Awaitable[None]]
 
 
@@ -73,6 +77,17 @@ class LiveSession:
             "stop": self._stop,
         }
 
+    async def hear(self, text: str | bytes) -> dict[str, Any] | None:
+        """Do what a message in JSON asks for, see `act`; what is none is told in a sentence."""
+        try:
+            message = parse_json(text)
+        except ValueError:
+            message = None
+        if isinstance(message, dict):
+            return await self.act(message)
+        await self._tell_unread(text)
+        return None
+
     async def act(self, message: dict[str, Any]) -> dict[str, Any] | None:
         """Act on a message; failures are reported to the windows in a sentence.
 
@@ -82,12 +97,14 @@ class LiveSession:
         try:
             action = self._actions.get(str(message.get("do")))
             if action is None:
-                raise ConfigError(f"Unknown request {message.get('do')!r}; reload the page.")
+                raise ConfigError(f"Unknown request {one_line(repr(message.get('do')), MOST_QUOTED)}; reload the page.")
             return await action(message)
         except CalibnetError as error:
             await self._tell_problem(str(error))
-        except (KeyError, TypeError, ValueError, IndexError):
-            await self._tell_problem(f"Request {message!r} is not valid; reload the page.")
+        except OSError as error:
+            await self._tell_problem(f"{error.filename or 'A file'}: {error.strerror or error}.")
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError):
+            await self._tell_unread(message)
         return None
 
     def hello(self) -> dict[str, Any]:
@@ -247,6 +264,9 @@ class LiveSession:
 
     async def _tell_state(self) -> None:
         await self.tell(self.state())
+
+    async def _tell_unread(self, message: object) -> None:
+        await self._tell_problem(f"Request {one_line(message, MOST_QUOTED)} is not valid; reload the page.")
 
     async def _tell_problem(self, text: str) -> None:
         await self.tell({"is": "problem", "text": text})

@@ -9,8 +9,13 @@ from calibnet.errors import CalibnetError
 FLUSH_TIMEOUT_S = 60.0
 
 
+LOST: list[rr.RecordingStream] = []
+"""Recordings whose writer has given up, kept for good: Rerun waits for it for ever where one of them is let go, and at
+the interpreter's end, so that a process with one has to end at once."""
+
+
 class RecordingLostError(CalibnetError):
-    """The recording can no longer be written; Rerun would wait for ever, even at the end of the process."""
+    """Nothing can be written any more; the recording is among those in `LOST`."""
 
 
 def flush(rec: rr.RecordingStream) -> None:
@@ -25,6 +30,7 @@ def flush(rec: rr.RecordingStream) -> None:
     except RuntimeError as error:
         if "timed out" not in str(error):
             raise
+        LOST.append(rec)
         raise RecordingLostError(
             "The recording can no longer be written: the disk or a quota is full, or a viewer does not respond."
         ) from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,15 @@ import rerun_bindings
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.memory import hand_back
 from calibnet.runtime.text import one_line
+from calibnet.runtime.writing import naming
 from inspector.record.flushing import RecordingLostError, flush
 from inspector.record.indexing import NotIndexedError, index
 
 FLUSH_BYTES = 1024 * 1024 * 1024
 """Size of a batch that is never reached, so that only flushes cut chunks."""
+
+BEGINNING_BYTES = 1024 * 1024
+"""More than a recording begins with, which is its name and its layout."""
 
 
 class ViewerClosedError(CalibnetError):
@@ -50,6 +54,7 @@ class Stream:
 
         Raises:
             ConfigError: a file cannot be written.
+            OSError: likewise, as the disk is full.
         """
         rr.set_strict_mode(True)  # data that cannot be logged is an error, not a gap in the recording and a warning
         self.remark = ""
@@ -57,7 +62,8 @@ class Stream:
         self._files = [sink for sink in sinks if isinstance(sink, Path)]
         self._has_file = any(isinstance(sink, Path | rr.FileSink) for sink in sinks)
         self._identity, self._blueprint = (application_id, recording_id), blueprint
-        self.rec = self._opened([_growing(sink) if isinstance(sink, Path) else sink for sink in sinks], True)
+        with naming(self._files[0]) if self._files else nullcontext():
+            self.rec = self._opened([_file_sink(sink) if isinstance(sink, Path) else sink for sink in sinks], True)
         self.rec.set_log_time_enabled(False)
         self.rec.send_recording_name(one_line(title))
 
@@ -90,7 +96,7 @@ class Stream:
         self.rec.disconnect()
         for file in self._files:
             try:
-                index(file, lambda partial: self._opened([rr.FileSink(partial)], False), advance)
+                index(file, lambda partial: self._opened([_file_sink(partial, footer=True)], False), advance)
             except NotIndexedError as error:
                 self.remark = str(error)
 
@@ -119,11 +125,19 @@ def plain(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: one_line(value) if isinstance(value, str) else value for name, value in options.items()}
 
 
-def _growing(path: Path) -> rr.FileSink:
-    """A file sink for a growing file without a footer."""
+def _file_sink(path: Path, footer: bool = False) -> rr.FileSink:
+    """A file sink; that of a growing file has no footer.
+
+    Rerun writes in a thread that fails silently, and then waits for it forever. Bytes that are written before, and removed
+    again, show that the disk or a quota is full.
+    """
+    with path.open("wb") as file:
+        file.write(bytes(BEGINNING_BYTES))
+        file.flush()
+        file.truncate(0)
     try:
-        return rr.FileSink(path, write_footer=False)
-    except (RuntimeError, ValueError) as error:  # for instance, a name that is not UTF-8
+        return rr.FileSink(path, write_footer=footer)
+    except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
         raise ConfigError(f"{path} cannot be written: {error}.") from None
 
 

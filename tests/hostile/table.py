@@ -14,12 +14,16 @@ from tests.hostile import (
     clouds,
     features,
     fleets,
+    foxglove,
+    guesses,
+    kinds,
     names,
     options,
     outputs,
     pictures,
     recordings,
     texts,
+    training,
     weights,
 )
 
@@ -36,6 +40,10 @@ ROWS = list(
         options.rows(),
         fleets.rows(),
         features.rows(),
+        foxglove.rows(),
+        guesses.rows(),
+        kinds.rows(),
+        training.rows(),
     )
 )
 

@@ -32,6 +32,29 @@ while True:
     digits = str(number).encode()
     write_whole(Path(sys.argv[1]), b'{"number": "' + digits * (4_000_000 // len(digits)) + b'"}', Kind.JSON)
 """
+RECORD_ON_A_FULL_DISK = """
+import resource, signal, sys
+import numpy as np
+import rerun as rr
+from pathlib import Path
+from rerun.blueprint import Blueprint
+from inspector.cli import main
+from inspector.record import flushing
+from inspector.record.stream import Stream
+flushing.FLUSH_TIMEOUT_S = 1.0
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (3_000_000, resource.RLIM_INFINITY))
+stream = Stream("calib-inspect", "id", "title", [Path(sys.argv[1])], Blueprint())
+code = 0
+try:
+    for number in range(100):
+        stream.rec.log("a", rr.Image(np.random.default_rng(number).integers(0, 256, (1000, 1000), np.uint8)))
+        stream.flush()
+except flushing.RecordingLostError as error:
+    print(error, flush=True)
+    code = 3
+main.leave(code)
+"""
 RECORD_FOR_EVER = """
 import sys
 from pathlib import Path
@@ -113,6 +136,13 @@ def test_two_processes_on_one_recording(tmp_path: Path) -> None:
         first.kill()
         first.wait()
     Claim(tmp_path / "run.rrd", Kind.RECORDING).release()
+
+
+def test_a_process_whose_recording_is_lost_says_so_and_ends(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", RECORD_ON_A_FULL_DISK, str(tmp_path / "run.rrd")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout[:42]) == (3, "The recording can no longer be written: the d"[:42]), done.stderr
+    assert (tmp_path / "run.rrd").read_bytes()[:3] == b"RRF"
 
 
 def test_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:

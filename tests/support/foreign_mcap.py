@@ -159,9 +159,11 @@ def transform_of(frame: Frame, at: float) -> dict[str, Any]:
     return {"timestamp": time_of(at), **names, "translation": moved, "rotation": turn}
 
 
-def write_foxglove(path: Path, encoding: str, frames: Sequence[Frame], **cloud: Any) -> Path:
+def write_foxglove(
+    path: Path, encoding: str, frames: Sequence[Frame], bag: ForeignMcap | None = None, **cloud: Any
+) -> Path:
     """Frames a second apart, with what Foxglove's own schemas say; a robot that moves is among the transforms."""
-    bag = ForeignMcap(path, encoding)
+    bag = bag or ForeignMcap(path, encoding)
     camera = frames[0].camera
     matrix = {"K": camera.matrix.ravel().tolist(), "D": [0.0] * 5, "R": [], "P": []}
     size = {"width": camera.width, "height": camera.height, "distortion_model": "plumb_bob"}

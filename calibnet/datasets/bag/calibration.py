@@ -67,7 +67,8 @@ def read(
     extrinsic = None if given is None else given.camera_from_lidar
     extrinsic = _of_transforms(bag, frames) if extrinsic is None else extrinsic
     remarks += [*of_lens(camera), *of_camera(central(camera).pinhole), *of_extrinsic(extrinsic)]
-    return BagCalibration(camera, extrinsic, refuse(remarks, f"Calibration of {image} in {bag}"))
+    where = f"Calibration of {image} in {bag}" + (f", with {guess}" if guess else "")
+    return BagCalibration(camera, extrinsic, refuse(remarks, where))
 
 
 def _of_info(bag: BagRecording, asked: str | None, image: str) -> tuple[CameraModel, Implausible | None]:

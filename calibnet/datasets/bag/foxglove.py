@@ -1,12 +1,14 @@
 """Messages of Foxglove's own schemas, in protobuf or JSON, as those of ROS that `messages` reads.
 
-The schemas are described at docs.foxglove.dev/docs/sdk/schemas.
+The schemas are described at docs.foxglove.dev/docs/sdk/schemas. JSON may hold anything in the place of a number, so
+each is held against its type here.
 """
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Callable
+from operator import index
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,10 +40,10 @@ def _compressed(message: Any) -> SimpleNamespace:
 def _raw(message: Any) -> SimpleNamespace:
     return SimpleNamespace(
         header=_header(message),
-        width=message.width,
-        height=message.height,
+        width=index(message.width),
+        height=index(message.height),
         encoding=message.encoding,
-        step=message.step,
+        step=index(message.step),
         data=memoryview(_bytes(message.data)),
         is_bigendian=False,
     )
@@ -51,18 +53,20 @@ def _points(message: Any) -> SimpleNamespace:
     pose = getattr(message, "pose", None)
     if pose is not None and not _is_identity(pose):
         raise DatasetError("its points have a pose of their own within their frame, which is not read")
-    data = memoryview(_bytes(message.data))
-    count = len(data) // max(1, message.point_stride)
+    data, stride = memoryview(_bytes(message.data)), index(message.point_stride)
+    count = len(data) // max(1, stride)
     fields = [
-        SimpleNamespace(name=field.name, offset=field.offset, datatype=POINT_TYPES.get(int(field.type), 0), count=1)
+        SimpleNamespace(
+            name=field.name, offset=index(field.offset), datatype=POINT_TYPES.get(int(field.type), 0), count=1
+        )
         for field in message.fields
     ]
     return SimpleNamespace(
         header=_header(message),
         width=count,
         height=1,
-        point_step=message.point_stride,
-        row_step=count * message.point_stride,
+        point_step=stride,
+        row_step=count * stride,
         fields=fields,
         data=data,
         is_bigendian=False,
@@ -78,13 +82,13 @@ def _is_identity(pose: Any) -> bool:
 def _camera(message: Any) -> SimpleNamespace:
     return SimpleNamespace(
         header=_header(message),
-        width=message.width,
-        height=message.height,
+        width=index(message.width),
+        height=index(message.height),
         distortion_model=message.distortion_model or ("" if any(message.D) else "plumb_bob"),
-        d=list(message.D),
-        k=list(message.K),
-        r=list(message.R),
-        p=list(message.P),
+        d=[float(value) for value in message.D],
+        k=[float(value) for value in message.K],
+        r=[float(value) for value in message.R],
+        p=[float(value) for value in message.P],
         binning_x=0,
         binning_y=0,
         roi=SimpleNamespace(x_offset=0, y_offset=0),
@@ -95,8 +99,14 @@ def _transform(message: Any) -> SimpleNamespace:
     return SimpleNamespace(
         header=SimpleNamespace(frame_id=message.parent_frame_id, seconds=seconds_of(message.timestamp)),
         child_frame_id=message.child_frame_id,
-        transform=SimpleNamespace(translation=message.translation, rotation=message.rotation),
+        transform=SimpleNamespace(
+            translation=_floats(message.translation, "xyz"), rotation=_floats(message.rotation, "xyzw")
+        ),
     )
+
+
+def _floats(said: Any, names: str) -> SimpleNamespace:
+    return SimpleNamespace(**{name: float(getattr(said, name)) for name in names})
 
 
 def _of_several(transforms: list[SimpleNamespace]) -> SimpleNamespace:

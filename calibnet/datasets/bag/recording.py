@@ -191,14 +191,23 @@ class BagRecording:
     def _connections(self, topic: str) -> list[Any]:
         return [one for one in self._reader.connections if one.topic == topic]
 
+    @contextmanager
+    def _naming(self, connection: Any) -> Iterator[None]:
+        try:
+            yield
+        except DatasetError as error:
+            raise DatasetError(f"Bag {self}, {connection.topic}: {error}.") from None
+
     def _stamp(self, connection: Any, data: bytes) -> float:
         if isinstance(self._reader, McapFile):
-            return float(connection.stamp(data))
+            with self._naming(connection):
+                return float(connection.stamp(data))
         return stamp_of(data, self._reader.is2)
 
     def _content(self, connection: Any, data: bytes) -> Any:
         if isinstance(self._reader, McapFile):
-            return connection.decode(data)
+            with self._naming(connection):
+                return connection.decode(data)
         return self._reader.deserialize(data, connection.msgtype)
 
 

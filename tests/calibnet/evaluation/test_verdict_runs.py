@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -54,7 +55,10 @@ def test_runs_are_kept_as_they_are_made_and_not_made_again(tmp_path: Path) -> No
     first = collect(RunLog(path, key), 20, run, go_on=lambda: next(time))
     assert [one.number for one in first] == [0, 1, 3, 4, 5, 6, 7], "a batch, then the time was over"
     with path.open("a") as file:
-        file.write('{"key": "cut sh')
+        whole = json.loads(path.read_text().splitlines()[0])
+        for odd in ({"rotation_deg": "far"}, {"offset": [0.0]}, {"information": [[1.0]]}, {"predictors": 7}):
+            file.write(json.dumps(whole | {"number": 19, "run": whole["run"] | odd}) + "\n")
+        file.write("[" * 100_000 + "\n" + '{"key": "cut sh')
     told: list[int] = []
     everything = collect(RunLog(path, key), 20, run, observer=told.append)
     assert made == list(range(20)) and told == list(range(8, 21)) and len(everything) == 19

@@ -106,5 +106,7 @@ def test_texts():
     for parse, text in ((parse_length, "2"), (parse_length, "2deg"), (parse_angle, "-1deg"), (parse_angle, "0deg")):
         with pytest.raises(ConfigError, match="with a unit; write for instance"):
             parse(text)
-    with pytest.raises(ConfigError, match="'q' is not an axis"):
-        parse_axes("x,q")
+    assert parse_axes("[]") == ()
+    for text, name in (("x,q", "q"), ("", ""), ("x,,y", ""), ("x,", "")):  # "$AXES" of a shell may be empty
+        with pytest.raises(ConfigError, match=f"'{name}' is not an axis"):
+            parse_axes(text)
