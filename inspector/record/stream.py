@@ -128,8 +128,8 @@ def plain(options: Mapping[str, Any]) -> dict[str, Any]:
 def _file_sink(path: Path, footer: bool = False) -> rr.FileSink:
     """A file sink; that of a growing file has no footer.
 
-    Rerun writes in a thread that fails silently, and then waits for it forever. Bytes that are written before, and removed
-    again, show that the disk or a quota is full.
+    Rerun writes in a thread that fails silently, and then waits for it forever. Bytes that are written first, and taken
+    back, show that the disk or a quota is full.
     """
     with path.open("wb") as file:
         file.write(bytes(BEGINNING_BYTES))

@@ -10,7 +10,7 @@ from tests.hostile.rows import FINE, Row, dangling, endless, fifo, folder, giant
 
 LIST, TABLE = "DRIVES.csv", "fleet.parquet"
 LISTS = {
-    "nothing": (b"", "names no drive"),
+    "nothing": (b"", "lists no drives"),
     "no text": (b"path\n\xff\xfe\n", "not a text file"),
     "a null in a name": (b"path,car\nx,a\0b\n", ""),
     "a drive of the fleet's own folder": (b"path,options\nx,--report elsewhere\n", "set by the fleet"),
