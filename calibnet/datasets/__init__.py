@@ -1,4 +1,4 @@
-"""Where frames come from: `open_sequence` by name, one module per source, all of them a `Sequence`.
+"""Sources of frames: one module per source, each a `Sequence`, opened by name with `open_sequence`.
 
 Importing this package is cheap; a source's module (and OpenCV with it) is
 imported when a sequence of it is opened.

@@ -1,4 +1,4 @@
-"""The calibration of one camera and one LiDAR, and what makes one unusable."""
+"""The calibration of one camera and one LiDAR, and checks of its matrices."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from calibnet.errors import DatasetError, ImplausibleError
 from calibnet.geometry.types import Extrinsic, Intrinsics, Rotation, Transform
 
 RIGID_TOLERANCE = 2e-3
-"""Largest entry of ``R^T R - I`` that is rounding: matrices written with three decimals pass."""
+"""Largest entry of ``R^T R - I`` that counts as rounding, so that matrices with three decimals pass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,27 +31,28 @@ def checked_intrinsics(matrix: Intrinsics, path: Path, key: str) -> Intrinsics:
     """Return the 3x3 ``matrix`` if it is that of a pinhole camera.
 
     Raises:
-        DatasetError: it is singular or of another form; the message names ``path`` and ``key``.
+        DatasetError: it is singular or has another form; the message names ``path`` and ``key``.
     """
     focal_x, focal_y = matrix[0, 0], matrix[1, 1]
     if not np.array_equal(matrix[[1, 2, 2, 2], [0, 0, 1, 2]], [0.0, 0.0, 0.0, 1.0]):
         raise DatasetError(f"{path}: {key} is not a camera matrix; write it as [fx 0 cx; 0 fy cy; 0 0 1].")
     if not (focal_x > 0.0 and focal_y > 0.0):
         raise DatasetError(
-            f"{path}: {key} is singular (focal lengths {focal_x:g} and {focal_y:g}); give both in pixels, above 0."
+            f"{path}: {key} is singular (focal lengths {focal_x:g} and {focal_y:g}); give positive focal lengths in "
+            "pixels."
         )
     return matrix
 
 
 def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
-    """Return the 3x3 ``rotation`` if it is one.
+    """Return the 3x3 ``rotation`` if it is orthonormal.
 
     Raises:
-        DatasetError: it stretches, or, as `ImplausibleError`, mirrors; the message names ``path`` and ``key``.
+        DatasetError: it is not, or (as `ImplausibleError`) it mirrors; the message names ``path`` and ``key``.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         deviation = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if not deviation <= RIGID_TOLERANCE:  # NaN is none either
+    if not deviation <= RIGID_TOLERANCE:  # refuses NaN as well
         raise DatasetError(
             f"{path}: the rotation of {key} is not orthonormal (off by {deviation:.3g}); "
             "give a rotation matrix with at least four decimals."
@@ -59,7 +60,7 @@ def checked_rotation(rotation: Rotation, path: Path, key: str) -> Rotation:
     if np.linalg.det(rotation) < 0.0:
         raise ImplausibleError(
             f"{path}: the rotation of {key} is a reflection (determinant -1), so one of its coordinate systems is "
-            "left-handed; negate one axis of that.",
+            "left-handed; negate one of its axes.",
             "left-handed",
         )
     return rotation

@@ -1,4 +1,4 @@
-"""All sequences that lie below a dataset's folder."""
+"""Finds all sequences in a dataset's folder."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from calibnet.datasets.registry import open_sequence
 
 
 def find_sequences(dataset: str, root: Path, name: str = "") -> Iterator[Sequence]:
-    """Open every sequence, of every colour camera, in the folder of a dataset.
+    """Open every sequence, with every colour camera, in the folder of a dataset.
 
     Args:
-        dataset: one of `dataset_names`; one that another package adds is opened on the folder itself.
+        dataset: a name from `dataset_names`; a dataset of another package is opened on the folder itself.
         root: the dataset's folder.
-        name: only this one: ``DATE/DRIVE``, a sequence's number, a split, or a folder below ``root``.
+        name: name of a single sequence to open: ``DATE/DRIVE``, a number, a split, or a folder below ``root``.
     """
     if dataset in FINDERS:
         return FINDERS[dataset](root, name)

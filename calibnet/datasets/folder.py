@@ -1,4 +1,4 @@
-"""Your own sensors: a folder of ``images/``, ``clouds/`` and a calibration file."""
+"""A folder of the user's own sensors: ``images/``, ``clouds/`` and a calibration file."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ from calibnet.geometry.types import Extrinsic
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
 DEPTHS_LOOKED_AT = 6
-"""Pictures of a drive that tell how many bits a camera gives."""
+"""Number of images of a drive from which the camera's bit depth is found."""
 PERIOD = 0.1
-"""Seconds between two frames: a plain folder records no time."""
+"""Seconds between two frames of a folder without times."""
 LARGEST_NUMBER = 10**10
-"""Stems from here on are clocks rather than frame numbers."""
+"""Smallest number in a file name that is taken for a time rather than a frame number."""
 
 
 class Folder(PairedSequence):
-    """Images and scans of one camera and one LiDAR, paired by their file names without the ending."""
+    """Images and scans of one camera and one LiDAR, paired by file name or time."""
 
     def __init__(
         self,
@@ -59,14 +59,14 @@ class Folder(PairedSequence):
         Args:
             root: the folder with ``images``, ``clouds`` (``.bin``, ``.npy``, ``.pcd``, ``.ply``) and
                 ``calibration.yaml``, or the file of another tool, see `calibnet.datasets.calibration_files`.
-            guess: a file with the extrinsic to start from, instead of that of the calibration, or where it has none.
-            camera: its name, in a calibration file of several cameras.
-            frames: names of the coordinate frames of camera and LiDAR, in a file of many.
-            max_time_difference: pair by time, what is at most so many milliseconds apart, see `pair`.
+            guess: a file with the initial extrinsic, instead of the one in the calibration, or if that has none.
+            camera: name of the camera, in a calibration file of several cameras.
+            frames: names of the coordinate frames of camera and LiDAR, in a file of several.
+            max_time_difference: largest time between an image and its scan in milliseconds, see `pair`.
             clouds: folder of the scans; ``clouds`` in ``root`` by default.
 
         Raises:
-            DatasetError: one of them is missing, malformed or cannot be right, or images and scans do not pair.
+            DatasetError: a file is missing, malformed or cannot be right, or images and scans do not pair.
         """
         root = Path(root)
         layout = "a data folder holds images/, clouds/ and calibration.yaml"
@@ -101,10 +101,10 @@ class Folder(PairedSequence):
 
 
 def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -> Development:
-    """How the pictures of a drive become eight bits; more than one is looked at where these have more."""
+    """The conversion of a drive's images to eight bits; several are examined if they have more bits."""
     pictures = list[Levels]()
     for position in evenly_spaced(len(images), DEPTHS_LOOKED_AT):
-        with suppress(DatasetError):  # each frame says it of itself
+        with suppress(DatasetError):  # each frame reports its own error
             pictures.append(read_levels(images[position], (camera.width, camera.height)))
             if pictures[0].dtype == np.uint8:
                 break
@@ -112,7 +112,7 @@ def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -
 
 
 def looked_at(images: list[Path], camera: CameraModel, development: Development = BY_ITSELF) -> list[NDArray[np.uint8]]:
-    """Some pictures from all over a drive, of those that can be read; none of a pinhole's."""
+    """Some readable images spread over a drive; empty for a pinhole camera."""
     pictures = list[NDArray[np.uint8]]()
     for position in evenly_spaced(len(images), 0 if camera.is_pinhole else LOOKED_AT):
         with suppress(DatasetError):
@@ -121,7 +121,7 @@ def looked_at(images: list[Path], camera: CameraModel, development: Development 
 
 
 def calibration_path(root: Path) -> Path:
-    """The calibration file of a folder: ``calibration.yaml``, or the only file there that could be one.
+    """The calibration file of a folder: ``calibration.yaml``, or the only candidate there.
 
     Raises:
         DatasetError: there are several.
@@ -132,7 +132,7 @@ def calibration_path(root: Path) -> Path:
     found = sorted(path for path in root.iterdir() if _may_be_calibration(path) and path.is_file())
     if len(found) > 1:
         names = ", ".join(path.name for path in found)
-        raise DatasetError(f"{root} holds several files that may be its calibration ({names}); leave one there.")
+        raise DatasetError(f"{root} has several files that may be its calibration ({names}); keep one of them.")
     return found[0] if found else ours
 
 
@@ -141,14 +141,14 @@ def _may_be_calibration(path: Path) -> bool:
 
 
 def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> CalibrationFile:
-    """The calibration of a folder, with the extrinsic of another file where that is given.
+    """The calibration of a folder, with the extrinsic from another file if given.
 
     Raises:
         DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
     """
     path = calibration_path(root)
     of_guess = wanted
-    if guess is not None and wanted.camera is not None:  # the name is of whichever file holds several
+    if guess is not None and wanted.camera is not None:  # the name applies to whichever file has several cameras
         if not names_cameras(guess):
             of_guess = replace(wanted, camera=None)
         elif not names_cameras(path):
@@ -156,24 +156,24 @@ def read_folder(root: Path, wanted: Wanted, guess: Path | None = None) -> Calibr
     found = read_calibration(path, wanted)
     if found.camera is None:
         raise DatasetError(
-            f"Calibration {path} ({found.kind}) knows no camera; put the file of the camera there, and give this one "
+            f"Calibration {path} ({found.kind}) has no camera; put the file of the camera there, and give this one "
             "with --guess."
         )
     if guess is not None:
         extrinsic = read_calibration(guess, of_guess).camera_from_lidar
         if extrinsic is None:
-            raise DatasetError(f"Calibration {guess} has no extrinsic of a LiDAR; give one that has with --guess.")
+            raise DatasetError(f"Calibration {guess} has no pose of a LiDAR; give a file that has one with --guess.")
         found = replace(found, camera_from_lidar=extrinsic)
     if found.camera_from_lidar is None:
         raise DatasetError(
-            f"Calibration {path} ({found.kind}) does not say where the LiDAR is; give a first guess with --guess FILE, "
+            f"Calibration {path} ({found.kind}) has no pose of the LiDAR; give a first guess with --guess FILE, "
             "or as the key 'camera_from_lidar', the 4x4 matrix that maps LiDAR points into the camera, in metres."
         )
     return found
 
 
 def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
-    """The calibration file of a folder, its camera and its extrinsic; the folder needs no frames.
+    """The calibration file of a folder, and its camera and extrinsic; the folder needs no frames.
 
     Raises:
         DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
@@ -190,10 +190,10 @@ def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
 
 
 def prior_of(calibration: CalibrationFile, path: Path) -> Prior:
-    """What a calibration file says is known of its extrinsic.
+    """The prior in a calibration file.
 
     Raises:
-        DatasetError: it says so wrongly.
+        DatasetError: it is not valid.
     """
     said = calibration.prior
     try:
@@ -207,7 +207,7 @@ def prior_of(calibration: CalibrationFile, path: Path) -> Prior:
 
 
 def _frames(pairs: list[Pair]) -> list[FrameFiles]:
-    """The frames of pairs, numbered by their names, with their times or `PERIOD` from one to the next."""
+    """The frames of pairs, numbered by their names, with their times or at intervals of `PERIOD`."""
     known = [one.seconds for one in pairs if one.seconds is not None]
     start = known[0] if len(known) == len(pairs) else None
     return [
@@ -217,7 +217,7 @@ def _frames(pairs: list[Pair]) -> list[FrameFiles]:
 
 
 def _numbers(stems: list[str]) -> list[int]:
-    """The stems as frame numbers if they are distinct and rise as numbers do, else positions."""
+    """The file names as frame numbers if they are distinct and ascending, else positions."""
     if all(stem.isdecimal() for stem in stems):
         numbers = [int(stem) for stem in stems]
         if numbers == sorted(set(numbers)) and numbers[-1] < LARGEST_NUMBER:

@@ -1,4 +1,4 @@
-"""What every dataset yields (`Frame`) and what every dataset is (`Sequence`)."""
+"""The interface of datasets: a `Sequence` that yields each `Frame`."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from calibnet.geometry.types import Extrinsic, Rotation
 
 
 class Original(NamedTuple):
-    """A picture as it was taken, ``[H, W, 3]`` uint8 RGB, and the camera that took it, lens included."""
+    """An image as taken, ``[H, W, 3]`` uint8 RGB, and its camera, lens included."""
 
     image: NDArray[np.uint8]
     camera: CameraModel
 
 
 class Face(NamedTuple):
-    """What a pinhole camera in the place of a wide lens sees: ``[H, W, 3]`` uint8 RGB, and how it is turned."""
+    """The image ``[H, W, 3]`` uint8 RGB of a pinhole camera in the place of a wide lens, and its rotation."""
 
     image: NDArray[np.uint8]
     camera: PinholeCamera
@@ -35,17 +35,18 @@ class Frame:
     """One synchronised image and scan.
 
     Attributes:
-        index: position in its sequence, as the files are numbered.
+        index: number of the frame, as in its files.
         timestamp: seconds since the sequence's first frame.
         image: ``[H, W, 3]`` uint8, RGB, rectified.
         points: ``[N, 4]`` float32, finite: x forward, y left, z up in metres, intensity 0..1.
         camera: intrinsics of ``image``.
         camera_from_lidar: the dataset's own extrinsic, 4x4 float64; the reference where the
             dataset is calibrated, a starting guess where the user's sensors are not yet.
-        source: the image's path (or a description), to name in messages.
-        remarks: what is unlikely about it, though some sensor may be so: the first suspects when it does not fit.
-        original: the picture before it was rectified; None where it was rectified already.
-        faces: of a lens that is wider than a pinhole, which are calibrated by instead of ``image``, its middle.
+        source: the image's path or a description, for messages.
+        remarks: unlikely findings, which are the first suspects if it does not fit.
+        original: the image before rectification; None if it was rectified already.
+        faces: faces of a lens that is wider than a pinhole, used for calibration instead of ``image``, which is its
+            middle.
     """
 
     index: int
@@ -60,13 +61,13 @@ class Frame:
     faces: tuple[Face, ...] = field(default=(), repr=False)
 
     def through(self, face: Face) -> Frame:
-        """What one of its faces sees, as a frame of its own."""
+        """One of its faces as a frame of its own."""
         turned = transform(face.face_from_camera, (0.0, 0.0, 0.0)) @ self.camera_from_lidar
         image, camera = face.image, face.camera
         return replace(self, image=image, camera=camera, camera_from_lidar=turned, original=None, faces=())
 
     def changed(self, change: Callable[[Frame], Frame]) -> Frame:
-        """A change of a frame, and the same change of the picture of each face."""
+        """Apply a change to the frame and to the image of each face."""
         faces = [(face, change(self.through(face))) for face in self.faces]
         return replace(
             change(self), faces=tuple(face._replace(image=new.image, camera=new.camera) for face, new in faces)
@@ -74,12 +75,12 @@ class Frame:
 
     @property
     def as_taken(self) -> Original:
-        """The picture and the camera that the user knows: what is shown, recorded and exported."""
+        """The original image and camera, which are shown, recorded and exported."""
         return self.original or Original(self.image, CameraModel.of(self.camera))
 
 
 class Frames(Protocol):
-    """What a drive is solved from: a `Sequence`, or a list of frames."""
+    """Frames of a drive: a `Sequence`, or a list of frames."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -92,7 +93,7 @@ class Frames(Protocol):
 
 @runtime_checkable
 class Numbered(Protocol):
-    """Frames that know how each is numbered before it is read."""
+    """Frames whose numbers are known before they are read."""
 
     def index_of(self, position: int, /) -> int:
         """`Frame.index` of the frame at a position."""
@@ -100,7 +101,7 @@ class Numbered(Protocol):
 
 
 def index_of(frames: Frames, position: int) -> int:
-    """How a frame that may be unreadable is numbered: by `Frame.index`, or its position where the frames do not say."""
+    """The number of a frame that may be unreadable: `Frame.index`, or its position if the frames are not `Numbered`."""
     return frames.index_of(position) if isinstance(frames, Numbered) else position
 
 
@@ -108,12 +109,12 @@ def index_of(frames: Frames, position: int) -> int:
 class Sequence(Protocol):
     """Frames of one camera and one LiDAR on one mount, read lazily.
 
-    One whose frames are not numbered by their positions is `Numbered` too, so that a frame that cannot be read is named
-    as the others are.
+    If frames are not numbered by their positions, it is `Numbered` too, so that an unreadable frame has its right
+    number in messages.
 
     Attributes:
-        name: for titles and file names, for instance ``"kitti-odometry/04"``.
-        rig: the sensors and mount the frames come from, for instance ``"KITTI 2011_09_30, camera 2"``.
+        name: name for titles and file names, for instance ``"kitti-odometry/04"``.
+        rig: sensors and mount of the frames, for instance ``"KITTI 2011_09_30, camera 2"``.
     """
 
     name: str

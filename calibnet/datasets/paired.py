@@ -1,4 +1,4 @@
-"""What every folder of images and scans shares: pairing files by stem and reading them as frames."""
+"""The base of datasets that are folders of images and scans: pairs files by name and reads them as frames."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from calibnet.runtime.reading import register_input
 from calibnet.runtime.text import one_line
 
 SCANS_LOOKED_AT = 4
-"""Scans of a drive that are read to find the scale of its intensity."""
+"""Number of scans of a drive from which the scale of intensity is found."""
 
 
 NOTES = ".txt"
-"""Ending of files that are scans only where nothing else is: beside others they are labels, or notes."""
+"""Suffix of files that are scans only if there are no others; beside others they are labels or notes."""
 
 
 class Both(NamedTuple):
@@ -57,7 +57,7 @@ class FrameFiles:
 
     @property
     def needed(self) -> Both:
-        """Both files.
+        """Image and scan.
 
         Raises:
             DatasetError: one is missing.
@@ -67,13 +67,13 @@ class FrameFiles:
         there = self.image or self.scan
         assert there is not None, "a frame has one file at least"
         what = "image" if self.image is None else "scan"
-        raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
+        raise DatasetError(f"{there} has no {what} of the same name; add it, or remove this file.")
 
 
 class PairedSequence(ABC):
     """A `calibnet.datasets.frame.Sequence` of image and scan files.
 
-    A subclass lists the files and says how each frame is calibrated.
+    A subclass lists the files and gives the calibration of each frame.
 
     Attributes:
         notes: sentences for the user on how the data is read.
@@ -97,7 +97,7 @@ class PairedSequence(ABC):
         return len(self.files)
 
     def index_of(self, position: int) -> int:
-        """The number of a frame, as its files have it."""
+        """The number of a frame, as in its files."""
         return self.files[position].index
 
     def __iter__(self) -> Iterator[Frame]:
@@ -108,7 +108,7 @@ class PairedSequence(ABC):
         """Read one frame.
 
         Raises:
-            DatasetError: a file of it is missing, damaged, empty, malformed, or holds what cannot be right.
+            DatasetError: one of its files is missing, damaged, empty, malformed, or has content that cannot be right.
             IndexError: there is no such position.
         """
         files = self.files[position]
@@ -136,7 +136,7 @@ class PairedSequence(ABC):
 
     @cached_property
     def _full_scale(self) -> float:
-        """The intensity that counts as 1 in the whole drive, by some scans from all over it."""
+        """The intensity that becomes 1 in the whole drive, from some scans spread over it."""
         intensities = [np.zeros(0, np.float32)]
         for position in evenly_spaced(len(self.files), SCANS_LOOKED_AT):
             with suppress(DatasetError):
@@ -157,7 +157,7 @@ class PairedSequence(ABC):
 
 
 def require_folder(folder: Path, remedy: str) -> Path:
-    """Return ``folder`` if it is one.
+    """Return ``folder`` if it is a folder.
 
     Raises:
         DatasetError: it is not; the message ends with ``remedy``.
@@ -169,7 +169,7 @@ def require_folder(folder: Path, remedy: str) -> Path:
 
 
 def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str, Path]:
-    """The files of ``folder`` with one of the endings by their name without it, in order: ``9`` before ``10``.
+    """The files of ``folder`` with one of the suffixes, by their names without it, in order: ``9`` before ``10``.
 
     Raises:
         DatasetError: there is none, or two share a stem.
@@ -181,25 +181,25 @@ def files_by_stem(folder: Path, suffixes: Sequence[str], what: str) -> dict[str,
     for path, suffix in found:
         if suffix == NOTES and are_notes:
             continue
-        stem = unicodedata.normalize("NFC", path.name[: -len(suffix)])  # macOS takes letters and accents apart
+        stem = unicodedata.normalize("NFC", path.name[: -len(suffix)])  # macOS separates letters and accents
         if stem in files:
-            raise DatasetError(f"{folder} holds both {files[stem].name} and {path.name}; keep one of them.")
+            raise DatasetError(f"{folder} has both {files[stem].name} and {path.name}; keep one of them.")
         files[stem] = path
     if not files:
         others = sorted({path.suffix for path in folder.iterdir() if path.suffix})
         there = f", only {', '.join(others[:5])}" if others else ""
-        raise DatasetError(f"{folder} holds no {what} ({', '.join(suffixes)}){there}; put them there.")
+        raise DatasetError(f"{folder} has no {what} ({', '.join(suffixes)}){there}; put them there.")
     return files
 
 
 def _in_order(path: Path) -> tuple[list[str | int], str]:
-    """What files are sorted by: words as words, numbers as numbers."""
+    """Sort key of a file: words as text, digits as numbers."""
     parts = re.split(r"([0-9]+)", path.name)
     return [int(part) if place % 2 else part for place, part in enumerate(parts)], path.name
 
 
 def check_paired(images: dict[str, Path], scans: dict[str, Path]) -> None:
-    """Check that every image has a scan of the same stem and the other way round.
+    """Check that every image has a scan of the same name and vice versa.
 
     Raises:
         DatasetError: they differ; the message says how many and names the first stems.
@@ -213,6 +213,6 @@ def check_paired(images: dict[str, Path], scans: dict[str, Path]) -> None:
     if problems:
         image_folder, scan_folder = (next(iter(files.values())).parent for files in (images, scans))
         raise DatasetError(
-            f"{image_folder} holds {len(images)} images and {scan_folder} {len(scans)} scans, which do not pair: "
+            f"{image_folder} has {len(images)} images and {scan_folder} {len(scans)} scans, which do not pair: "
             f"{'; '.join(problems)}; add the missing files or remove the others."
         )

@@ -1,4 +1,4 @@
-"""Which image and which scan are of one moment: those of one name, or those nearest in time."""
+"""Pairs images and scans by name, or by nearest time."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from calibnet.geometry.types import Floats
 from calibnet.runtime.reading import TEXT_BYTES, read_text
 
 TIMES = "timestamps.txt"
-"""File of times beside the files of a folder: one a line, in the order of their names."""
+"""File of times in a folder, with one line per file in the order of their names."""
 MAX_TIME_DIFFERENCE_MS = 50.0
-"""Largest time between an image and a scan of one frame, by default: half a turn of a scanner."""
+"""Default largest time between image and scan of a frame, half a turn of a scanner."""
 WORTH_A_WARNING_MS = 20.0
-"""Time between them above which the user is warned: 28 cm of way at 50 km/h."""
+"""Time between image and scan above which the user is warned, in which a car at 50 km/h moves 28 cm."""
 CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
-"""By the number of digits of a time since 1970, its unit in seconds."""
+"""Unit in seconds of a time since 1970, by its number of digits."""
 TIME_IN_NAME = re.compile(r"(?:.*[^\d.])?(\d{13}|\d{16}|\d{19}|\d{10}[._]\d{3,9})|(\d{10,19}|\d{9,10}[._]\d+)")
-"""A time since 1970 as a file's name, or, of milliseconds and finer ones, at its end, as nuScenes names its files."""
+"""A time since 1970 as a file name or, for milliseconds and finer, at its end, as in nuScenes."""
 NEWEST = 4e9
-"""Seconds since 1970 beyond which a number is no time."""
+"""Largest time in seconds since 1970."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """An image and a scan of one moment; one of them is None where the other has no partner of its name.
+    """An image and a scan of one moment, or only one of them.
 
     Attributes:
-        stem: name of the image's file without its ending, or of the scan's where there is no image.
-        image: its file.
-        scan: its file.
-        seconds: when the image was taken; None where no time is known.
+        stem: file name of the image without suffix, or of the scan if there is no image.
+        image: file of the image; None if missing.
+        scan: file of the scan; None if missing.
+        seconds: time of the image; None if unknown.
     """
 
     stem: str
@@ -47,7 +47,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Pairing:
-    """The frames of a folder, and sentences for the user on how they were found."""
+    """The frames of a folder, and sentences for the user on the pairing."""
 
     pairs: list[Pair]
     notes: tuple[str, ...] = ()
@@ -56,25 +56,26 @@ class Pairing:
 def pair(images: Mapping[str, Path], scans: Mapping[str, Path], most_ms: float | None = None) -> Pairing:
     """Pair the images and scans of two folders, each sorted by name.
 
-    By name, if no name lacks its partner or no times are known; a frame without a partner is kept, to be told of when
-    it is read. By the number in the names, if these are alike otherwise in each folder (``frame_0001``, ``scan_0001``)
-    and no name is in both. Otherwise by time, of `TIMES` or of the names: each image with the nearest scan, each scan
-    once.
+    They are paired by name if every name has a partner or times are unknown; a file without a partner is kept, and
+    reported when it is read. If no name is in both folders and names in each differ only in a number (``frame_0001``,
+    ``scan_0001``), they are paired by number. Otherwise they are paired by time, from `TIMES` or the names: each image
+    with the nearest scan, and each scan once.
 
     Args:
         images: files by stem.
         scans: likewise.
-        most_ms: milliseconds that the two of a frame may be apart; giving it asks for pairing by time.
+        most_ms: largest time between image and scan in milliseconds; if given, pairs by time.
 
     Raises:
-        DatasetError: nothing pairs, or times were asked for and are not known.
+        DatasetError: nothing pairs, or times are requested but unknown.
     """
     image_times, scan_times = times_of(images), times_of(scans)
     by_time = image_times is not None and scan_times is not None
     if most_ms is not None and not by_time:
         lacking = next(iter((images if image_times is None else scans).values())).parent
         raise DatasetError(
-            f"{lacking} knows no times to pair by; write {lacking / TIMES} with a time a line, in seconds, or name the "
+            f"{lacking} has no times for pairing; write {lacking / TIMES} with one time per line, in seconds, or name "
+            "the "
             "files by their times."
         )
     if most_ms is None and (images.keys() == scans.keys() or not by_time):
@@ -90,8 +91,9 @@ def _by_name(images: Mapping[str, Path], scans: Mapping[str, Path], times: Float
         image_folder, scan_folder = (next(iter(files.values())).parent for files in (images, scans))
         raise DatasetError(
             f"{image_folder} ({len(images)} images, the first {next(iter(images))}) and {scan_folder} ({len(scans)} "
-            f"scans, the first {next(iter(scans))}) have no name in common; name an image and its scan alike, or by "
-            f"their times, or write their times into a {TIMES} in each folder."
+            f"scans, the first {next(iter(scans))}) have no name in common; give an image and its scan the same name, "
+            "name them by "
+            f"their times, or write their times to a {TIMES} in each folder."
         )
     seconds = dict(zip(images, times.tolist() if times is not None else [None] * len(images), strict=True))
     stems = [*images, *(stem for stem in scans if stem not in images)]
@@ -100,13 +102,13 @@ def _by_name(images: Mapping[str, Path], scans: Mapping[str, Path], times: Float
     if not lacking:
         return Pairing(pairs)
     few = ", ".join(lacking[:3]) + (" and so on" if len(lacking) > 3 else "")
-    return Pairing(pairs, (f"{len(lacking)} of {len(stems)} names have an image or a scan only ({few}).",))
+    return Pairing(pairs, (f"{len(lacking)} of {len(stems)} names have only an image or only a scan ({few}).",))
 
 
 def _numbered(images: Mapping[str, Path], scans: Mapping[str, Path]) -> Pairing | None:
-    """Pairs of one number; None where names differ in more than that, or both folders have numbers of their own.
+    """Pairs of the same number; None if names differ in more than that, or both folders have numbers of their own.
 
-    One counted from 0 and the other from 1 would pair as well, and wrongly.
+    If one folder counts from 0 and the other from 1, pairs would be wrong.
     """
     image_numbers, scan_numbers = numbers_in(images), numbers_in(scans)
     if image_numbers is None or scan_numbers is None:
@@ -116,11 +118,13 @@ def _numbered(images: Mapping[str, Path], scans: Mapping[str, Path]) -> Pairing 
     image, scan = next((image_numbers[one], scan_numbers[one]) for one in image_numbers if one in scan_numbers)
     renamed = {image_numbers.get(number, stem): scans[stem] for number, stem in scan_numbers.items()}
     paired = _by_name(images, renamed, times_of(images))
-    return Pairing(paired.pairs, (f"Paired by the number in their names, as {image} and {scan}.", *paired.notes))
+    return Pairing(
+        paired.pairs, (f"Paired by the number in their names, for instance {image} and {scan}.", *paired.notes)
+    )
 
 
 def numbers_in(stems: Iterable[str]) -> dict[int, str] | None:
-    """Names by the last number in each; None where they differ in anything else, or have one twice or none."""
+    """Names by the last number in each; None if they differ in anything else, or a number is missing or repeated."""
     found = [(re.fullmatch(r"(.*?)(\d{1,18})(\D*)", stem), stem) for stem in stems]
     parts = {(match[1], match[3]) for match, _ in found if match is not None}
     numbers = {int(match[2]): stem for match, stem in found if match is not None}
@@ -151,7 +155,7 @@ def _by_time(
     if not pairs:
         raise DatasetError(
             f"No image of {next(iter(images.values())).parent} has a scan within {most_ms:g} ms, the nearest is "
-            f"{apart.min():.0f} ms off; check that both clocks are the same, or give a larger --max-time-difference."
+            f"{apart.min():.0f} ms away; check that both clocks agree, or give a larger --max-time-difference."
         )
     farthest = float(max(apart[position] for position in best.values()))
     note = f"Paired by time: {len(pairs)} frames, image and scan up to {farthest:.0f} ms apart"
@@ -161,17 +165,18 @@ def _by_time(
     notes = [f"{note}."]
     if farthest > WORTH_A_WARNING_MS:
         notes.append(
-            f"At 50 km/h {farthest:.0f} ms are {farthest / 1000 * 50 / 3.6 * 100:.0f} cm: frames taken while driving "
-            "are only as good; those taken at standstill are not affected."
+            f"At 50 km/h, {farthest:.0f} ms are {farthest / 1000 * 50 / 3.6 * 100:.0f} cm, which limits the accuracy "
+            "of frames taken "
+            "while driving; those taken at a standstill are not affected."
         )
     return Pairing(pairs, tuple(notes))
 
 
 def times_of(files: Mapping[str, Path]) -> Floats | None:
-    """Seconds of files by stem, of `TIMES` beside them or of their names; None where neither tells.
+    """Times of files in seconds, from `TIMES` beside them or from their names; None without either.
 
     Raises:
-        DatasetError: `TIMES` is there and does not fit the files.
+        DatasetError: `TIMES` exists but does not match the files.
     """
     path = next(iter(files.values())).parent / TIMES
     if path.exists():
@@ -180,11 +185,12 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
         seconds = [_seconds(word) for word in words]
         if None in seconds:
             raise DatasetError(
-                f"{path}: {words[seconds.index(None)][:40]!r} is no time; write seconds, or nanoseconds since 1970, or "
+                f"{path}: {words[seconds.index(None)][:40]!r} is not a time; write seconds, or nanoseconds since 1970, "
+                "or "
                 "2026-11-26 13:02:25.594."
             )
         if len(seconds) != len(files):
-            raise DatasetError(f"{path} has {len(seconds)} times for {len(files)} files; write one a line.")
+            raise DatasetError(f"{path} has {len(seconds)} times for {len(files)} files; write one per line.")
         return np.array(seconds, dtype=np.float64)
     named = [TIME_IN_NAME.fullmatch(stem) for stem in files]
     seconds = [None if match is None else _seconds((match[1] or match[2]).replace("_", ".")) for match in named]
@@ -203,7 +209,7 @@ def _seconds(word: str) -> float | None:
 
 
 def _of_date(word: str) -> float | None:
-    """Seconds of a date as KITTI writes it, with up to nine digits of a second."""
+    """Seconds of a date in KITTI's format, with up to nine digits of a second."""
     match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})[ T](\d{2}:\d{2}:\d{2})(\.\d+)?Z?", word)
     if match is None:
         return None

@@ -22,32 +22,33 @@ from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Extrinsic, Intrinsics
 
 VIEW_DEG = (8.0, 150.0)
-"""Angle across the picture; beyond the second a pinhole camera spends its pixels on the corners."""
+"""Smallest and largest horizontal field of view of a pinhole camera, in degrees."""
 SQUARE, STRETCHED = 1.25, 2.5
-"""Ratio of the focal lengths of pictures with square pixels, and of pictures that were resized to another shape."""
+"""Largest ratio of the focal lengths of images with square pixels, and of images resized to another aspect ratio."""
 MIDDLE, CROPPED = (0.25, 0.75), (-0.5, 1.5)
-"""Shares of width and height where the principal point lies, and where it may lie after a picture was cropped."""
+"""Range of the principal point relative to width and height, and the range for a cropped image."""
 SAME_SHAPE, OTHER_SIZE, SURELY_OTHER = 0.1, 1.35, 1.8
-"""A matrix is of another size where its factors across and down are alike within the first, and exceed the second."""
+"""A matrix belongs to another size if its factors in both directions agree within the first and exceed the second;
+above the third this is certain."""
 LONG_ARM_M, LONGEST_ARM_M = 5.0, 30.0
-"""Distance between camera and LiDAR that only lorries have, and the largest; a lorry is 20 m long."""
+"""Distance between camera and LiDAR that only lorries exceed, and the largest, in metres; a lorry is 20 m long."""
 STEEP = 0.9
-"""Sine of the angle by which a camera may look up or down before it counts as looking along the LiDAR's z axis."""
+"""Sine of the elevation above which a camera counts as looking along the LiDAR's z axis."""
 GRID, SEEN = 40, 0.5
-"""Places across a rectified picture, and the share of them that at least shows something of any real lens."""
+"""Number of samples across a rectified image, and the smallest share of them that any real lens fills."""
 BLACK = (0.05, 0.2)
-"""Shares of a side by which a rectified picture may reach beyond the original on one side, and on the other."""
+"""Largest shares of a side by which a rectified image may exceed the original on one side, and on the other."""
 
 
 @dataclass(frozen=True)
 class Implausible:
-    """Something that cannot be right, or hardly.
+    """A finding that cannot be right, or is unlikely.
 
     Attributes:
         name: ``focal-length``, ``principal-point``, ``picture-size``, ``distortion``, ``units``, ``axes``,
             ``accumulated``, ``bit-depth`` or ``bayer``.
-        text: a sentence without its full stop: what is seen; what to do.
-        certain: whether no sensor has it, so that the input is refused.
+        text: a sentence without full stop: the finding; what to do.
+        certain: whether no sensor can have it, so that the input is refused.
     """
 
     name: str
@@ -56,10 +57,10 @@ class Implausible:
 
 
 def refuse(found: Iterable[Implausible | None], where: str | Path) -> tuple[Implausible, ...]:
-    """What is unlikely.
+    """The unlikely findings.
 
     Raises:
-        ImplausibleError: something is certainly wrong; the message names ``where`` it was found.
+        ImplausibleError: a finding is certain; the message names ``where`` it is.
     """
     remarks = tuple(remark for remark in found if remark is not None)
     for remark in remarks:
@@ -69,19 +70,21 @@ def refuse(found: Iterable[Implausible | None], where: str | Path) -> tuple[Impl
 
 
 def suspicion(remarks: Iterable[Implausible], otherwise: str) -> str:
-    """What to check when picture and scan do not fit: what is unlikely about them, or what usually is wrong."""
+    """What to check if image and scan do not fit: the unlikely findings or, without any, the usual causes."""
     return ", or ".join(remark.text for remark in remarks) or otherwise
 
 
 def of_camera(camera: PinholeCamera) -> list[Implausible | None]:
-    """All checks of a camera matrix against its picture; the first that finds something is the best explanation."""
+    """All checks of a camera matrix; the first finding is the best explanation."""
     return [focal_length(camera) or pixel_shape(camera), picture_size(camera) or principal_point(camera)]
 
 
 def of_lens(camera: CameraModel) -> list[Implausible | None]:
-    """All checks of a lens, and of its camera matrix where that is not the rectified picture's as well."""
+    """All checks of a lens, and of its camera matrix if that is not the one of the rectified image."""
     if camera.model in ("plumb_bob", "rational_polynomial"):
-        return [] if any(of_camera(camera.pinhole)) else [distortion(camera)]  # a wrong matrix would be put down to it
+        return (
+            [] if any(of_camera(camera.pinhole)) else [distortion(camera)]
+        )  # a wrong matrix would be blamed on the lens
     return [pixel_shape(camera.pinhole), picture_size(camera.pinhole) or principal_point(camera.pinhole)]
 
 
@@ -91,7 +94,7 @@ def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:
 
 
 def focal_length(camera: PinholeCamera) -> Implausible | None:
-    """Against the width of the picture."""
+    """Check the focal length against the width of the image."""
     focal, width = camera.focal[0], camera.width
     view = float(np.degrees(2 * np.arctan(width / 2 / focal)))
     if VIEW_DEG[0] <= view <= VIEW_DEG[1]:
@@ -106,7 +109,7 @@ def focal_length(camera: PinholeCamera) -> Implausible | None:
 
 
 def distortion(camera: CameraModel) -> Implausible | None:
-    """Whether a lens leaves hardly anything of the rectified picture, which has the size and matrix of the original."""
+    """Check that a lens fills enough of the rectified image, which has the size and matrix of the original."""
     width, height = camera.pinhole.width, camera.pinhole.height
     u, v = np.meshgrid(np.linspace(0, width - 1, GRID), np.linspace(0, height - 1, GRID))
     pixels = np.column_stack([u.ravel(), v.ravel(), np.ones(u.size)])
@@ -123,16 +126,16 @@ def distortion(camera: CameraModel) -> Implausible | None:
 
 
 def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection: Intrinsics) -> Implausible | None:
-    """Whether a camera's matrix and the one for its rectified pictures are of pictures of different sizes.
+    """Check that a camera's matrix and that of its rectified images belong to images of the same size.
 
-    A rectified picture that reaches far beyond the original on one side, and not at all on the other, was made of a
-    larger one: so bags of KITTI's rectified pictures are, which carry the matrix and lens of those before.
+    A rectified image that exceeds the original far on one side, but not on the other, was made from a larger one, as in
+    bags of KITTI's rectified images, which have the matrix and lens of the original ones.
 
     Args:
-        camera: of the pictures as they were taken.
-        rotation: ``[3, 3]``, of the rectified camera from that one.
-        projection: ``[3, 3]``, of the rectified camera, for pictures of the same size. One that is no camera matrix,
-            as of drivers that leave it empty, says nothing.
+        camera: camera of the original images.
+        rotation: ``[3, 3]``, rotation from that camera to the rectified one.
+        projection: ``[3, 3]``, matrix of the rectified camera, for images of the same size; ignored if it is not a
+            camera matrix, as from drivers that leave it empty.
     """
     if not (np.isfinite(projection).all() and (projection[2] == (0, 0, 1)).all() and projection[1, 0] == 0):
         return None
@@ -155,7 +158,7 @@ def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection
 
 
 def pixel_shape(camera: PinholeCamera) -> Implausible | None:
-    """One focal length against the other."""
+    """Check the ratio of the focal lengths."""
     ratio = camera.focal[0] / camera.focal[1]
     if 1 / SQUARE <= ratio <= SQUARE:
         return None
@@ -167,7 +170,7 @@ def pixel_shape(camera: PinholeCamera) -> Implausible | None:
 
 
 def picture_size(camera: PinholeCamera) -> Implausible | None:
-    """The principal point lies in the middle, but of a picture of another size."""
+    """Check that the principal point is not the middle of an image of another size."""
     across, down = 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height
     factor = (max(across, 0.0) * max(down, 0.0)) ** 0.5
     if not factor or abs(across / down - 1) > SAME_SHAPE or 1 / OTHER_SIZE < factor < OTHER_SIZE:
@@ -181,7 +184,7 @@ def picture_size(camera: PinholeCamera) -> Implausible | None:
 
 
 def principal_point(camera: PinholeCamera) -> Implausible | None:
-    """Whether the principal point is near the middle of the picture."""
+    """Check that the principal point is near the middle of the image."""
     shares = camera.center[0] / camera.width, camera.center[1] / camera.height
     if all(MIDDLE[0] <= share <= MIDDLE[1] for share in shares):
         return None
@@ -193,7 +196,7 @@ def principal_point(camera: PinholeCamera) -> Implausible | None:
 
 
 def arm(camera_from_lidar: Extrinsic) -> Implausible | None:
-    """The distance of camera and LiDAR."""
+    """Check the distance between camera and LiDAR."""
     metres = float(np.linalg.norm(camera_from_lidar[:3, 3]))
     if metres <= LONG_ARM_M:
         return None
@@ -202,7 +205,7 @@ def arm(camera_from_lidar: Extrinsic) -> Implausible | None:
 
 
 def viewing_direction(camera_from_lidar: Extrinsic) -> Implausible | None:
-    """Whether the camera looks about horizontally, and is not on its side only because the matrix is the inverse."""
+    """Check that the camera looks roughly horizontally, and is not on its side because the matrix is inverted."""
     towards_up = float(camera_from_lidar[2, 2])
     if abs(towards_up) > STEEP:
         text = (

@@ -1,4 +1,4 @@
-"""A bag as frames: topics found, images and scans paired by their stamps, camera and first guess of the bag itself."""
+"""A bag as a sequence of frames: finds topics, pairs images and scans by their stamps, and reads the calibration."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from calibnet.errors import DatasetError
 
 @dataclass(frozen=True)
 class BagOptions:
-    """How a bag is read.
+    """Options for reading a bag.
 
     Attributes:
-        image: topic of the images; None to find it, as for the other two.
+        image: topic of the images; None to find it, as for the other topics.
         points: topic of the point clouds.
         info: topic of the camera's calibration.
-        guess: file with the extrinsic to start from, the camera, or both, where the bag's are not to be taken.
-        camera: its name, in a ``guess`` of several cameras.
-        frames: names of the coordinate frames; by default those that the messages are in.
+        guess: file with the initial extrinsic, the camera, or both, to use instead of the bag's.
+        camera: name of the camera, if ``guess`` has several.
+        frames: names of the coordinate frames; by default those of the messages.
         every: seconds from one frame to the next; None for about 40 frames.
-        accumulate: scans put together at a standstill, for scanners that do not repeat their pattern.
-        max_time_difference: milliseconds that an image and its scan may be apart.
+        accumulate: number of scans to accumulate at a standstill, for scanners with a non-repeating pattern.
+        max_time_difference: largest time between an image and its scan, in milliseconds.
     """
 
     image: str | None = None
@@ -59,7 +59,7 @@ class BagOptions:
 
 @dataclass(frozen=True)
 class Moment:
-    """An image and its scans, by the times at which they were recorded."""
+    """An image and its scans, by their recording times."""
 
     image: Stamped
     scans: tuple[Stamped, ...]
@@ -73,11 +73,11 @@ class Bag:
 
         Args:
             paths: a ``.bag``, ``.db3`` or ``.mcap`` file, a ROS 2 bag's folder, or several files of ROS 1.
-            options: how it is read.
+            options: options for reading it.
 
         Raises:
-            DatasetError: it cannot be read, a topic is missing or one of several, nothing pairs, or camera or guess
-                are not known.
+            DatasetError: it cannot be read, a topic is missing or ambiguous, nothing pairs, or camera or guess are
+                unknown.
         """
         self._bag, self._options = BagRecording(paths), options
         self.image = found_topic(self._bag, options.image, IMAGES, "image", "images")
@@ -91,7 +91,7 @@ class Bag:
         )
         looked_at = list[NDArray[np.uint8]]()
         self._development = Development()
-        with suppress(ImageError):  # each frame says it of itself
+        with suppress(ImageError):  # each frame reports its own error
             first = levels_of(first_image)
             self._development = Development.of([first] if first.dtype == np.uint8 else self._some_levels(images))
             looked_at = [self._development(first)]
@@ -121,7 +121,7 @@ class Bag:
         """Read one frame.
 
         Raises:
-            DatasetError: a message of it is damaged, or holds what cannot be right.
+            DatasetError: one of its messages is damaged, or has content that cannot be right.
             IndexError: there is no such position.
         """
         position = range(len(self))[position]
@@ -133,8 +133,8 @@ class Bag:
             raise DatasetError(f"The image of {where} {error}.") from None
         if taken.shape[:2] != (camera.height, camera.width):
             raise DatasetError(
-                f"The image of {where} is {taken.shape[1]}x{taken.shape[0]} and its calibration is for "
-                f"{camera.width}x{camera.height}; give the topic of the images as they are calibrated."
+                f"The image of {where} is {taken.shape[1]}x{taken.shape[0]} but its calibration is for "
+                f"{camera.width}x{camera.height}; give the topic of the images that were calibrated."
             )
         points = np.concatenate([self._scan(scan) for scan in moment.scans])
         image, original, faces = self._lens(taken)
@@ -154,7 +154,7 @@ class Bag:
         )
 
     def _some_levels(self, images: Sequence[Stamped]) -> list[Levels]:
-        """Some pictures from all over the bag, as they are stored."""
+        """Some images spread over the bag, as stored."""
         found = list[Levels]()
         for position in evenly_spaced(len(images), DEPTHS_LOOKED_AT):
             with suppress(ImageError):
@@ -175,7 +175,7 @@ class Bag:
         return np.concatenate([self._raw(scans[position])[:, 3] for position in evenly_spaced(len(scans), 4)])
 
     def _moments(self, images: list[Stamped], scans: list[Stamped]) -> tuple[list[Moment], tuple[str, ...]]:
-        """The frames: of each period the stillest scan, with the image nearest to it."""
+        """The frames: the stillest scan of each period, with the nearest image."""
         most = self._options.max_time_difference or MAX_TIME_DIFFERENCE_MS
         images = sorted(images, key=lambda one: one.seconds)
         scans = sorted(scans, key=lambda one: one.seconds)
@@ -188,7 +188,7 @@ class Bag:
         if not len(paired):
             raise DatasetError(
                 f"No scan of {self.points} has an image of {self.image} within {most:g} ms, the nearest is "
-                f"{apart.min():.0f} ms off; check the clocks, or give a larger --max-time-difference."
+                f"{apart.min():.0f} ms away; check the clocks, or give a larger --max-time-difference."
             )
 
         def moved(position: int) -> float:
@@ -209,12 +209,12 @@ class Bag:
             f"a standstill, image and scan up to {1000 * farthest:.0f} ms apart."
         ]
         if 1000 * farthest > WORTH_A_WARNING_MS and still < len(moments):
-            notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm: record while standing, if you can.")
+            notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm; record at a standstill if possible.")
         return moments, tuple(notes)
 
 
 def _around(taken: NDArray[np.float64], swept: NDArray[np.float64]) -> NDArray[np.int64]:
-    """``[N, 2]``: for each scan the images before and after it."""
+    """``[N, 2]``: the images before and after each scan."""
     after = np.clip(np.searchsorted(taken, swept), 0, len(taken) - 1)
     return np.stack([np.maximum(after - 1, 0), after], axis=1)
 

@@ -1,4 +1,4 @@
-"""Camera and first guess of a bag: of its own messages, or of a file that the user names instead."""
+"""Camera and first guess of a bag, from its own messages or from a file of the user."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
 
 MOST_TRANSFORMS = 2000
-"""Messages of a topic of transforms that are looked at."""
+"""Largest number of messages read from a topic of transforms."""
 
 
 class BagCalibration(NamedTuple):
-    """What is known of the sensors of a bag.
+    """Calibration of the sensors of a bag.
 
     Attributes:
-        camera: with its lens.
-        camera_from_lidar: 4x4, the first guess.
-        remarks: what is unlikely about them.
+        camera: the camera with its lens.
+        camera_from_lidar: the first guess, 4x4.
+        remarks: unlikely findings.
     """
 
     camera: CameraModel
@@ -40,23 +40,23 @@ class BagCalibration(NamedTuple):
 def read(
     bag: BagRecording, image: str, frames: FrameChoice, info: str | None, guess: Path | None, wanted: Wanted
 ) -> BagCalibration:
-    """Read it.
+    """Read the calibration of a bag.
 
     Args:
         bag: the recording.
         image: topic of the images.
         frames: the coordinate frames that images and scans are in.
         info: topic of the CameraInfo; None to find it.
-        guess: a calibration file; what it says holds, but for the camera where ``info`` is named.
-        wanted: what to take from that file.
+        guess: a calibration file that takes precedence, except for the camera if ``info`` is given.
+        wanted: what to use of that file.
 
     Raises:
-        DatasetError: something is missing, or cannot be right.
+        DatasetError: something is missing or cannot be right.
     """
     given = None if guess is None else read_calibration(guess, wanted)
     if given is not None and given.camera is None and given.camera_from_lidar is None:
         raise DatasetError(
-            f"Calibration {guess} says neither where the LiDAR is nor what the camera is; give one that does."
+            f"Calibration {guess} has neither a camera nor the pose of the LiDAR; give a file that has one of them."
         )
     remarks: list[Implausible | None] = []
     if given is not None and given.camera is not None and info is None:
@@ -72,11 +72,11 @@ def read(
 
 
 def _of_info(bag: BagRecording, asked: str | None, image: str) -> tuple[CameraModel, Implausible | None]:
-    """The camera of the CameraInfo that belongs to the images, and what is odd about that."""
+    """The camera of the images' CameraInfo, and an unlikely finding about it."""
     info = info_of(bag, asked, image)
     if info is None:
         raise DatasetError(
-            f"Bag {bag} holds no CameraInfo of {image}; give the camera's calibration with --guess FILE, or its topic "
+            f"Bag {bag} has no CameraInfo of {image}; give the camera's calibration with --guess FILE, or its topic "
             "with --info."
         )
     content, where = camera_info_of(bag.message(info).content), Path(f"{bag}, {info}")
@@ -101,13 +101,13 @@ def _of_transforms(bag: BagRecording, frames: FrameChoice) -> Extrinsic:
     links = links if static else steady(links)
     if not links:
         raise DatasetError(
-            f"Bag {bag} has no /tf_static, which would say where the LiDAR is; give a first guess with --guess FILE."
+            f"Bag {bag} has no /tf_static with the pose of the LiDAR; give a first guess with --guess FILE."
         )
     return camera_from_lidar(links, frames, where)
 
 
 def steady(links: Sequence[Link]) -> list[Link]:
-    """Those that never change: what is on one mount, where static transforms are told among the others."""
+    """The transforms that never change, where static ones are published among the others."""
     told: dict[tuple[str, str], list[Link]] = {}
     for link in links:
         told.setdefault((link.parent, link.child), []).append(link)

@@ -1,4 +1,4 @@
-"""Messages of Foxglove's own schemas, in protobuf or JSON, as those of ROS that `messages` reads.
+"""Converts messages of Foxglove's schemas, in protobuf or JSON, to those of ROS that `messages` reads.
 
 The schemas are described at docs.foxglove.dev/docs/sdk/schemas. JSON may hold anything in the place of a number, so
 each is held against its type here.
@@ -15,7 +15,7 @@ from typing import Any
 from calibnet.errors import DatasetError
 
 POINT_TYPES = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
-"""Types of fields of points as PointCloud2 numbers them, which has signed numbers before unsigned ones."""
+"""Types of point fields and their numbers in PointCloud2, which has signed before unsigned types."""
 
 
 def seconds_of(time: Any) -> float:
@@ -52,7 +52,7 @@ def _raw(message: Any) -> SimpleNamespace:
 def _points(message: Any) -> SimpleNamespace:
     pose = getattr(message, "pose", None)
     if pose is not None and not _is_identity(pose):
-        raise DatasetError("its points have a pose of their own within their frame, which is not read")
+        raise DatasetError("its points have a pose within their frame, which is not supported")
     data, stride = memoryview(_bytes(message.data)), index(message.point_stride)
     count = len(data) // max(1, stride)
     fields = [
@@ -125,4 +125,4 @@ AS_ROS: dict[str, tuple[str, Callable[[Any], SimpleNamespace]]] = {
         lambda several: _of_several([_transform(one) for one in several.transforms]),
     ),
 }
-"""For each schema the type of ROS that says the same, and how a message becomes one."""
+"""The equivalent ROS type of each schema, and the conversion."""

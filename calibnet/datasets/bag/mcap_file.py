@@ -1,6 +1,6 @@
-"""MCAP files that no ROS 2 recorded: of Foxglove's own schemas, of ROS 1 messages, or of ROS 2 ones through a bridge.
+"""MCAP files that were not recorded by ROS 2: with Foxglove's schemas, ROS 1 messages, or ROS 2 ones by a bridge.
 
-rosbags reads those of ROS 2 alone; these are read through the format's own library, with the same bounds.
+rosbags reads only those of ROS 2; others are read by the format's own library, with the same bounds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Decode = Callable[[bytes], Any]
 
 
 class Info(NamedTuple):
-    """The type of a topic's messages, as ROS 2 names it, and how many there are."""
+    """The type of a topic's messages, as named by ROS 2, and their number."""
 
     msgtype: str
     msgcount: int
@@ -34,13 +34,13 @@ class Channel:
     """A topic's messages of one schema.
 
     Attributes:
-        id: in the file.
-        topic: its name.
-        msgtype: of ROS 2.
-        decode: makes a message of its bytes, with the fields that ROS has; None where nobody here reads it.
-        stamp: the time that it says, in seconds; 0 for none.
-        store: the types that a message of ROS is decoded with, those of its own definition; None for another message.
-        old: whether it is one of ROS 1.
+        id: id of the channel in the file.
+        topic: name of the topic.
+        msgtype: type in ROS 2.
+        decode: makes a message with ROS's fields from its bytes; None if it is not supported.
+        stamp: time stamp of a message in seconds; 0 for none.
+        store: types with which a ROS message is decoded, from its own definition; None for other messages.
+        old: whether it is of ROS 1.
     """
 
     id: int
@@ -53,7 +53,7 @@ class Channel:
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a file is an MCAP file that does not say that ROS 2 recorded it."""
+    """Whether a file is an MCAP file that was not recorded by ROS 2."""
     if path.suffix != ".mcap" or path.is_dir():
         return False
     with path.open("rb") as file:
@@ -63,15 +63,15 @@ def is_foreign(path: Path) -> bool:
 
 
 class McapFile:
-    """An open file, with what is asked of `rosbags.highlevel.AnyReader`.
+    """An open file, with the part of `rosbags.highlevel.AnyReader`'s interface that is used here.
 
     Attributes:
-        connections: its channels.
-        topics: by name.
+        connections: channels of the file.
+        topics: topics by name.
     """
 
     def __init__(self, path: Path) -> None:
-        """Open it; all that it says of itself is read."""
+        """Open a file and read its summary."""
         from mcap.reader import make_reader
 
         self.stack: Any = path.open("rb")
@@ -82,7 +82,7 @@ class McapFile:
         if summary is not None and summary.statistics is not None and summary.channels:
             counts = dict(summary.statistics.channel_message_counts)
             channels = {key: (one, summary.schemas.get(one.schema_id)) for key, one in summary.channels.items()}
-        else:  # nobody closed it
+        else:  # it was not closed properly
             for schema, channel, _ in self._make().iter_messages():
                 counts[channel.id] = counts.get(channel.id, 0) + 1
                 channels[channel.id] = (channel, schema)
@@ -94,7 +94,7 @@ class McapFile:
             self.topics[one.topic] = Info(one.msgtype, known.msgcount + more)
 
     def messages(self, channels: Iterable[Channel], start: int | None = None) -> Iterator[tuple[Channel, int, bytes]]:
-        """Messages in the order of time, from one in nanoseconds on: channel, when it was recorded, bytes."""
+        """Messages in order of time, from a start in nanoseconds: channel, recording time and bytes."""
         wanted = {one.id: one for one in channels}
         names = [one.topic for one in wanted.values()]
         for _, channel, message in self._make().iter_messages(topics=names, starting_at=start):
@@ -112,7 +112,7 @@ def _rewound(file: Any) -> Any:
 
 
 def _channel(channel: Any, schema: Any) -> Channel:
-    """A channel, with how its messages are read."""
+    """A channel, with the decoder of its messages."""
     name = "" if schema is None else str(schema.name)
     if name in AS_ROS:
         kind, as_ros = AS_ROS[name]
@@ -134,7 +134,7 @@ def _channel(channel: Any, schema: Any) -> Channel:
 
 
 def _decoder(encoding: str, schema: Any) -> Decode | None:
-    """The decoder of a message that is not of ROS; None where its encoding is not read here."""
+    """The decoder of a message that is not of ROS; None if its encoding is not supported."""
     if encoding == "json":
         return lambda data: json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
     if encoding == "protobuf":
@@ -146,7 +146,7 @@ def _decoder(encoding: str, schema: Any) -> Decode | None:
 
 @cache
 def _store(kind: str, old: bool, definition: str) -> Any:
-    """What decodes a message of ROS, by the definition that came with it or, without one, by ROS's own."""
+    """The types to decode a ROS message, from the definition in the file or, without one, ROS's own."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     if not definition.strip():

@@ -1,4 +1,4 @@
-"""Messages of ROS as pictures, points, cameras and transforms."""
+"""Reads ROS messages as images, points, cameras and transforms."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ CHANNELS: dict[str, tuple[type[np.generic], int, int | None]] = {
     "yuv422_yuy2": (np.uint8, 2, cv2.COLOR_YUV2RGB_YUY2),
     "yuyv": (np.uint8, 2, cv2.COLOR_YUV2RGB_YUY2),
 }
-"""Encodings of raw images: type and number of a pixel's values, and how OpenCV makes RGB of them."""
+"""Encodings of raw images: type and number of a pixel's values, and OpenCV's conversion to RGB."""
 POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """NumPy types of the fields of a PointCloud2."""
 
 
 def stamp_of(data: bytes, is_ros2: bool) -> float:
-    """Seconds of the header that images and points begin with, without reading the rest; 0 where it has none."""
-    at = 4  # after CDR's own header, or the sequence number of ROS 1
+    """Time stamp in the header of an image or scan in seconds, without reading the rest; 0 if it has none."""
+    at = 4  # after the CDR header, or the sequence number of ROS 1
     if len(data) < at + 8:
         return 0.0
     little = not is_ros2 or data[1] & 1
@@ -64,22 +64,22 @@ def stamp_of(data: bytes, is_ros2: bool) -> float:
 
 
 def levels_of(message: Any) -> Levels:
-    """``[H, W, 3]`` RGB of an image, compressed or raw, of the depth that it has.
+    """``[H, W, 3]`` RGB of an image, compressed or raw, at its own bit depth.
 
     Raises:
-        ImageError: it is damaged, or of an encoding that is not known here.
+        ImageError: it is damaged, or its encoding is not supported.
     """
     if not hasattr(message, "encoding"):
         return decode_levels(bytes(message.data))
     encoding = str(message.encoding)
     known = CHANNELS.get(encoding) or CHANNELS.get(encoding.lower())
     if known is None:
-        raise ImageError(f"has the encoding {encoding!r}, which is not known here; record it compressed, or as rgb8")
+        raise ImageError(f"has the unsupported encoding {encoding!r}; record it compressed, or as rgb8")
     kind, channels, code = known
     dtype = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
     row = int(message.width) * channels * dtype.itemsize
     if message.step < row or len(message.data) < message.step * message.height or not row:
-        raise ImageError("has fewer bytes than its size promises")
+        raise ImageError("has fewer bytes than its size requires; record it again")
     rows = np.asarray(message.data, np.uint8)[: message.step * message.height].reshape(message.height, message.step)
     pixels = np.ascontiguousarray(rows[:, :row]).view(dtype).reshape(message.height, message.width, channels)
     pixels = pixels.astype(dtype.newbyteorder("="), copy=False)
@@ -91,14 +91,14 @@ def columns_of(message: Any) -> Columns:
     """Columns ``[N]`` of a PointCloud2 of any layout, by name in lower case.
 
     Raises:
-        CloudError: it promises more than it holds.
+        CloudError: it has fewer bytes than its header states.
     """
     order = ">" if message.is_bigendian else "<"
     count, step, width = int(message.width) * int(message.height), int(message.point_step), int(message.width)
     if count > MOST_POINTS or not 0 < step <= 4096:
         raise CloudError(f"it promises {count:,} points of {step} bytes")
     data = np.asarray(message.data, np.uint8)
-    if message.height > 1 and message.row_step > width * step:  # rows with something behind them
+    if message.height > 1 and message.row_step > width * step:  # rows with padding
         if len(data) < message.row_step * message.height:
             raise CloudError(f"it is truncated, it promises {count:,} points")
         data = data[: message.row_step * message.height].reshape(message.height, message.row_step)
@@ -118,7 +118,7 @@ def columns_of(message: Any) -> Columns:
 
 
 def camera_info_of(message: Any) -> dict[str, Any]:
-    """A CameraInfo as `calibnet.datasets.calibration_files.ros` reads one."""
+    """A CameraInfo as a mapping for `calibnet.datasets.calibration_files.ros`."""
     roi = message.roi
     lower = hasattr(message, "k")
     return {
@@ -145,7 +145,7 @@ def links_of(message: Any) -> Iterator[Link]:
 
 
 def _rotation(xyzw: NDArray[np.float64]) -> Rotation:
-    """The rotation of a quaternion; NaN where it is not one, so that no frame can use it."""
+    """The rotation of a quaternion; NaN if it is not valid, so that no frame can use it."""
     from scipy.spatial.transform import Rotation as ScipyRotation
 
     length = float(np.linalg.norm(xyzw))

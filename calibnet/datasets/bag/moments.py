@@ -1,4 +1,4 @@
-"""Which moments of a drive are calibrated: spread over it, at standstill where there is one."""
+"""Chooses the moments of a drive to calibrate: spread over it, and preferably at a standstill."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from numpy.typing import NDArray
 from calibnet.geometry.types import Floats
 
 MOMENTS = 40
-"""Frames taken from a bag by default: more of one drive tell little more."""
+"""Default number of frames taken from a bag; more of one drive add little."""
 SHORTEST_S = 1.0
-"""From one to the next."""
+"""Shortest default period from one frame to the next, in seconds."""
 TRIED = 3
-"""Moments of each period that are looked at for the stillest."""
+"""Number of moments of each period among which the stillest is searched."""
 CELL_DEG = 2.0
 STILL_M = 0.03
-"""Median change of range from one scan to the next up to which everything stands still."""
+"""Largest median change of range between scans at a standstill, in metres."""
 
 
 def change(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
-    """Metres by which ranges change from one scan ``[N, 4]`` to another, the median over directions."""
+    """Median change of range over all directions from one scan ``[N, 4]`` to another, in metres."""
     ranges = [_ranges(points) for points in (one, other)]
     both = np.isfinite(ranges[0]) & np.isfinite(ranges[1])
     return float(np.median(np.abs(ranges[0] - ranges[1])[both])) if both.any() else np.inf
 
 
 def periods(seconds: Floats, every: float | None) -> list[NDArray[np.int64]]:
-    """Positions of times, in order, by period; about `MOMENTS` periods by default.
+    """Positions of times by period, in order; about `MOMENTS` periods by default.
 
     Args:
         seconds: ``[N]``, rising.
@@ -40,7 +40,7 @@ def periods(seconds: Floats, every: float | None) -> list[NDArray[np.int64]]:
 
 
 def stillest(candidates: Sequence[int], moved: Callable[[int], float]) -> tuple[int, float]:
-    """The candidate at which least changes, of `TRIED` spread over them, and how much that is."""
+    """The candidate with the smallest change, of `TRIED` spread over all, and that change."""
     some = np.unique(np.linspace(0, len(candidates) - 1, min(TRIED, len(candidates))).astype(int))
     found = {int(candidates[place]): moved(int(candidates[place])) for place in some}
     best = min(found, key=lambda position: (found[position], position))
@@ -48,7 +48,7 @@ def stillest(candidates: Sequence[int], moved: Callable[[int], float]) -> tuple[
 
 
 def _ranges(points: NDArray[np.float32]) -> Floats:
-    """The median range in each cell of directions; NaN where there is no point."""
+    """The median range in each cell of directions; NaN in empty cells."""
     x, y, z = points[:, :3].astype(np.float64).T
     distance = np.sqrt(x * x + y * y + z * z)
     real = np.isfinite(distance)

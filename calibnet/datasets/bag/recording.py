@@ -1,4 +1,4 @@
-"""An open bag: its topics, and messages by topic and time; every failure is one sentence."""
+"""An open bag: its topics, and messages by topic and time, with every failure as one sentence."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 KINDS = (".bag", ".db3", ".mcap")
-"""What a bag's file is called: ROS 1, and the two storages of ROS 2."""
+"""File name suffixes of bags: of ROS 1, and of the two storages of ROS 2."""
 METADATA_BYTES = 16 * MEGABYTE
 """Largest metadata.yaml of a ROS 2 bag."""
 DEFINED = {
@@ -37,11 +37,11 @@ DEFINED = {
     "geometry_msgs/msg/Vector3",
     "geometry_msgs/msg/Quaternion",
 }
-"""Messages that are read, and those within them; a bag brings definitions of its own."""
+"""Message types that are read, including nested ones; a bag has definitions of its own."""
 
 
 class Topic(NamedTuple):
-    """A topic, the type of its messages, and how many there are."""
+    """A topic, the type of its messages, and their number."""
 
     name: str
     type: str
@@ -49,7 +49,7 @@ class Topic(NamedTuple):
 
 
 class Stamped(NamedTuple):
-    """When a message was recorded, in nanoseconds, and what time its own header says, in seconds."""
+    """Recording time of a message in nanoseconds, and the time stamp in its header in seconds."""
 
     recorded: int
     seconds: float
@@ -57,27 +57,27 @@ class Stamped(NamedTuple):
 
 @dataclass(frozen=True)
 class Message:
-    """A message as it was deserialized, and its time."""
+    """A deserialized message and its time."""
 
     content: Any
     seconds: float
 
 
 class BagRecording:
-    """One bag, or the several files of one."""
+    """One bag, which may consist of several files."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        """Open it.
+        """Open a bag.
 
         Raises:
-            DatasetError: it is missing, damaged, or of a kind that is not known here.
+            DatasetError: it is missing, damaged, or of an unsupported kind.
         """
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
         self.paths = [file for path in paths for file in _parts(path)]
         for path in self.paths:
-            for file in _files(path):  # which also makes them inputs, so that no output replaces them
+            for file in _files(path):  # also registers them as inputs, so that no output replaces them
                 largest = METADATA_BYTES if file.suffix == ".yaml" else None
                 require_file(file, "Bag", largest, DatasetError, "copy it again")
         bound_unpacking()
@@ -87,7 +87,7 @@ class BagRecording:
             if any(is_foreign(path) for path in self.paths):
                 if len(self.paths) > 1:
                     raise DatasetError(
-                        f"Bag {self} was not recorded by ROS 2, and such MCAP files are read one at a time; join them: "
+                        f"Bag {self} was not recorded by ROS 2; several such MCAP files have to be joined first: "
                         "mcap merge A.mcap B.mcap -o AB.mcap."
                     )
                 self._reader = McapFile(self.paths[0])
@@ -107,11 +107,11 @@ class BagRecording:
         return sorted(Topic(name, info.msgtype or "", info.msgcount) for name, info in self._reader.topics.items())
 
     def of_type(self, types: Sequence[str]) -> list[Topic]:
-        """The topics of one of some types that hold messages."""
+        """The topics with messages of one of the types."""
         return [topic for topic in self.topics if topic.type in types and topic.messages]
 
     def times(self, topic: str) -> list[Stamped]:
-        """When the messages of a topic were recorded, and the times that their headers say."""
+        """Recording times and time stamps of all messages of a topic."""
         with self.failures():
             return [
                 Stamped(recorded, self._stamp(connection, data) or recorded * 1e-9)
@@ -122,9 +122,9 @@ class BagRecording:
         """Messages of a topic from a time on.
 
         Args:
-            topic: its name.
-            start: nanoseconds, of `Stamped.recorded`; None for the first.
-            most: how many.
+            topic: name of the topic.
+            start: recording time of the first message in nanoseconds; None for the very first.
+            most: largest number of messages.
         """
         with self.failures():
             found = self._reader.messages(self._connections(topic), start=start)
@@ -134,58 +134,60 @@ class BagRecording:
                 yield Message(self._content(connection, data), self._stamp(connection, data) or recorded * 1e-9)
 
     def message(self, topic: str, at: int | None = None) -> Message:
-        """The message of a topic that was recorded at a time, or its first.
+        """The message of a topic that was recorded at a given time, or the first one.
 
         Raises:
-            DatasetError: there is none, whatever its index promises, or it is damaged.
+            DatasetError: there is none, or it is damaged.
         """
         for message in self.messages(topic, at, 1):
             return message
         when = "" if at is None else f" at {at}"
-        raise DatasetError(f"Bag {self} holds no message of {topic}{when} that can be read; it is damaged.")
+        raise DatasetError(
+            f"Bag {self} has no readable message of {topic}{when}; it is damaged, so copy or record it again."
+        )
 
     @contextmanager
     def failures(self) -> Iterator[None]:
-        """Say in one sentence what a reader of bags, or one of the libraries below it, cannot read."""
+        """A context that turns every error of the bag libraries into one sentence."""
         try:
             yield
         except (DatasetError, GeneratorExit):
             raise
-        except Exception as error:  # bags are read by many hands, which fail in as many ways
+        except Exception as error:  # bags are read by many libraries, which raise many errors
             why = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
-            if isinstance(error, MemoryError):  # what a damaged record says of its own length
-                why = "it promises more than there is memory for"
+            if isinstance(error, MemoryError):  # a damaged record may state a huge length
+                why = "it states a size beyond the available memory"
             raise DatasetError(
                 f"Bag {self} cannot be read ({why}); reindex it (`rosbag reindex`, `ros2 bag reindex`, `mcap "
                 "recover`), or copy it again."
             ) from None
 
     def _check_definitions(self, store: Typestore, old: bool) -> None:
-        """Hold what a bag says of the messages that are read from it against what they are.
+        """Check the definitions in a bag of the messages that are read.
 
         Args:
-            store: the types that its messages are decoded with.
+            store: types with which its messages are decoded.
             old: whether they are of ROS 1.
 
         Raises:
-            DatasetError: a field is missing there, or of another type.
+            DatasetError: a field is missing or has another type.
         """
         from rosbags.typesys import Stores, get_typestore
 
         standard = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
-        if old:  # whose stored messages lack TFMessage, which is the same in both
+        if old:  # ROS 1's stored types lack TFMessage, which is the same in both
             standard |= get_typestore(Stores.ROS1_NOETIC).fielddefs
         for name in sorted(store.fielddefs.keys() & DEFINED):
             fields = dict(store.fielddefs[name][1])
             wrong = [field for field, kind in standard[name][1] if fields.get(field) != kind]
             if wrong:
                 raise DatasetError(
-                    f"Bag {self} defines {name} without {', '.join(wrong)}, or otherwise than ROS does; it is damaged, "
-                    "or was recorded with messages of your own under that name."
+                    f"Bag {self} defines {name} without {', '.join(wrong)}, or differently from ROS; it is damaged, "
+                    "or was recorded with custom messages of that name."
                 )
 
     def __str__(self) -> str:
-        """Its first file."""
+        """The path of its first file."""
         return str(self.paths[0])
 
     def _connections(self, topic: str) -> list[Any]:
@@ -212,7 +214,7 @@ class BagRecording:
 
 
 def _parts(path: Path) -> list[Path]:
-    """What libraries open: a file, a folder with its ``metadata.yaml``, or the bags in a folder that has none.
+    """The paths to open: a file, a folder with ``metadata.yaml``, or the bags in a folder without one.
 
     Raises:
         DatasetError: there is none.
@@ -222,7 +224,7 @@ def _parts(path: Path) -> list[Path]:
     if not path.is_dir():
         if path.suffix not in KINDS and path.is_file():
             raise DatasetError(
-                f"Bag {path} ends with none of {', '.join(KINDS)}; call it by its kind, and reindex first what a "
+                f"Bag {path} does not end with one of {', '.join(KINDS)}; rename it, and first reindex a file that a "
                 "recorder left as .active (`rosbag reindex`)."
             )
         return [path]
@@ -230,7 +232,7 @@ def _parts(path: Path) -> list[Path]:
         return [path]
     found = sorted(file for file in path.iterdir() if file.suffix in KINDS)
     if not found:
-        raise DatasetError(f"Folder {path} holds no bag; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder.")
+        raise DatasetError(f"Folder {path} is not a bag; give a .bag, .db3 or .mcap file, or a ROS 2 bag's folder.")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Which topics of a bag are the camera's and the LiDAR's: the only one of a kind, or one that the user names."""
+"""Finds the topics of camera and LiDAR in a bag: the only one of a kind, or the one that the user names."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from calibnet.datasets.bag.recording import BagRecording, Topic
 from calibnet.errors import DatasetError
 
 SUFFIXES = ("/compressed", "/image_raw", "/image_color", "/image_rect_color", "/image_rect", "/image_mono", "/image")
-"""What an image's topic ends with, beyond the camera's name; taken off one after the other."""
+"""Suffixes of image topics after the camera's name, which are removed one after the other."""
 RECTIFIED = re.compile(r"(?<![a-z])rect(ified)?(?![a-z])", re.IGNORECASE)
-"""In the names of topics of images that were rectified, ``image_rect_color`` for instance."""
+"""Pattern in the names of topics of rectified images, such as ``image_rect_color``."""
 DEPTH = "/compressedDepth"
-"""What the topics of packed images of depth end with, which have the type of pictures."""
+"""Suffix of topics of compressed depth images, which have the type of images."""
 
 
 def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], option: str, what: str) -> str:
-    """The topic that is asked for, or the only one of some types.
+    """The requested topic, or the only one of some types.
 
-    Of the same images raw and compressed, the compressed ones are taken: that is one topic in two forms.
+    If images are both raw and compressed, the compressed topic is used.
 
     Raises:
-        DatasetError: there is none, or one of several has to be named; the message lists them.
+        DatasetError: there is none, or there are several to choose from; the message lists them.
     """
     found = bag.of_type(types)
     if asked is not None:
@@ -36,19 +36,19 @@ def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], opti
     if len(found) == 1:
         return found[0].name
     if not found:
-        raise DatasetError(f"Bag {bag} holds no {what}; {_listed(bag.topics, 'messages', bag)}.")
+        raise DatasetError(f"Bag {bag} has no {what}; {_listed(bag.topics, 'messages', bag)}.")
     raise DatasetError(
-        f"Bag {bag} holds several topics of {what}, choose one with --{option}; {_listed(found, what, bag)}."
+        f"Bag {bag} has several topics of {what}; choose one with --{option}: {_listed(found, what, bag)}."
     )
 
 
 def info_of(bag: BagRecording, asked: str | None, image: str) -> str | None:
-    """The topic of the camera's calibration: asked for, beside the images, or the only one; None where there is none.
+    """The topic of the camera's calibration: the requested one, the one beside the images, or the only one; else None.
 
-    The only one that is not beside the images counts where it cannot be of other images in the bag.
+    The only one that is not beside the images is used if it cannot belong to other images in the bag.
 
     Raises:
-        DatasetError: what is asked for is not there, or it is one of several.
+        DatasetError: the requested one does not exist, or there are several.
     """
     infos = bag.of_type(INFOS)
     names = [topic.name for topic in infos]
@@ -68,20 +68,20 @@ def info_of(bag: BagRecording, asked: str | None, image: str) -> str | None:
         return None
     listed = _listed(infos, "CameraInfo", bag)
     raise DatasetError(
-        f"Bag {bag} does not say which CameraInfo is that of {image}, choose it with --info, or give the camera's "
-        f"calibration with --guess FILE; {listed}."
+        f"Bag {bag} has several CameraInfo topics for {image}; choose one with --info, or give the camera's "
+        f"calibration with --guess FILE: {listed}."
     )
 
 
 def camera_of(image: str) -> str:
-    """The camera's name in that of its topic of images."""
+    """The camera's name, from that of its image topic."""
     for suffix in SUFFIXES:
         image = image.removesuffix(suffix)
     return image
 
 
 def is_rectified(image: str) -> bool:
-    """Whether a topic of images is called like one that ``image_proc`` rectified."""
+    """Whether the name of an image topic is that of images rectified by ``image_proc``."""
     return bool(RECTIFIED.search(image))
 
 

@@ -1,4 +1,4 @@
-"""Bags unpacked up to a bound, so that a small file can take neither all memory nor all of a disk."""
+"""Bounds the unpacking of bags, so that a small file cannot take all memory or all of a disk."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from types import SimpleNamespace
 from typing import Any
 
 LARGEST_BYTES = 512 << 20
-"""Largest unpacked chunk or message; recorders begin a new chunk after a few megabytes."""
+"""Largest unpacked chunk or message; recorders start a new chunk after a few megabytes."""
 STEP_BYTES = 16 << 20
 MOST_TIMES = 100
-"""What a whole packed file may grow by, beyond `LARGEST_BYTES`; pictures and scans shrink to a third or so."""
+"""Largest factor by which a packed file may grow, beyond `LARGEST_BYTES`; images and scans shrink to about a third."""
 RESERVE_BYTES = 1 << 30
-"""Room that is left on the disk of temporary files, to which whole bags are unpacked."""
+"""Disk space to leave free for temporary files, to which whole bags are unpacked."""
 
 
 def bound_unpacking() -> None:
-    """Let rosbags and mcap unpack no piece and no file that is larger, of whatever bag they read from now on."""
+    """Limit the size of all chunks and files that rosbags and mcap unpack from now on."""
     import mcap.stream_reader
     from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
     from rosbags.rosbag1.reader import decompressors
@@ -38,10 +38,10 @@ def bound_unpacking() -> None:
 
 
 def bounded(make: Callable[[], Any]) -> Callable[[bytes], bytes]:
-    """A function that unpacks one piece.
+    """A function that unpacks one chunk within the bound.
 
     Args:
-        make: a decompressor, with the methods that those of Python's own library have.
+        make: makes a decompressor with the interface of Python's own.
     """
 
     def unpack(data: bytes) -> bytes:
@@ -52,23 +52,23 @@ def bounded(make: Callable[[], Any]) -> Callable[[bytes], bytes]:
             pieces.append(unpacker.decompress(b"", STEP_BYTES))
             size += len(pieces[-1])
             if size > LARGEST_BYTES:
-                raise ValueError(f"a piece of it unpacks to more than {LARGEST_BYTES >> 20} MB")
+                raise ValueError(f"a chunk unpacks to more than {LARGEST_BYTES >> 20} MB")
         if not unpacker.eof:
-            raise ValueError("a packed piece of it is cut short")
+            raise ValueError("a packed chunk is truncated")
         return b"".join(pieces)
 
     return unpack
 
 
 def bounded_file(kind: Any) -> type[Any]:
-    """A kind of packed file that is read up to a bound: what may be meant, and what the disk has room for.
+    """A class of packed files that are read up to a bound, which is a plausible size and the space on the disk.
 
     Args:
-        kind: of files, which are read or written through another one.
+        kind: class of packed files.
     """
 
     class BoundedFile(kind):  # type: ignore[misc]  # rosbags brings its zstd without types
-        """Counts what is read of it."""
+        """Counts the bytes that are read."""
 
         def __init__(self, file: Any, mode: str = "rb", **options: Any) -> None:
             super().__init__(file, mode, **options)
@@ -80,11 +80,11 @@ def bounded_file(kind: Any) -> type[Any]:
                 self._left = self._most = max(0, min(room, self._most))
 
         def read(self, size: int = -1) -> bytes:
-            """Up to so many bytes."""
+            """Read up to ``size`` bytes."""
             data: bytes = super().read(size)
             self._left -= len(data)
             if self._left < 0:
-                where = f", all the room that {tempfile.gettempdir()} has for it" if self._is_full else ""
+                where = f", the space available in {tempfile.gettempdir()}" if self._is_full else ""
                 raise ValueError(f"it unpacks to more than {self._most >> 20} MB{where}")
             return data
 

@@ -1,4 +1,4 @@
-"""What a calibration file says, whichever tool wrote it, and what is asked of one that says it of several sensors."""
+"""The content of a calibration file of any tool, and the selection from a file of several sensors."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from calibnet.geometry.types import Extrinsic, Transform
 
 
 class FrameChoice(NamedTuple):
-    """Names of coordinate frames, for files that hold many; None to find them by their names."""
+    """Names of the coordinate frames to use; None to recognise them by their names."""
 
     camera: str | None = None
     lidar: str | None = None
 
 
 BY_NAME = FrameChoice()
-"""Frames are found by what they are called."""
+"""Recognise both frames by their names."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to take from a file that holds more than one of a kind.
+    """Selection from a file with several sensors.
 
     Attributes:
-        camera: its name in the file; None where the file holds only one.
-        frames: of the coordinate frames.
-        picture: one of the camera's, or its width and height, for formats that do not say its size.
+        camera: name of the camera in the file; None if it has only one.
+        frames: names of the coordinate frames.
+        picture: an image of the camera, or its width and height, for formats that do not contain the size.
     """
 
     camera: str | None = None
@@ -39,7 +39,7 @@ class Wanted:
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Width and height of the picture; None where it cannot be read."""
+        """Width and height of the image; None if it cannot be read."""
         if isinstance(self.picture, tuple):
             return self.picture
         try:
@@ -54,13 +54,13 @@ class CalibrationFile:
     """The content of a calibration file.
 
     Attributes:
-        kind: what wrote it, for sentences, for instance ``"Kalibr's camchain"``.
-        camera: None where the file tells only where the sensors are.
-        camera_from_lidar: 4x4; None where the file knows no LiDAR.
-        rig_from_camera: 4x4, where the camera sits on a rig of several; None where it does not say.
+        kind: kind of file for messages, for instance ``"Kalibr's camchain"``.
+        camera: the camera; None if the file has only poses.
+        camera_from_lidar: the extrinsic, 4x4; None if the file has no LiDAR.
+        rig_from_camera: pose of the camera on its rig, 4x4; None if not given.
         cloud_columns: names of the columns of ``.bin`` and text clouds; None where it does not say.
-        bayer: pattern of a sensor whose pictures are not demosaiced, of `calibnet.datasets.images.development.BAYER`.
-        prior: what is fixed or known beforehand of the extrinsic, as the options of the same names say it.
+        bayer: pattern of a sensor whose images are not demosaiced, from `calibnet.datasets.images.development.BAYER`.
+        prior: prior on the extrinsic, with the names and values of the command line's options.
     """
 
     kind: str

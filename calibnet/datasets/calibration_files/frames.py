@@ -1,4 +1,4 @@
-"""Coordinate frames that hang on each other, and which of them are the camera's and the LiDAR's."""
+"""Trees of coordinate frames, and the extrinsic between the frames of camera and LiDAR."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LIDAR = re.compile(
     r"lidar|velo|laser|livox|ouster|os[_-]?(lidar|sensor|\d)|hesai|pandar|rslidar|robosense|scan", re.IGNORECASE
 )
 OPTICAL_FROM_BODY = transform([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]], [0.0, 0.0, 0.0])
-"""From a frame with x forward, y left, z up to one with x right, y down, z forward: REP 103."""
+"""From a body frame (x forward, y left, z up) to an optical one (x right, y down, z forward), as in REP 103."""
 SAME = 1e-3
-"""Metres, and elements of a rotation, by which two ways to a frame may differ."""
+"""Largest difference between two paths to a frame, in metres and in elements of the rotation."""
 UPRIGHT = 0.8
-"""Cosine between the z axes of a camera's frame and the LiDAR's from which on the camera's is none of an image."""
+"""Cosine between the z axes of the camera's frame and the LiDAR's above which the former is not an optical frame."""
 
 
 class Link(NamedTuple):
@@ -40,22 +40,21 @@ def camera_from_lidar(links: Iterable[Link], choice: FrameChoice, path: Path | s
 
     Args:
         links: the tree of frames.
-        choice: their names; those that are not given are found by what they are called.
-        path: of the file, for messages.
+        choice: names of the frames; missing ones are recognised by their names.
+        path: path of the file, for messages.
 
     Raises:
-        DatasetError: a frame is not there, could be one of several, hangs on another tree, has two places, or is not an
-            image's.
+        DatasetError: a frame is missing, ambiguous, not connected, in two places, or not an optical frame.
     """
     tree: dict[str, dict[str, Transform]] = {}
     broken: list[str] = []
     for parent, child, parent_from_child in links:
         if not np.isfinite(parent_from_child).all():
-            broken.append(child)  # as ROS leaves it out
+            broken.append(child)  # ROS ignores it as well
             continue
         if not np.allclose(tree.get(parent, {}).get(child, parent_from_child), parent_from_child, atol=SAME):
             raise DatasetError(
-                f"{path} says twice, and differently, where {child} is in {parent}; give the right one by --guess FILE."
+                f"{path} has two different poses of {child} in {parent}; give the right one with --guess FILE."
             )
         tree.setdefault(parent, {})[child] = parent_from_child
         tree.setdefault(child, {})[parent] = invert(parent_from_child)
@@ -71,17 +70,17 @@ def camera_from_lidar(links: Iterable[Link], choice: FrameChoice, path: Path | s
     found = invert(reachable[camera])
     if found[2, 2] > UPRIGHT and not OPTICAL.search(camera):
         raise DatasetError(
-            f"{path}: the frame {camera} stands as the LiDAR does, x forward and z up, so it is not that of the image; "
-            "name its optical frame (x right, y down, z forward) with --camera-frame, and add that if it is missing."
+            f"{path}: the frame {camera} has its z axis up like the LiDAR, so it is not the camera's optical frame; "
+            "give that (x right, y down, z forward) with --camera-frame, and add it if it is missing."
         )
     return found
 
 
 def _from(tree: dict[str, dict[str, Transform]], start: str, path: Path | str) -> dict[str, Transform]:
-    """``start_from_frame`` of every frame that hangs on it.
+    """``start_from_frame`` of every connected frame.
 
     Raises:
-        DatasetError: two ways lead to a frame, and say that it is in different places.
+        DatasetError: two paths to a frame contradict each other.
     """
     found, waiting = {start: np.eye(4)}, [start]
     while waiting:
@@ -93,8 +92,8 @@ def _from(tree: dict[str, dict[str, Transform]], start: str, path: Path | str) -
                 waiting.append(other)
             elif not np.allclose(found[other], by_this_way, atol=SAME):
                 raise DatasetError(
-                    f"{path} leads from {start} to {other} in two ways that contradict each other; a frame hangs on "
-                    "one other alone, so take the wrong transform out."
+                    f"{path} has two paths from {start} to {other} that contradict each other; a frame has only "
+                    "one parent, so remove the wrong transform."
                 )
     return found
 
@@ -107,12 +106,12 @@ def _chosen(
     path: Path | str,
     but: str = "",
 ) -> str:
-    """The frame of that name, or the only one that is called as such frames are."""
+    """The frame of a name, or the only one whose name is that of such a frame."""
     if name is not None:
         if name not in tree:
             there = ", ".join(sorted(tree)) or "none"
             raise DatasetError(
-                f"{path} has no frame {name!r}; frames there: {there}. Name one of them with --{what}-frame, or give a "
+                f"{path} has no frame {name!r}; choose one of {there} with --{what}-frame, or give a "
                 "first guess with --guess FILE."
             )
         return name
@@ -123,7 +122,7 @@ def _chosen(
         called = [frame for frame in called if not LIDAR.search(frame)] or called
     if len(called) != 1:
         found = f"several frames of a {what} ({', '.join(called[:6])})" if called else (
-            f"no frame that is called like a {what} ({', '.join(sorted(tree)[:8])})"
+            f"no frame with the name of a {what} ({', '.join(sorted(tree)[:8])})"
         )  # fmt: skip
         raise DatasetError(f"{path} has {found}; name it with --{what}-frame.")
     return called[0]

@@ -17,26 +17,26 @@ from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.types import Transform
 
 CAMERA_MODELS = {"pinhole": 4, "omni": 5, "ds": 6}
-"""The projections that are known here, and how many intrinsics each has: (xi, (alpha,)) fu, fv, pu, pv."""
+"""The supported projections and their numbers of intrinsics: (xi, (alpha,)) fu, fv, pu, pv."""
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is one of Kalibr's."""
+    """Whether the content is of a file of Kalibr."""
     return isinstance(content, Mapping) and bool(_cameras(content))
 
 
 def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationFile:
-    """Read the camera that is wanted.
+    """Read the selected camera.
 
-    ``T_cam_lidar`` or ``T_lidar_cam``, which some add, are in Kalibr's way: ``T_b_a`` maps from a to b.
+    ``T_cam_lidar`` or ``T_lidar_cam``, which some add, follow Kalibr's convention: ``T_b_a`` maps from a to b.
 
     Raises:
-        DatasetError: the file has several cameras and none is named, or its lens is not known here.
+        DatasetError: the file has several cameras and none is selected, or its lens is not supported.
     """
     cameras = _cameras(content)
     name = wanted.camera if wanted.camera is not None else next(iter(cameras)) if len(cameras) == 1 else None
     if name not in cameras:
-        raise DatasetError(f"Calibration {path} holds {', '.join(cameras)}; say which one with --camera.")
+        raise DatasetError(f"Calibration {path} has the cameras {', '.join(cameras)}; choose one with --camera.")
     chosen = cameras[name]
     extrinsic = values.extrinsic(chosen, path)
     if chosen.get("T_cam_lidar") is not None:
@@ -63,8 +63,8 @@ def _camera(camera: Mapping[Any, Any], path: Path, name: str) -> CameraModel:
     projection = str(camera["camera_model"])
     if projection not in CAMERA_MODELS:
         raise DatasetError(
-            f"Calibration {path}: {name}.camera_model is {projection!r}; calibrate with one of "
-            f"{', '.join(CAMERA_MODELS)}, or give rectified pictures."
+            f"Calibration {path}: {name}.camera_model is {projection!r}, which is not supported; calibrate with one of "
+            f"{', '.join(CAMERA_MODELS)}, or give rectified images."
         )
     intrinsics = values.numbers(camera["intrinsics"], f"{name}.intrinsics", path, (CAMERA_MODELS[projection],))
     size = values.numbers(camera["resolution"], f"{name}.resolution", path, (2,))
@@ -78,14 +78,16 @@ def _camera(camera: Mapping[Any, Any], path: Path, name: str) -> CameraModel:
         lens, coefficients = "double_sphere", own.tolist()
     elif projection == "omni":
         if lens != "plumb_bob":
-            raise DatasetError(f"Calibration {path}: {name} is omni with {lens}; only omni-radtan is known here.")
+            raise DatasetError(
+                f"Calibration {path}: {name} is omni with {lens}, which is not supported; calibrate with omni-radtan."
+            )
         lens = "omnidirectional"
         coefficients = [*own.tolist(), *values.numbers(coefficients, key, path, (4,)).tolist()]
     return values.camera((width, height), matrix, lens, coefficients, path, key)
 
 
 def _first_from(cameras: Mapping[str, Mapping[Any, Any]], name: str, path: Path) -> Transform | None:
-    """The first camera from that of this name, through ``T_cn_cnm1`` (the camera from the one before it)."""
+    """The transform from the named camera to the first one, by ``T_cn_cnm1`` (a camera from the one before it)."""
     chain = list(cameras)
     camera_from_first = np.eye(4)
     for one in chain[1 : chain.index(name) + 1]:

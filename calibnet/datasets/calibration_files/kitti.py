@@ -19,23 +19,23 @@ LIDAR, OF_OBJECT, RECTIFYING = "Tr", "Tr_velo_to_cam", "R0_rect"
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is one of them."""
+    """Whether the content is of a calibration file of KITTI."""
     if not isinstance(content, Mapping):
         return False
     return bool(_cameras(content)) and (LIDAR in content or {OF_OBJECT, RECTIFYING} <= content.keys())
 
 
 def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationFile:
-    """Read a camera, of the pictures' size, and its extrinsic.
+    """Read a camera, with the size of the images, and its extrinsic.
 
     Raises:
-        DatasetError: a row is malformed, or the cameras differ and none is named.
+        DatasetError: a row is malformed, or the cameras differ and none is selected.
     """
     cameras = _cameras(content)
     named = None if wanted.camera is None else f"P{wanted.camera.removeprefix('P')}"
     if named not in cameras and (named is not None or len({content[name] for name in cameras}) > 1):
         numbers = ", ".join(name.removeprefix("P") for name in cameras)
-        raise DatasetError(f"Calibration {path} holds cameras {numbers}; say which one with --camera.")
+        raise DatasetError(f"Calibration {path} has the cameras {numbers}; choose one with --camera.")
     name = named or cameras[0]
     sizes = {LIDAR: 12} if LIDAR in content else {OF_OBJECT: 12, RECTIFYING: 9}
     rows = read_calibration_file(path, {name: 12, **sizes})

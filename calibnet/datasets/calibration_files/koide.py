@@ -17,7 +17,7 @@ RESULTS = ("T_lidar_camera", "init_T_lidar_camera", "init_T_lidar_camera_auto")
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is one of them."""
+    """Whether the content is of koide3's ``calib.json``."""
     return isinstance(content, Mapping) and _is_camera(content.get("camera"))
 
 
@@ -26,10 +26,10 @@ def _is_camera(camera: Any) -> bool:
 
 
 def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationFile:
-    """Read the camera, of the pictures' size, and the pose that was found, or else the guess.
+    """Read the camera, with the size of the images, and the result or else the initial guess.
 
     Raises:
-        DatasetError: something is missing, or the lens is not known here.
+        DatasetError: something is missing, or the lens is not supported.
     """
     of = content["camera"]
     model = values.lens_model(of["camera_model"], path, "camera.camera_model")
@@ -40,7 +40,9 @@ def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationF
         bent = coefficients or [0.0] * 4
         coefficients = [xi, *values.numbers(bent, "camera.distortion_coeffs", path, (4,)).tolist()]
     if wanted.size is None:
-        raise DatasetError(f"{path} does not say the size of the pictures, and there is none beside it; add pictures.")
+        raise DatasetError(
+            f"{path} does not contain the size of the images, and there are no images beside it; add them."
+        )
     matrix = values.matrix_of(intrinsics, path, "camera.intrinsics")
     camera = values.camera(wanted.size, matrix, model, coefficients, path, "camera.distortion_coeffs")
     return CalibrationFile("koide3's calib.json", camera, _extrinsic(content.get("results"), path))

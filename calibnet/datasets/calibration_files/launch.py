@@ -1,4 +1,4 @@
-"""Launch files of ROS 1 and 2 (XML, YAML): the static transforms that they publish, as our own export for ROS does."""
+"""Launch files of ROS 1 and 2 (XML, YAML) that publish static transforms, such as our own export for ROS."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ PUBLISHER = "static_transform_publisher"
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is one of them."""
+    """Whether the content is of a launch file."""
     return isinstance(content, Mapping) and isinstance(content.get("launch"), list)
 
 
 def of_xml(root: Element) -> dict[str, Any]:
-    """A launch file in XML as the same in YAML says it."""
+    """A launch file in XML, in the form of one in YAML."""
     return {"launch": [{"node": dict(node.attrib)} for node in root.iter("node")]}
 
 
 def transforms_of(content: Mapping[Any, Any], path: Path) -> dict[str, Any]:
-    """The transforms as `calibnet.datasets.calibration_files.transforms` reads a list of them.
+    """The transforms, as a list for `calibnet.datasets.calibration_files.transforms`.
 
     Raises:
-        DatasetError: the file publishes none, or leaves a number to whoever launches it.
+        DatasetError: the file publishes none, or a number is filled in only at launch.
     """
     found = [_transform(arguments, path) for arguments in _published(content["launch"])]
     if not found:
-        raise DatasetError(f"Calibration {path} is a launch file without a {PUBLISHER}; give one that has one.")
+        raise DatasetError(f"Calibration {path} is a launch file without a {PUBLISHER}; give a file that has one.")
     return {"transforms": found}
 
 
 def _published(items: Any) -> Iterator[str]:
-    """Arguments of every publisher, in groups as well."""
+    """Arguments of every publisher, including those in groups."""
     for item in items if isinstance(items, list) else ():
         if not isinstance(item, Mapping):
             continue
@@ -50,8 +50,8 @@ def _published(items: Any) -> Iterator[str]:
 def _transform(arguments: str, path: Path) -> dict[str, Any]:
     if "$(" in arguments:
         raise DatasetError(
-            f"Calibration {path}: {PUBLISHER} has arguments that are filled in at the launch ({arguments[:80]}); write "
-            "them out."
+            f"Calibration {path}: {PUBLISHER} has arguments that are filled in at launch ({arguments[:80]}); replace "
+            "them by numbers."
         )
     try:
         words = shlex.split(arguments)
@@ -71,7 +71,8 @@ def _transform(arguments: str, path: Path) -> dict[str, Any]:
         frames = [*words[count:], None, None][:2]
     if not given or None in frames:
         raise DatasetError(
-            f"Calibration {path}: the arguments of {PUBLISHER} ({arguments[:80]}) are neither --x … --child-frame-id "
-            "nor x y z, yaw pitch roll or qx qy qz qw, and two frames; correct them."
+            f"Calibration {path}: the arguments of {PUBLISHER} ({arguments[:80]}) are not of the form --x … "
+            "--child-frame-id "
+            "or x y z, yaw pitch roll or qx qy qz qw, and two frames; correct them."
         )
     return {"parent": frames[0], "child": frames[1], **given}

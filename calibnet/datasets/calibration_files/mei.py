@@ -1,4 +1,4 @@
-"""Calibrations of Mei's model as CamOdoCal writes them, which KITTI-360's fisheyes have."""
+"""CamOdoCal's calibration files of Mei's model, which KITTI-360's fisheyes have."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ GROUPS = {
     "distortion_parameters": ("k1", "k2", "p1", "p2"),
     "projection_parameters": ("gamma1", "gamma2", "u0", "v0"),
 }
-REMEDY = "give CamOdoCal's file as it is"
+REMEDY = "give CamOdoCal's original file"
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is one of these."""
+    """Whether the content is of such a file."""
     return isinstance(content, Mapping) and {"mirror_parameters", "projection_parameters"} <= content.keys()
 
 
 def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
-    """Read the camera; such a file knows no LiDAR.
+    """Read the camera; such a file has no LiDAR.
 
     Raises:
-        DatasetError: a parameter is missing or no number.
+        DatasetError: a parameter is missing or not a number.
     """
     found: dict[str, float] = {}
     for group, names in GROUPS.items():

@@ -21,7 +21,7 @@ LIDAR_FROM_CAMERA = "CameraExtrinsicMat"
 
 
 def is_known(content: Any, of_opencv: bool) -> bool:
-    """Whether it is one of them: of OpenCV's dialect, or with a camera matrix under one of its names and no other."""
+    """Whether the content is of such a file: in OpenCV's dialect, or with a camera matrix under its names only."""
     if not isinstance(content, Mapping):
         return False
     exported = "convention" in content and "distortion_coefficients" in content
@@ -29,7 +29,7 @@ def is_known(content: Any, of_opencv: bool) -> bool:
 
 
 def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationFile:
-    """Read the camera and, where it is said by its name, the extrinsic.
+    """Read the camera and, if named, the extrinsic.
 
     Raises:
         DatasetError: there is no camera matrix, no distortion, or no size.
@@ -42,7 +42,7 @@ def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationF
         return CalibrationFile("OpenCV's file", None, extrinsic)
     for key, what in ((matrix_key, "camera_matrix"), (coefficients_key, "distortion_coefficients")):
         if key is None:
-            raise DatasetError(f"Calibration {path}: this file of OpenCV has no {what}; store it under that name.")
+            raise DatasetError(f"Calibration {path}: this file of OpenCV has no {what}; add it under that name.")
     name = _key(content, MODEL)
     fisheye = any(str(key).lower() in ("fisheye", "fisheye_model") and content[key] in (1, True) for key in content)
     model = "equidistant" if fisheye else values.lens_model(content[name] if name else "plumb_bob", path, str(name))
@@ -53,7 +53,7 @@ def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationF
 
 
 def _size(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> tuple[int, int]:
-    """Width and height; those of the pictures where the file does not say."""
+    """Width and height; those of the images if the file has none."""
     width, height, size = (_key(content, names) for names in (WIDTH, HEIGHT, SIZE))
     if width is not None and height is not None:
         return values.pixels(content[width], str(width), path), values.pixels(content[height], str(height), path)
@@ -61,10 +61,12 @@ def _size(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> tuple[int, 
         sides = values.numbers(content[size], str(size), path, (2,)).tolist()
         return values.pixels(sides[0], str(size), path), values.pixels(sides[1], str(size), path)
     if wanted.size is None:
-        raise DatasetError(f"Calibration {path} does not say the size of the pictures; add image_width, image_height.")
+        raise DatasetError(
+            f"Calibration {path} does not contain the size of the images; add image_width and image_height."
+        )
     return wanted.size
 
 
 def _key(content: Mapping[Any, Any], names: str) -> Any:
-    """The key that is one of these names, in lower case and without separators."""
+    """The key with one of these names, in lower case and without separators."""
     return next((key for key in content if re.fullmatch(names, re.sub(r"[\W_]", "", str(key)).lower())), None)

@@ -1,4 +1,4 @@
-"""The ``calibration.yaml`` of a plain folder: the one file in which every fact has one name."""
+"""The ``calibration.yaml`` of a plain folder."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from calibnet.errors import DatasetError
 from calibnet.geometry.camera_model import CameraModel, LensModel
 
 KNOWN = ("fix", "prior_translation", "prior_rotation")
-"""What of the extrinsic is known beforehand, as the options of the same names say it."""
+"""Keys of the prior, with the names of the command line's options."""
 NEEDED = ("width", "height", "camera_matrix", "distortion")
 
 
 def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
-    """Read ``width``, ``height``, ``camera_matrix`` (3x3), the lens, the extrinsic and what else there may be.
+    """Read ``width``, ``height``, ``camera_matrix`` (3x3), the lens, the extrinsic and optional keys.
 
     The lens is ``distortion_model`` (``plumb_bob`` by default), ``distortion``, and ``xi`` and ``alpha`` of the models
-    that have them. Other keys are ignored, but for those that mean geometry elsewhere, see `unread_keys`. A file with
-    an extrinsic alone is one too: it serves as a guess.
+    that have them. Other keys are ignored, except those that mean geometry in other tools, see `unread_keys`. A file
+    with only an extrinsic can serve as a guess.
 
     Raises:
-        DatasetError: a key is missing, a value has the wrong form, or geometry would go unread.
+        DatasetError: a key is missing, a value has the wrong form, or geometry would be ignored.
     """
     if unread := unread_geometry(content):
-        raise DatasetError(f"Calibration {path} holds geometry that is not read: {in_words(unread)}.")
+        raise DatasetError(f"Calibration {path} has geometry under keys that are not read: {in_words(unread)}.")
     rig = content.get("rig_from_camera")
     columns = content.get("cloud_columns")
     return CalibrationFile(

@@ -1,4 +1,4 @@
-"""Which tool wrote a calibration file is told by what it holds, not by its name."""
+"""Recognises calibration files by their content rather than their names."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ NOTHING_WANTED = Wanted()
 def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> CalibrationFile:
     """Read a calibration file.
 
-    Known are our ``calibration.yaml``, ROS's ``camera_info``, Kalibr's ``camchain``, OpenCV's ``FileStorage``,
+    Supports our ``calibration.yaml``, ROS's ``camera_info``, Kalibr's ``camchain``, OpenCV's ``FileStorage``,
     CamOdoCal's (KITTI-360's fisheyes), KITTI's ``calib.txt``, koide3's ``calib.json``, lists of transforms such as
     ``/tf_static``, launch files, URDF, and Autoware's.
 
     Args:
         path: the file.
-        wanted: what to take from a file of several sensors.
+        wanted: selection from a file of several sensors.
 
     Raises:
-        DatasetError: it cannot be read, or what it says cannot be used; the message names it.
+        DatasetError: it cannot be read or used; the message names it.
     """
     content, of_opencv = parse(path)
     if wanted.camera is not None and not _names_cameras(content):
         raise DatasetError(
-            f"Calibration {path} holds one camera, and none by the name {wanted.camera}; leave --camera out."
+            f"Calibration {path} has one camera, which is not called {wanted.camera}; leave --camera out."
         )
     if launch.is_known(content):
         content = launch.transforms_of(content, path)
@@ -51,12 +51,14 @@ def read_calibration(path: Path, wanted: Wanted = NOTHING_WANTED) -> Calibration
     if transforms.is_autoware(content):
         return transforms.read_autoware(content, path, wanted)
     if not isinstance(content, Mapping):
-        raise DatasetError(f"Calibration {path} holds no 'key: value' lines; write it as docs/own-sensors.md says.")
+        raise DatasetError(
+            f"Calibration {path} has no 'key: value' lines; write it as described in docs/own-sensors.md."
+        )
     return ours.read(content, path)
 
 
 def names_cameras(path: Path) -> bool:
-    """Whether a file is of a kind that holds several cameras, of which one has to be named.
+    """Whether a file is of a kind with several cameras, of which one has to be selected.
 
     Raises:
         DatasetError: it cannot be read.

@@ -1,7 +1,7 @@
-"""ROS's ``camera_info``: as ``camera_calibration`` writes it, and as ``topic echo`` of ROS 1 and 2 prints it.
+"""ROS's ``camera_info``, as written by ``camera_calibration`` or printed by ``topic echo`` of ROS 1 and 2.
 
-Its matrix ``K`` and lens are of the pictures as they are taken (``image_raw``); ``P`` is the matrix of those that
-``image_proc`` rectified by it. Keys of our own for the extrinsic may stand beside.
+Its matrix ``K`` and lens belong to the raw images (``image_raw``); ``P`` is the matrix of those that
+``image_proc`` rectified. It may also contain our own keys for the extrinsic.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NAMES = {
 
 
 def is_known(content: Any) -> bool:
-    """Whether it is a ``camera_info``."""
+    """Whether the content is of a ``camera_info``."""
     if not isinstance(content, Mapping):
         return False
     calibrated = "image_width" in content and isinstance(content.get("camera_matrix"), Mapping)
@@ -33,36 +33,37 @@ def is_known(content: Any) -> bool:
 
 
 def read(content: Mapping[Any, Any], path: Path) -> CalibrationFile:
-    """Read its camera, and the extrinsic that may stand beside.
+    """Read its camera, and the extrinsic if given.
 
     Raises:
-        DatasetError: it is incomplete, or is of pictures that were binned or cut.
+        DatasetError: it is incomplete, or belongs to images that were binned or cropped.
     """
     return CalibrationFile("ROS's camera_info", camera(content, path), values.extrinsic(content, path))
 
 
 def camera(content: Mapping[Any, Any], path: Path, rectified: bool = False) -> CameraModel:
-    """The camera of the pictures.
+    """The camera of the images.
 
     Args:
-        content: of the file or message.
-        path: of the file.
-        rectified: whether the pictures were rectified already, so that they have the matrix ``P`` and no distortion.
+        content: content of the file or message.
+        path: path of the file.
+        rectified: whether the images are already rectified, so that they have the matrix ``P`` and no distortion.
 
     Raises:
-        DatasetError: it is incomplete, or is of pictures that were binned or cut.
+        DatasetError: it is incomplete, or belongs to images that were binned or cropped.
     """
     found = {what: next((key for key in keys if key in content), None) for what, keys in NAMES.items()}
     for what, key in found.items():
         if key is None:
-            raise DatasetError(f"Calibration {path}: this camera_info has no {NAMES[what][0]}; write it out again.")
+            raise DatasetError(f"Calibration {path}: this camera_info has no {NAMES[what][0]}; export it again.")
     roi = content.get("roi") or {}
     cut = [key for key in ("binning_x", "binning_y") if content.get(key) not in (None, 0, 1)]
     cut += [f"roi.{key}" for key in ("x_offset", "y_offset") if isinstance(roi, Mapping) and roi.get(key)]
     if cut:
         raise DatasetError(
-            f"Calibration {path}: this camera_info is of pictures that were cut or binned ({', '.join(cut)}); give the "
-            "camera matrix of the pictures as they are, with these at 0."
+            f"Calibration {path}: this camera_info belongs to images that were cropped or binned ({', '.join(cut)}); "
+            "give the "
+            "camera matrix of the images as stored, and set these to 0."
         )
 
     def value(what: str) -> Any:
@@ -75,13 +76,13 @@ def camera(content: Mapping[Any, Any], path: Path, rectified: bool = False) -> C
     matrix = values.numbers(value("matrix"), str(found["matrix"]), path, (3, 3))
     if not matrix.any():
         raise DatasetError(
-            f"Calibration {path}: the camera matrix is zero, as drivers write it of a camera that nobody calibrated; "
+            f"Calibration {path}: the camera matrix is zero, which drivers write for an uncalibrated camera; "
             "calibrate it, and give its calibration file."
         )
     taken = values.camera(size, matrix, model, value("coefficients"), path, str(found["coefficients"]))
     if rectified and not taken.is_pinhole:
         raise DatasetError(
-            f"Calibration {path}: the pictures are rectified, and this camera_info lacks their matrix P; take those "
-            "that were not, or give a calibration file of these."
+            f"Calibration {path}: the images are rectified, but this camera_info has no matrix P; use the raw "
+            "images, or give a calibration file of the rectified ones."
         )
     return taken

@@ -1,4 +1,4 @@
-"""The text of a calibration file as nested mappings, lists and numbers: YAML, JSON, XML, and OpenCV's kind of each."""
+"""Parses calibration files to nested mappings, lists and numbers: YAML, JSON, XML, and OpenCV's dialects of these."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from calibnet.errors import DatasetError
 from calibnet.runtime.reading import parse_json, parse_yaml, read_text
 
 OPENCV_YAML, OPENCV_TAG = "%YAML:1.0", "!!opencv-matrix"
-"""Before version 3 OpenCV put no space behind a key."""
+"""First line of OpenCV's YAML, which before version 3 has no space after a key, and its tag of a matrix."""
 END_OF_MESSAGE = re.compile(r"^---[ \t]*$", re.MULTILINE)
-"""ROS's ``topic echo`` prints it behind every message."""
+"""Line that ROS's ``topic echo`` prints after every message."""
 MOST_MESSAGES = 100
 REMEDY = (
-    "write width, height, camera_matrix, distortion and camera_from_lidar there, or give the file of another tool "
+    "write width, height, camera_matrix, distortion and camera_from_lidar to it, or give the file of another tool "
     "(docs/own-sensors.md)"
 )
 
 
 class Parsed(NamedTuple):
-    """The content, and whether OpenCV's ``FileStorage`` wrote it."""
+    """The content, and whether it was written by OpenCV's ``FileStorage``."""
 
     content: Any
     is_opencv: bool
@@ -34,7 +34,7 @@ def parse(path: Path) -> Parsed:
     """Read and parse a file.
 
     Raises:
-        DatasetError: it cannot be read, is none of these languages, or says a key twice.
+        DatasetError: it cannot be read, is in another language, or has a key twice.
     """
     text = read_text(path, "Calibration", remedy=REMEDY)
     start = text.lstrip()
@@ -53,14 +53,14 @@ def parse(path: Path) -> Parsed:
         if start.startswith("{"):
             return Parsed(parse_json(text), "opencv-matrix" in text)
     except ValueError:
-        pass  # a mapping of YAML in braces, perhaps
+        pass  # it may be a YAML mapping in braces
     is_opencv = start.startswith(OPENCV_YAML) or OPENCV_TAG in text
     if start.startswith(OPENCV_YAML):
         text = re.sub(r"^([ \t]*\w+):(?=\S)", r"\1: ", text, flags=re.MULTILINE)
-    text = re.sub(r"\A\s*%YAML.*", "", text)  # a directive, which has no document of its own
+    text = re.sub(r"\A\s*%YAML.*", "", text)  # the directive is not followed by a document marker
     parts = [part for part in re.split(END_OF_MESSAGE, text.replace(OPENCV_TAG, "")) if part.strip()]
     if len(parts) > MOST_MESSAGES:
-        raise DatasetError(f"Calibration {path} holds {len(parts)} messages, with --- between them; one is enough.")
+        raise DatasetError(f"Calibration {path} has {len(parts)} messages separated by ---; keep one.")
     try:
         messages = [parse_yaml(part) for part in parts]
     except ValueError as problem:
@@ -69,10 +69,10 @@ def parse(path: Path) -> Parsed:
 
 
 def _joined(messages: list[Any], path: Path) -> Any:
-    """One content of what ``topic echo`` printed: several messages that say the same, or each some transforms.
+    """Join the messages printed by ``topic echo``: equal ones, or several with transforms.
 
     Raises:
-        DatasetError: they say different things.
+        DatasetError: they contradict each other.
     """
     if len(messages) <= 1:
         return messages[0] if messages else None
@@ -80,13 +80,13 @@ def _joined(messages: list[Any], path: Path) -> Any:
         return {"transforms": [transform for one in messages for transform in one["transforms"]]}
     if any(_said(one) != _said(messages[0]) for one in messages):
         raise DatasetError(
-            f"Calibration {path} holds {len(messages)} messages that differ, with --- between them; keep the right one."
+            f"Calibration {path} has {len(messages)} different messages separated by ---; keep the right one."
         )
     return messages[0]
 
 
 def _said(message: Any) -> Any:
-    """What a message says, but when and of which picture."""
+    """A message without its header."""
     return {key: message[key] for key in message if key != "header"} if isinstance(message, Mapping) else message
 
 

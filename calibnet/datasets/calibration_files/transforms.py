@@ -1,4 +1,4 @@
-"""Lists of transforms between frames: ``/tf_static`` as ``topic echo`` prints it or by hand, and Autoware's."""
+"""Lists of transforms between frames: ``/tf_static`` as printed by ``topic echo`` or by hand, and Autoware's files."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ CHILDREN = ("child", "child_frame", "child_frame_id")
 
 
 def is_list(content: Any) -> bool:
-    """Whether it is a list of transforms."""
+    """Whether the content is a list of transforms."""
     items = _items(content)
     return bool(items) and all(isinstance(item, Mapping) and any(key in item for key in CHILDREN) for item in items)
 
 
 def read_list(content: Any, path: Path, wanted: Wanted) -> CalibrationFile:
-    """The extrinsic out of a list of ``parent``, ``child``, ``translation`` and ``rotation`` or ``transform``.
+    """The extrinsic from a list of ``parent``, ``child``, ``translation`` and ``rotation``, or ``transform``.
 
-    A quaternion's order is told by its keys x, y, z, w; four bare numbers are refused.
+    A quaternion needs the keys x, y, z, w; four numbers without names are refused.
 
     Raises:
-        DatasetError: an item is malformed, or the frames do not lead from the LiDAR to the camera.
+        DatasetError: an item is malformed, or the frames do not connect the LiDAR with the camera.
     """
     links = [_link(item, number, path) for number, item in enumerate(_items(content), start=1)]
     return CalibrationFile("a list of transforms", None, camera_from_lidar(links, wanted.frames, path))
 
 
 def is_autoware(content: Any) -> bool:
-    """Whether it is Autoware's ``sensors_calibration.yaml`` or ``sensor_kit_calibration.yaml``."""
+    """Whether the content is of Autoware's ``sensors_calibration.yaml`` or ``sensor_kit_calibration.yaml``."""
     if not isinstance(content, Mapping) or not content:
         return False
     children = [child for parent in content.values() if isinstance(parent, Mapping) for child in parent.values()]
@@ -47,10 +47,10 @@ def is_autoware(content: Any) -> bool:
 
 
 def read_autoware(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationFile:
-    """The extrinsic out of frames in frames, each with x, y, z in metres and roll, pitch, yaw in radians.
+    """The extrinsic from nested frames, each with x, y, z in metres and roll, pitch, yaw in radians.
 
-    Autoware's frames of a camera stand like a body (x forward); the image's frame hangs on them as
-    ``..._optical_link``, by the quarter turns that its vehicle descriptions give it.
+    Autoware's camera frames are body frames (x forward); the optical frame ``..._optical_link`` is their child, by the
+    rotation in Autoware's vehicle descriptions.
     """
     links = []
     for parent, children in content.items():

@@ -1,7 +1,7 @@
-"""Keys of a ``calibration.yaml`` that mean geometry elsewhere and are not read here: named, never passed over.
+"""Finds keys of a ``calibration.yaml`` that mean geometry in other tools but are not read here.
 
-Other tools write the same facts under other names (`camera_info` of ROS, Kalibr, OpenCV). Whoever gives
-``dist_coeffs`` has a lens that bends lines; a file read without it would calibrate another camera.
+Other tools use other names for the same values (`camera_info` of ROS, Kalibr, OpenCV). If ``dist_coeffs`` were ignored,
+for instance, a camera without its distortion would be calibrated.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ MATRIX = "'camera_matrix' as [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
 LENS = "'distortion_model' and 'distortion', for instance plumb_bob with OpenCV's k1, k2, p1, p2, k3"
 EXTRINSIC = "'camera_from_lidar' as the 4x4 matrix that maps LiDAR points into the camera, in metres"
 INVERSE = "its inverse as 'camera_from_lidar'"
-RECTIFIED = "rectified pictures with the 'camera_matrix' they then have"
-WHOLE = "the 'camera_matrix' of the pictures as they are stored"
+RECTIFIED = "rectified images with their 'camera_matrix'"
+WHOLE = "the 'camera_matrix' of the images as stored"
 STRAIGHT = "'distortion_model' as one of plumb_bob, rational_polynomial, equidistant, omnidirectional, double_sphere"
 
 _CAM, _LIDAR = r"(camera|cam|image)\d*", r"(lidar|velodyne|velo|laser|livox|ouster|hesai|pandar|ldr)\d*"
@@ -51,35 +51,36 @@ NAMES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (EXTRINSIC, (r"t|tf|tr|rt|pose|transform\w*", rf"t({_CAM}|{_LIDAR}|bs|body|imu|base|ic|vehicle)\w*")),
     (EXTRINSIC, (r"r|q|[tq][wxyz]|[rt]vecs?|rpy|roll|pitch|yaw|euler", r"(rot|trans)(ation|lation)?s?|quaternions?")),
 )  # fmt: skip
-"""What is right, instead of names such as these, in lower case and without ``_``; the first that fits counts."""
+"""The right keys instead of names that match these patterns, in lower case and without ``_``; the first match
+counts."""
 
 LENSES_READ = re.compile(
     r"plumbbob|radtan|radialtangential|rational(polynomial)?|brown(conrady)?|opencv|"
     r"none|pinhole|perspective|rectified|undistorted|linear"
 )
-"""Values of ``distortion_model`` that say no more than OpenCV's coefficients do."""
+"""Values of ``distortion_model`` for which OpenCV's coefficients suffice."""
 OTHER_LENSES = re.compile(
     r"fish|equi|omni|unified|doublesphere|kannala|brandt|spher|panoram|scaramuzza|ocam|catadioptric|thinprism|division|"
     r"cylind|^(mei|e?ucm|ds|kb\d?|fov|atan|ftheta)$"
 )
-"""How a lens that they do not fit is called."""
+"""Names of lenses that OpenCV's coefficients do not describe."""
 MODEL = re.compile(r"(camera|lens|distortion|projection|dist|cam|intrinsics?)?(model|type)|lens")
-"""Keys whose value may name one, beside the makers and marks that it names."""
+"""Keys whose value may name a lens model rather than a maker."""
 
 
 class Unread(NamedTuple):
-    """A key, where it stands (``cam0.intrinsics``), and what is right instead."""
+    """A key with its parents (``cam0.intrinsics``), and the right key instead."""
 
     key: str
     remedy: str
 
 
 def unread_geometry(content: Mapping[Any, Any], parent: str = "") -> list[Unread]:
-    """What a calibration file says of the geometry that reading it would miss; nothing for most files.
+    """The geometry in a calibration file that would be ignored; empty for most files.
 
     Args:
-        content: of the file, or of a key in it.
-        parent: that key and a dot.
+        content: content of the file, or of a key in it.
+        parent: name of that key and a dot.
     """
     found = []
     lens_is_said = not parent and bool(content.get("distortion_model"))
@@ -100,7 +101,7 @@ def unread_geometry(content: Mapping[Any, Any], parent: str = "") -> list[Unread
 
 
 def in_words(unread: Sequence[Unread]) -> str:
-    """The keys and what is right instead of each, as the end of a sentence."""
+    """The keys and the right ones instead, as the end of a sentence."""
     keys: dict[str, list[str]] = {}
     for key, remedy in unread:
         keys.setdefault(remedy, []).append(f"'{key}'")
@@ -108,7 +109,7 @@ def in_words(unread: Sequence[Unread]) -> str:
 
 
 def _is_read(name: str, model: str) -> bool:
-    """Whether pictures of a lens of this name are straight once OpenCV's coefficients are undone."""
+    """Whether OpenCV's coefficients describe a lens of this name."""
     if name == "distortionmodel":
         return LENSES_READ.fullmatch(_plain(model)) is not None
     return not OTHER_LENSES.search(_plain(model))
@@ -120,14 +121,14 @@ def _remedy(name: str, value: object) -> str | None:
 
 
 def _says_nothing(value: object) -> bool:
-    """Whether a value is empty, zero or no, as are all that it holds: then it changes nothing."""
+    """Whether a value and everything in it is empty, zero or false, and so has no effect."""
     if isinstance(value, Mapping):
         return all(map(_says_nothing, value.values()))
     return value is None or (isinstance(value, bool | int | float | str | list) and not value)
 
 
 def _is_matrix(value: object) -> bool:
-    """Whether a value is rows of numbers, as of a camera matrix, a projection or a transform."""
+    """Whether a value is a matrix of numbers, such as a camera matrix, a projection or a transform."""
     try:
         return np.array(value, dtype=np.float64).shape in {(3, 3), (3, 4), (4, 4)}
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""URDF, the description of a robot: its links are frames, and its fixed joints the transforms between them."""
+"""URDF, a robot's description, whose links are frames and whose fixed joints are the transforms between them."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from xml.etree.ElementTree import Element
 from calibnet.errors import DatasetError
 
 ROOTS = ("robot", "joint")
-"""Outermost elements: of a whole description, and of one joint to put into it, as our own export is."""
+"""Root elements of a whole description, and of a single joint, as in our own export."""
 
 
 def transforms_of(robot: Element, path: Path) -> dict[str, Any]:
-    """The fixed joints as `calibnet.datasets.calibration_files.transforms` reads a list of transforms.
+    """The fixed joints, as a list of transforms for `calibnet.datasets.calibration_files.transforms`.
 
-    Joints that move are left out: what hangs on one has no fixed place.
+    Moving joints are ignored, since their children have no fixed pose.
 
     Raises:
-        DatasetError: it is a xacro that was not expanded, or has no fixed joint.
+        DatasetError: it is an unexpanded xacro, or has no fixed joint.
     """
     found: list[dict[str, Any]] = []
     for joint in robot.iter("joint"):
@@ -32,5 +32,5 @@ def transforms_of(robot: Element, path: Path) -> dict[str, Any]:
     if any("xacro" in element.tag for element in robot.iter()) or any("$" in text for text in texts):
         raise DatasetError(f"Calibration {path} is a xacro; expand it: xacro {path.name} > robot.urdf.")
     if not found:
-        raise DatasetError(f"Calibration {path} is a URDF without fixed joints; give one that has camera and LiDAR.")
+        raise DatasetError(f"Calibration {path} is a URDF without fixed joints; give one with camera and LiDAR.")
     return {"transforms": found}

@@ -1,1 +1,1 @@
-"""Files of point clouds: `scans.read_scan` reads any of them, one module per format."""
+"""Files of point clouds, with one module per format; `scans.read_scan` reads all of them."""

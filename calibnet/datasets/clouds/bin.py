@@ -1,4 +1,4 @@
-"""``.bin`` clouds: float32 numbers, row by row, in a file that does not say how many make a row."""
+"""``.bin`` clouds: rows of float32 numbers, in a file that does not state the number of columns."""
 
 from __future__ import annotations
 
@@ -16,44 +16,46 @@ LAYOUTS: tuple[tuple[str, ...], ...] = (
     (*KITTI, "ring"),
     (*KITTI, "ring", "time"),
 )
-"""Those that are recognised, the usual one first: KITTI's, and nuScenes's of five columns among them."""
+"""Layouts that are recognised, the most common first; includes KITTI's, and nuScenes's with five columns."""
 FLOAT_BYTES = 4
-DECLARE = "say them in calibration.yaml, for instance 'cloud_columns: [x, y, z, intensity, ring]'"
+DECLARE = "name them in calibration.yaml, for instance 'cloud_columns: [x, y, z, intensity, ring]'"
 LEVELS = 32
-"""Classes of values, of equal numbers, that columns are told apart by."""
+"""Number of classes of values, of equal size, by which columns are distinguished."""
 ENOUGH_VALUES = 60_000
 FEWEST_VALUES = 400
-"""Below it nothing is recognised: the layout is taken to be KITTI's."""
+"""Smallest number of values for recognition; with fewer, the layout is taken to be KITTI's."""
 NEARLY = 0.97
-"""Share of the best layout's telling from which on a simpler one, or KITTI's, is as good."""
+"""Share of the best layout's information from which a simpler one, or KITTI's, is preferred."""
 CLEARLY = 0.8
-"""Share of it above which another layout is a rival."""
+"""Share of the best layout's information above which another layout makes it ambiguous."""
 SMALLEST, LARGEST, USUAL = 1e-9, 1e9, 0.4
-"""Sizes of the numbers of a scan but 0, and the share of such ones below which they are no whole numbers."""
+"""Range of magnitudes of a scan's numbers other than 0, and the share of such numbers below which they are not
+float32."""
 FARTHEST_M = 200_000.0
-"""Coordinates of a scan are smaller, in millimetres too; half a number read as one is mostly larger by far, or 0."""
+"""Largest coordinate of a scan, even in millimetres; half of a float64 read as float32 is mostly far larger, or 0."""
 
 
 def read_bin(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
     """Columns ``[N]`` by name.
 
-    Without a declared layout it is the one under which a number's column tells most of its size: x, y, z and intensity
-    are spread differently, and under another layout all columns mix. On 109 scans of all kinds of scanners, written
-    with 3 to 6 columns, in their order and shuffled, it is always the right one.
+    Without a declared layout, the one is chosen under which a number's column gives most information on its size: x, y,
+    z and intensity are distributed differently, and under a wrong layout all columns mix. On 109 scans of all kinds of
+    scanners, written with 3 to 6 columns, in order and shuffled, the right one was always chosen.
 
     Args:
-        data: of the file.
+        data: content of the file.
         layout: names of the columns; None to recognise them.
 
     Raises:
-        CloudError: the length fits no layout, or it cannot be told which one.
+        CloudError: the length fits no layout, or the layout is ambiguous.
     """
     if layout is None:
         layout = recognised(data)
     elif len(data) % (FLOAT_BYTES * len(layout)):
         raise CloudError(
-            f"its {len(data)} bytes are no whole rows of {len(layout)} columns ({', '.join(layout)}, as float32), so "
-            "it is truncated or the columns are others"
+            f"its {len(data)} bytes are not a whole number of rows of {len(layout)} columns ({', '.join(layout)}, as "
+            "float32), so "
+            "it is truncated or has other columns"
         )
     else:
         _check_declared(np.frombuffer(data, "<f4"), layout)
@@ -62,16 +64,17 @@ def read_bin(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
 
 
 def recognised(data: bytes) -> tuple[str, ...]:
-    """The layout of a file's rows.
+    """Recognise the layout of a file's rows.
 
     Raises:
-        CloudError: as of `read_bin`.
+        CloudError: as for `read_bin`.
     """
     fitting = [layout for layout in LAYOUTS if len(data) % (FLOAT_BYTES * len(layout)) == 0]
     if not fitting:
         _check_width(data)
         raise CloudError(
-            f"it is truncated, or not of float32, for {len(data)} bytes are no whole rows of 3 to 6 columns; {DECLARE}"
+            f"it is truncated or not of float32, since {len(data)} bytes are not a whole number of rows of 3 to 6 "
+            f"columns; {DECLARE}"
         )
     values = np.frombuffer(data, "<f4")
     if _halves_are_odd(values):
@@ -91,10 +94,10 @@ def recognised(data: bytes) -> tuple[str, ...]:
 
 
 def _check_declared(values: NDArray[np.float32], layout: tuple[str, ...]) -> None:
-    """Hold a declared layout against the numbers, which mix where there are more or fewer columns.
+    """Check a declared layout against the numbers, which mix if there are more or fewer columns.
 
     Raises:
-        CloudError: another number of columns tells much more of them.
+        CloudError: another number of columns fits much better.
     """
     if len(values) < FEWEST_VALUES:
         return
@@ -104,15 +107,15 @@ def _check_declared(values: NDArray[np.float32], layout: tuple[str, ...]) -> Non
     best = max(telling, key=lambda columns: telling[columns], default=0)
     if best and _telling(levels, len(layout)) < CLEARLY * telling[best]:
         raise CloudError(
-            f"cloud_columns names {len(layout)} columns ({', '.join(layout)}), and its numbers look like rows of {best}"
+            f"cloud_columns names {len(layout)} columns ({', '.join(layout)}), but its numbers look like rows of {best}"
         )
 
 
 def _check_width(data: bytes) -> None:
-    """Tell numbers of 8 bytes, which nothing here writes, by their sizes.
+    """Detect numbers of 8 bytes by their magnitudes.
 
     Raises:
-        CloudError: they are such.
+        CloudError: the numbers have 8 bytes.
     """
     with np.errstate(invalid="ignore"):
         values = np.abs(np.frombuffer(data[: len(data) // 8 * 8], "<f8"))
@@ -121,7 +124,7 @@ def _check_width(data: bytes) -> None:
 
 
 def _halves_are_odd(values: NDArray[np.float32]) -> bool:
-    """Whether every other number is 0 or none that a scan has, as the lower halves of larger numbers are."""
+    """Whether every other number is 0 or implausible, like the lower halves of float64 numbers."""
     pairs = values[: len(values) // 2 * 2].reshape(-1, 2)
     with np.errstate(invalid="ignore"):
         lower = np.abs(pairs[pairs.any(axis=1), 0])
@@ -130,7 +133,7 @@ def _halves_are_odd(values: NDArray[np.float32]) -> bool:
 
 
 def _levels(values: NDArray[np.float32]) -> NDArray[np.int64]:
-    """The class of each value: 0 of what is not finite, and 1 to `LEVELS` by size."""
+    """The class of each value: 0 if it is not finite, else 1 to `LEVELS` by size."""
     finite = np.isfinite(values)
     known = values[finite]
     levels = np.zeros(len(values), np.int64)
@@ -141,7 +144,7 @@ def _levels(values: NDArray[np.float32]) -> NDArray[np.int64]:
 
 
 def _telling(levels: NDArray[np.int64], columns: int) -> float:
-    """Mutual information, in nats, of a number's column and its size."""
+    """Mutual information of a number's column and its size, in nats."""
     levels = levels[: len(levels) // columns * columns]
     column = np.arange(len(levels)) % columns
     joint = np.bincount(column * (LEVELS + 1) + levels, minlength=columns * (LEVELS + 1)).reshape(columns, -1)
@@ -157,7 +160,7 @@ def _plausible(rows: NDArray[np.float32]) -> bool:
     positions = rows[:, :3]
     finite = np.isfinite(positions).all(axis=1)
     if not finite.any():
-        return True  # said elsewhere, in a sentence of its own
+        return True  # reported elsewhere
     return bool((np.abs(positions[finite]) < FARTHEST_M).mean() > 0.99)
 
 

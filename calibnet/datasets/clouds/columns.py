@@ -1,4 +1,4 @@
-"""A cloud as named columns of numbers, cut from bytes that are held against what a header promises."""
+"""Clouds as named columns of numbers, read from bytes that are checked against the header."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from calibnet.runtime.reading import MEGABYTE
 
 MOST_POINTS = 16_000_000
-"""Points of one scan; a scanner gives 300,000 a turn."""
+"""Largest number of points of a scan; scanners have up to 300,000 per turn."""
 MOST_COLUMNS = 256
 LONGEST_ROW, LONGEST_LINE = 4096, 64 * 1024
-"""Bytes of one point, binary and as text."""
+"""Largest number of bytes of a point, in binary and as text."""
 LONGEST_WORD = 64
-"""Characters of a number in a text file that are read."""
+"""Largest number of characters of a number in a text file."""
 MOST_BYTES = 256 * MEGABYTE
-"""Largest scan, in its file and unpacked."""
+"""Largest size of a scan, in its file and unpacked."""
 Columns = dict[str, NDArray[np.generic]]
-"""Values ``[N]`` by name, in lower case; of a name given twice the first counts."""
+"""Values ``[N]`` by name in lower case; of two columns with the same name the first counts."""
 
 
 INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity", "scalar_reflectance", "i")
@@ -30,17 +30,17 @@ INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity
 
 
 class CloudError(ValueError):
-    """What is wrong with a cloud, in words that continue a sentence; after a semicolon what to do, if that is known."""
+    """An error in a cloud, in words that continue a sentence; what to do follows after a semicolon, if known."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """One value of a point, or ``count`` of them.
+    """One value of a point, or several.
 
     Attributes:
-        name: in lower case.
-        dtype: of one value.
-        count: values; only single ones are kept, the others are padding or descriptors.
+        name: name in lower case.
+        dtype: type of one value.
+        count: number of values; only single ones are kept, since others are padding or descriptors.
     """
 
     name: str
@@ -49,35 +49,35 @@ class Column:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return self.dtype.itemsize * self.count
 
 
 def check_table(columns: Sequence[Column], points: int) -> None:
-    """Hold the layout that a header promises against what a scan can be.
+    """Check that the layout in a header is plausible for a scan.
 
     Raises:
-        CloudError: it is nothing of the kind.
+        CloudError: it is not.
     """
     if not 0 < len(columns) <= MOST_COLUMNS or any(column.count < 1 for column in columns):
         raise CloudError(f"its header names {len(columns)} columns")
     if sum(column.size for column in columns) > LONGEST_ROW:
-        raise CloudError(f"its header promises points of more than {LONGEST_ROW} bytes")
+        raise CloudError(f"its header states points of more than {LONGEST_ROW} bytes")
     if not 0 <= points <= MOST_POINTS:
-        raise CloudError(f"its header promises {_few(points)} points, and {MOST_POINTS:,} are the most that are read")
+        raise CloudError(f"its header states {_few(points)} points, but at most {MOST_POINTS:,} are read")
 
 
 def from_rows(data: memoryview, columns: Sequence[Column], points: int, alone: bool = True) -> Columns:
-    """Binary data, point after point.
+    """Read binary data, point by point.
 
     Args:
-        data: what follows the header.
-        columns: of the table.
-        points: that the header promises.
-        alone: nothing else may follow.
+        data: bytes after the header.
+        columns: columns of the table.
+        points: number of points in the header.
+        alone: whether nothing else may follow.
 
     Raises:
-        CloudError: there are fewer bytes than promised, or more.
+        CloudError: there are fewer or more bytes than stated.
     """
     check_table(columns, points)
     row = sum(column.size for column in columns)
@@ -97,7 +97,7 @@ def from_rows(data: memoryview, columns: Sequence[Column], points: int, alone: b
 
 
 def from_columns(data: bytearray, columns: Sequence[Column], points: int) -> Columns:
-    """Binary data, column after column, as a compressed ``.pcd`` has it; its length is right already."""
+    """Read binary data of the right length, column by column, as in a compressed ``.pcd``."""
     ends = np.cumsum([0, *(column.size * points for column in columns)])
     return {
         name: np.frombuffer(data, columns[place].dtype, points, int(ends[place]))
@@ -106,10 +106,10 @@ def from_columns(data: bytearray, columns: Sequence[Column], points: int) -> Col
 
 
 def from_text(data: bytes, columns: Sequence[Column], points: int, alone: bool = True) -> Columns:
-    """Text, one point a line; empty lines do not count.
+    """Read text with one point per line, ignoring empty lines.
 
     Raises:
-        CloudError: a line is missing, too many, too short or too long, or holds a word.
+        CloudError: there are too few or too many lines, or a line has too few or too many numbers, or a word.
     """
     check_table(columns, points)
     width = sum(column.count for column in columns)
@@ -126,36 +126,36 @@ def from_text(data: bytes, columns: Sequence[Column], points: int, alone: bool =
             try:
                 values.append(float(words[place][:LONGEST_WORD]))
             except ValueError:
-                raise CloudError(f"point {number:,} has a {name[:40]!r} that is no number") from None
+                raise CloudError(f"point {number:,} has a {name[:40]!r} that is not a number") from None
     check_length(number + len(file.read().split(b"\n", 2)) - 1, points, points, alone)
     return {name: np.frombuffer(values, np.float64) for name, _, values in kept}
 
 
 def check_length(found: int, promised: int, points: int, alone: bool) -> None:
-    """Hold an amount of data against what a header promises; a few bytes too many are no damage.
+    """Check an amount of data against the header; a few bytes too many are allowed.
 
     Raises:
         CloudError: it is less, or much more.
     """
     if found < promised:
-        raise CloudError(f"it is truncated, its header promises {points:,} points")
+        raise CloudError(f"it is truncated: its header states {points:,} points")
     if alone and found > promised + max(promised // max(points, 1), 1):
-        raise CloudError(f"it holds more than the {points:,} points that its header promises")
+        raise CloudError(f"it has more than the {points:,} points in its header")
 
 
 def whole_number(text: str) -> int:
-    """A count of a header.
+    """A count in a header.
 
     Raises:
-        CloudError: it is none.
+        CloudError: it is not a whole number.
     """
     if not (text.isascii() and text.isdecimal()):
-        raise CloudError(f"its header says {text[:40]!r} where a whole number should be")
+        raise CloudError(f"its header has {text[:40]!r} instead of a whole number")
     return int(text[:20])
 
 
 def _single(columns: Sequence[Column]) -> dict[str, int]:
-    """Places of the columns with one value, by name."""
+    """Indices of the columns with a single value, by name."""
     places: dict[str, int] = {}
     for place, column in enumerate(columns):
         if column.count == 1:
@@ -168,13 +168,13 @@ def _few(number: int) -> str:
 
 
 def points_of(columns: Columns) -> NDArray[np.float32]:
-    """``[N, 4]`` of columns by name; intensity 0 where there is none.
+    """Points ``[N, 4]`` from columns by name, with intensity 0 if there is none.
 
     Raises:
         CloudError: a coordinate is missing.
     """
     if missing := [axis for axis in "xyz" if axis not in columns]:
-        raise CloudError(f"it has no column {', '.join(missing)}, only {', '.join(columns) or 'none'}")
+        raise CloudError(f"it has no column {', '.join(missing)} (its columns: {', '.join(columns) or 'none'})")
     intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
     return joined(columns["x"], columns["y"], columns["z"], intensity)
 
@@ -182,9 +182,9 @@ def points_of(columns: Columns) -> NDArray[np.float32]:
 def joined(
     x: NDArray[np.generic], y: NDArray[np.generic], z: NDArray[np.generic], intensity: NDArray[np.generic] | None
 ) -> NDArray[np.float32]:
-    """``[N, 4]`` of single columns; without an intensity that is 0."""
+    """Points ``[N, 4]`` from single columns, with intensity 0 if there is none."""
     points = np.zeros((len(x), 4), np.float32)
-    with np.errstate(over="ignore"):  # what is too large becomes infinite, and is dropped as such
+    with np.errstate(over="ignore"):  # too large values become infinite, and are dropped
         for place, values in enumerate((x, y, z) if intensity is None else (x, y, z, intensity)):
             points[:, place] = values
     return points

@@ -1,4 +1,4 @@
-"""Clouds as NumPy saves them: ``.npy``, also with named fields as ``ros_numpy`` makes them, and ``.npz``."""
+"""NumPy's files of clouds: ``.npy``, also with named fields as made by ``ros_numpy``, and ``.npz``."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def read_npy(data: bytes) -> NDArray[np.float32]:
     """Points ``[N, 4]`` of an array ``[N, 3]`` or wider, or of one with fields x, y, z, intensity.
 
     Raises:
-        CloudError: it is something else, or damaged.
+        CloudError: it has another form, or is damaged.
     """
     return _points(read_array(data))
 
 
 def read_npz(data: bytes) -> NDArray[np.float32]:
-    """Points ``[N, 4]`` of the only array that can be some, or of arrays called x, y, z and intensity.
+    """Points ``[N, 4]`` of the only array of a suitable shape, or of arrays called x, y, z and intensity.
 
     Raises:
-        CloudError: there is none, or several; or the file is damaged, or would unpack to more than a scan can be.
+        CloudError: there is none or several, the file is damaged, or it would unpack to more than a scan can have.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as file:
@@ -43,19 +43,19 @@ def read_npz(data: bytes) -> NDArray[np.float32]:
     }
     if set("xyz") <= columns.keys():
         if len({len(column) for name, column in columns.items() if len(name) == 1}) > 1:
-            raise CloudError("its x, y and z are of different lengths")
+            raise CloudError("its x, y and z have different lengths")
         return points_of({name: column for name, column in columns.items() if len(column) == len(columns["x"])})
     tables = [
         name for name, array in arrays.items() if array.dtype.names or (array.ndim == 2 and 3 <= array.shape[1] <= 16)
     ]
     if len(tables) != 1:
         held = ", ".join(f"{name[:40]} {array.shape}" for name, array in list(arrays.items())[:6]) or "none"
-        raise CloudError(f"of its arrays ({held}) not one alone is [N, 4]; save the points as the only one")
+        raise CloudError(f"it does not have exactly one array [N, 4] among {held}; save only the points")
     return _points(arrays[tables[0]])
 
 
 def _arrays(file: zipfile.ZipFile) -> Iterator[tuple[str, NDArray[np.generic]]]:
-    """The arrays of numbers in an archive, which unpack to no more than a scan can be."""
+    """The arrays of numbers in an archive, whose unpacked size is checked."""
     entries = file.infolist()
     if len(entries) > MOST_COLUMNS or sum(entry.file_size for entry in entries) > MOST_BYTES:
         raise CloudError(f"it would unpack to more than {MOST_BYTES >> 20} MB")
@@ -65,7 +65,7 @@ def _arrays(file: zipfile.ZipFile) -> Iterator[tuple[str, NDArray[np.generic]]]:
         try:
             yield entry.filename.removesuffix(".npy"), read_array(data)
         except CloudError:
-            continue  # text, or objects, beside the points
+            continue  # ignore text and objects beside the points
 
 
 def _points(array: NDArray[Any]) -> NDArray[np.float32]:
@@ -73,34 +73,34 @@ def _points(array: NDArray[Any]) -> NDArray[np.float32]:
         fields = {name: np.asarray(array[name]).ravel() for name in array.dtype.names}
         return points_of({name.lower(): field for name, field in fields.items() if field.size == array.size})
     if array.ndim == 2 and 3 <= array.shape[0] <= 8 and array.shape[1] > 8:
-        raise CloudError(f"it is an array {array.shape}, which seems to be transposed; save [N, 4], a point a row")
+        raise CloudError(f"it is an array {array.shape}, which seems to be transposed; save [N, 4], one point per row")
     if array.ndim != 2 or array.shape[1] < 3:
-        raise CloudError(f"it is an array {array.shape} of {array.dtype} and not [N, 4] numbers: x, y, z, intensity")
+        raise CloudError(f"it is an array {array.shape} of {array.dtype} instead of [N, 4] numbers: x, y, z, intensity")
     x, y, z = array[:, 0], array[:, 1], array[:, 2]
     return joined(x, y, z, array[:, 3] if array.shape[1] > 3 else None)
 
 
 def read_array(data: bytes) -> NDArray[np.generic]:
-    """The array of a ``.npy`` file; its header is held against its bytes before anything is allocated.
+    """The array of a ``.npy`` file, whose header is checked against its size before anything is allocated.
 
     Raises:
-        CloudError: it is no such file, or has another length.
+        CloudError: it is not such a file, or has another length.
     """
     file = io.BytesIO(data)
     try:
         version = npy.read_magic(file)
         read_header = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that Python 2 wrote it
+            warnings.simplefilter("ignore")  # about files of Python 2
             shape, by_column, dtype = read_header(file)
-    except Exception:  # the header is a Python literal, and fails in as many ways
+    except Exception:  # the header is a Python literal, which can fail in many ways
         raise CloudError("it is truncated or not a .npy array") from None
     length, promised = len(data) - file.tell(), math.prod(shape) * dtype.itemsize
     if dtype.hasobject:
-        raise CloudError("it holds Python objects, which are not opened; save an array [N, 4] of numbers")
+        raise CloudError("it contains Python objects, which are not read; save an array [N, 4] of numbers")
     if dtype.kind not in "fiu" and not dtype.names:
         raise CloudError(f"it is an array of {str(dtype)[:40]}; save an array [N, 4] of numbers")
     if any(side < 0 for side in shape) or length != promised:
         what = f"an array {str(shape)[:60]} of {str(dtype)[:40]}"
-        raise CloudError(f"its header promises {what}, of {promised} bytes, and it holds {length}")
+        raise CloudError(f"its header states {what} of {promised} bytes, but it has {length}")
     return np.frombuffer(data, dtype, offset=file.tell()).reshape(shape, order="F" if by_column else "C")

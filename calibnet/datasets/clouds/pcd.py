@@ -1,6 +1,6 @@
-"""Point clouds as PCL and ROS write them: ``.pcd`` as text, binary, and compressed by LZF.
+"""Point clouds of PCL and ROS: ``.pcd`` as text, binary, and compressed by LZF.
 
-Read here and by no native library: of a header that promises what the bytes do not hold, those read past the end.
+Read without a native library, since these read past the end of the file if the header states too much.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ DTYPES = {
     **{("U", size): np.dtype(f"<u{size}") for size in (1, 2, 4, 8)},
 }
 PADDING = "_"
-"""Name of what only fills a row; compressed data leaves it out."""
+"""Name of padding fields, which compressed data leaves out."""
 STANDING = "0 0 0 1 0 0 0"
 STANDS = 1e-3
-"""Metres, and radians over two, that are no pose."""
+"""Largest deviation of a viewpoint from the identity, in metres and in half radians."""
 COMPRESSED_SIZES = struct.Struct("<II")
-"""Bytes of the compressed data that follow, and of what they hold."""
+"""Compressed and uncompressed size of the data that follows."""
 
 
 def read_pcd(data: bytes) -> Columns:
     """The columns of a ``.pcd`` file.
 
     Raises:
-        CloudError: the header cannot be read, or the data is not what it promises.
+        CloudError: the header cannot be read, or the data does not match it.
     """
     header, start = _header(data)
     _check_viewpoint(header.get("VIEWPOINT", []))
@@ -54,17 +54,17 @@ def read_pcd(data: bytes) -> Columns:
         return from_rows(memoryview(data)[start:], columns, points)
     if form == "binary_compressed":
         return _compressed(data[start:], columns, points)
-    raise CloudError(f"its header says DATA {form[:40]!r}, which is none of ascii, binary and binary_compressed")
+    raise CloudError(f"its header has DATA {form[:40]!r} instead of ascii, binary or binary_compressed")
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
-    """Words of every line by their first one, and where the data begins."""
+    """Words of every header line by the first one, and the offset of the data."""
     header: dict[str, list[str]] = {}
     start = 0
     while "DATA" not in header:
         end = data.find(b"\n", start, HEADER_BYTES)
         if end < 0:
-            raise CloudError("it has no PCD header that can be read")
+            raise CloudError("it has no valid PCD header")
         words = data[start:end].decode("ascii", "replace").split()
         start = end + 1
         if words and not words[0].startswith("#"):
@@ -73,13 +73,13 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
 
 
 def _check_viewpoint(words: list[str]) -> None:
-    """See that no pose stands between the points and the LiDAR's frame.
+    """Check that there is no pose between the points and the LiDAR's frame.
 
-    PCL's viewer takes the points to be in the frame of that pose, others store them in the world and the LiDAR's place
-    there in it: which of them wrote a file, it does not say.
+    PCL's viewer takes the points to be in the frame of that pose, while other tools store them in world coordinates
+    together with the LiDAR's pose; the file does not say which.
 
     Raises:
-        CloudError: its position is not 0, 0, 0, or its quaternion (w first) turns.
+        CloudError: its position is not 0, 0, 0, or its quaternion (w first) is not the identity.
     """
     if words in ([], ["0"] * 7):
         return
@@ -91,13 +91,13 @@ def _check_viewpoint(words: list[str]) -> None:
     except ValueError:
         pass
     raise CloudError(
-        f"its header says VIEWPOINT {' '.join(words)[:80]}, and tools do not agree on whether its points are to be "
-        f"moved by that; give them as the LiDAR sees them, with VIEWPOINT {STANDING}"
+        f"its header has VIEWPOINT {' '.join(words)[:80]}, and tools do not agree on whether to apply it to the "
+        f"points; give points in the LiDAR's frame, with VIEWPOINT {STANDING}"
     )
 
 
 def _layout(header: dict[str, list[str]]) -> tuple[list[Column], int]:
-    """Columns and number of points."""
+    """Columns and number of points in the header."""
     names = [name.lower() for name in header.get("FIELDS", [])]
     sizes, kinds = header.get("SIZE", []), header.get("TYPE", [])
     counts = header.get("COUNT", ["1"] * len(names))
@@ -112,7 +112,7 @@ def _layout(header: dict[str, list[str]]) -> tuple[list[Column], int]:
     width, height = (whole_number(" ".join(header.get(key, ["1"]))) for key in ("WIDTH", "HEIGHT"))
     points = whole_number(header["POINTS"][0]) if header.get("POINTS") else width * height
     if "WIDTH" in header and points != width * height:
-        raise CloudError(f"its PCD header promises {points} points and {width} x {height} of them")
+        raise CloudError(f"its PCD header has {points} points but a size of {width} x {height}")
     check_table(columns, points)
     return columns, points
 
@@ -125,25 +125,25 @@ def _compressed(data: bytes, columns: list[Column], points: int) -> Columns:
     if unpacked == points * sum(column.size for column in columns):
         present = columns
     elif unpacked != points * sum(column.size for column in present):
-        raise CloudError(f"its {points:,} points are not what its compressed data says to hold ({unpacked:,} bytes)")
+        raise CloudError(f"its {points:,} points do not match the size of its compressed data ({unpacked:,} bytes)")
     if len(data) < COMPRESSED_SIZES.size + packed or unpacked > MOST_BYTES:
         raise CloudError(f"it is truncated, its header promises {points:,} points")
     return from_columns(unpack_lzf(data[COMPRESSED_SIZES.size :][:packed], unpacked), present, points)
 
 
 def unpack_lzf(data: bytes, size: int) -> bytearray:
-    """Undo LZF, the compression of PCL.
+    """Decompress LZF, the compression of PCL.
 
-    A control byte below 32 stands before one byte more than it says; another one for a copy of what was unpacked
-    before: its upper three bits, with a further byte where all are set, are the length minus 2, its lower five and the
-    byte after them how far back, minus 1.
+    A control byte below 32 precedes that many plus one literal bytes. Any other one is a copy of earlier output: its
+    upper three bits, plus a further byte if all are set, are the length minus 2; its lower five bits and the next byte
+    are the distance minus 1.
 
     Args:
-        data: compressed.
-        size: bytes that it holds.
+        data: compressed data.
+        size: uncompressed size in bytes.
 
     Raises:
-        CloudError: it is damaged, or holds another number of bytes.
+        CloudError: it is damaged, or has another size.
     """
     out = bytearray()
     place, end = 0, len(data)
@@ -167,7 +167,7 @@ def unpack_lzf(data: bytes, size: int) -> bytearray:
                 raise IndexError
             if back >= length:
                 out += out[start : start + length]
-            else:  # it overlaps itself: a pattern that repeats
+            else:  # overlapping copy, a repeating pattern
                 pattern = out[start:]
                 out += (pattern * (length // back + 1))[:length]
     except IndexError:

@@ -9,9 +9,9 @@ from calibnet.datasets.plausibility import Implausible
 from calibnet.geometry.visibility import is_accumulated
 
 NEAREST_M, FARTHEST_M = 0.5, 250.0
-"""Metres between which the median distance of a scan's points lies."""
+"""Range of the median distance of a scan's points, in metres."""
 FLAT = 0.4
-"""A scene is this much lower than it is wide, whatever it is; else z is not up."""
+"""Largest ratio of a scene's height to its width if z is up."""
 ENOUGH_POINTS = 10_000
 """Points of a scan that are looked at."""
 
@@ -22,7 +22,7 @@ def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
 
 
 def ranges(points: NDArray[np.float32]) -> Implausible | None:
-    """How far away the points are, in metres if all is well."""
+    """Check the distances of the points, which should be in metres."""
     middle = float(np.median(np.linalg.norm(some(points).astype(np.float64), axis=1)))
     if NEAREST_M <= middle <= FARTHEST_M:
         return None
@@ -36,7 +36,7 @@ def ranges(points: NDArray[np.float32]) -> Implausible | None:
 
 
 def up(points: NDArray[np.float32]) -> Implausible | None:
-    """Which axis of the scan is the vertical: the world is wider than high."""
+    """Check that z is the vertical axis, since the world is wider than high."""
     low, high = np.percentile(some(points), (10, 90), axis=0)
     spread = np.maximum(high - low, 1e-6)
     flattest = int(spread.argmin())
@@ -50,7 +50,7 @@ def up(points: NDArray[np.float32]) -> Implausible | None:
 
 
 def several(points: NDArray[np.float32]) -> Implausible | None:
-    """Whether the cloud is a map rather than a scan."""
+    """Check that the cloud is a scan rather than several."""
     if not is_accumulated(points):
         return None
     text = (
@@ -61,5 +61,5 @@ def several(points: NDArray[np.float32]) -> Implausible | None:
 
 
 def some(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Enough of the positions ``[N, 3]`` for a median."""
+    """A sample of the positions ``[N, 3]``, enough for a median."""
     return points[:: max(1, len(points) // ENOUGH_POINTS), :3]

@@ -1,4 +1,4 @@
-"""Reading LiDAR scans of any format (`SCAN_SUFFIXES`) as clean ``[N, 4]`` points."""
+"""Reads LiDAR scans of any format (`SCAN_SUFFIXES`) as clean ``[N, 4]`` points."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from calibnet.errors import DatasetError
 from calibnet.runtime.reading import read_file
 
 FARTHEST_M = 1e5
-"""Coordinates beyond are marks of points without a return, as NaN is."""
+"""Largest coordinate in metres; larger ones mark points without a return, like NaN."""
 
 INTENSITY_SCALES = (1.0, 255.0)
-"""Largest intensity of those that are stored as a share and as 8 bits. There is no such rule for wider ones."""
+"""Largest intensity if stored as a share or in 8 bits; there is no such rule for wider ones."""
 BRIGHT_SHARE = 0.99
-"""Share of the points whose intensity has to fit; what most of a wider one's points stay below counts as 1."""
+"""Share of the points whose intensity must be within a scale; for a wider one, their largest intensity becomes 1."""
 
 
 def read_scan(
@@ -34,8 +34,9 @@ def read_scan(
 
     Args:
         path: the file.
-        columns: of a ``.bin`` or of text, see `calibnet.datasets.clouds.bin.read_bin`; None to recognise them.
-        full_scale: intensity that counts as 1, see `full_scale_of`; None to judge by this scan alone.
+        columns: columns of a ``.bin`` or text file, see `calibnet.datasets.clouds.bin.read_bin`; None to recognise
+            them.
+        full_scale: intensity that becomes 1, see `full_scale_of`; None to find it from this scan alone.
 
     Returns:
         ``[N, 4]`` float32, N > 0, finite: x, y, z in metres and intensity 0..1 (0 where the file
@@ -48,10 +49,10 @@ def read_scan(
 
 
 def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.float32]:
-    """The points of a file ``[N, 4]`` as they are stored, intensity included; arguments and errors of `read_scan`."""
+    """The points of a file ``[N, 4]`` as stored, intensity included; arguments and errors are those of `read_scan`."""
     data = read_file(path, "Scan", MOST_BYTES)
     if not data:
-        raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame or copy the scan again.")
+        raise DatasetError(f"Scan {path} is empty (0 bytes); remove the frame, or copy the scan again.")
     try:
         suffix = ending(path, SCAN_SUFFIXES)
         if suffix in _BY_COLUMNS:
@@ -63,9 +64,9 @@ def read_raw(path: Path, columns: tuple[str, ...] | None = None) -> NDArray[np.f
 
 
 def full_scale_of(intensities: NDArray[np.floating]) -> float:
-    """The intensity that counts as 1, of many points' ``[N]``: 1 of shares, 255 of 8 bits, and else what is bright.
+    """The intensity that becomes 1, from those of many points ``[N]``: 1 for shares, 255 for 8 bits, else a bright one.
 
-    A reflector may shine beyond it, and a sensor of 16 bits hardly ever uses them.
+    Reflectors may exceed it, and a sensor of 16 bits hardly ever uses all of them.
     """
     known = intensities[np.isfinite(intensities)]
     bright = float(np.quantile(known, BRIGHT_SHARE, method="lower")) if len(known) else 0.0
@@ -73,7 +74,7 @@ def full_scale_of(intensities: NDArray[np.floating]) -> float:
 
 
 def clean_points(points: NDArray[np.floating], path: Path, full_scale: float | None = None) -> NDArray[np.float32]:
-    """Drop rows of ``[N, 4]`` that are no return, at no finite place or at 0, 0, 0, and bring intensity to 0..1.
+    """Drop points ``[N, 4]`` without a return (not finite, or at 0, 0, 0), and scale intensity to 0..1.
 
     An intensity that is not finite becomes 0.
 
@@ -86,8 +87,8 @@ def clean_points(points: NDArray[np.floating], path: Path, full_scale: float | N
     real = (np.abs(places) < FARTHEST_M).all(axis=1) & places.any(axis=1)  # false for NaN
     if not real.any() and (np.isfinite(places).all(axis=1) & places.any(axis=1)).any():
         raise DatasetError(
-            f"Scan {path}: its points are more than {FARTHEST_M / 1e3:.0f} km away, as those of a map are; give metres "
-            "from the LiDAR, as it stood when the picture was taken."
+            f"Scan {path}: its points are more than {FARTHEST_M / 1e3:.0f} km away, like those of a map; give metres "
+            "in the LiDAR's frame at the time of the image."
         )
     if not real.any():
         raise DatasetError(f"Scan {path} has no finite point (all NaN, infinite or 0, 0, 0); remove the frame.")
@@ -101,13 +102,13 @@ def clean_points(points: NDArray[np.floating], path: Path, full_scale: float | N
 
 
 def ending(path: Path, suffixes: Sequence[str]) -> str:
-    """The longest of some endings, in lower case, that a file's name has; empty for none."""
+    """The longest of some suffixes, in lower case, with which a file name ends; empty for none."""
     name = path.name.lower()
     return max((suffix for suffix in suffixes if name.endswith(suffix)), key=len, default="")
 
 
 def _table(read: Callable[[bytes], Columns]) -> Callable[[bytes], NDArray[np.float32]]:
-    """A reader of columns as a reader of points."""
+    """Make a reader of points from a reader of columns."""
     return lambda data: points_of(read(data))
 
 
@@ -126,6 +127,6 @@ _BY_COLUMNS: dict[str, Callable[[bytes, tuple[str, ...] | None], Columns]] = {
     **dict.fromkeys((".bin", ".pcd.bin"), read_bin),  # KITTI's and nuScenes's
     **dict.fromkeys(TEXT_SUFFIXES, read_text),
 }
-"""Those whose columns may have to be declared."""
+"""Readers of formats whose columns may have to be declared, by suffix."""
 SCAN_SUFFIXES = (*_BY_COLUMNS, *_READERS)
-"""The file endings that `read_scan` reads."""
+"""The file name suffixes that `read_scan` reads."""

@@ -1,4 +1,4 @@
-"""Clouds in files made for tables and surveys: Feather, Parquet, LAS and LAZ; what pyarrow reads of others."""
+"""Clouds in files for tables and surveys: Feather, Parquet, LAS and LAZ."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from calibnet.runtime.reading import MEGABYTE
 from calibnet.runtime.text import one_line
 
 LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
-"""Bytes of the header of LAS 1.2 and of 1.4, and of a point's position and intensity."""
+"""Sizes in bytes of the header of LAS 1.2 and 1.4, and of a point's position and intensity."""
 COMPRESSED = 128
-"""Formats of points from here on are compressed: LAZ."""
+"""Smallest number of a compressed point format (LAZ)."""
 LEAST_SECONDS, LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 3, 8, 60, 2048
-"""Limits of unpacking a scan: seconds of computing, of a small one and with one more for each megabyte at most; seconds
-in all on a busy machine; and memory besides its points. A megabyte of a good scan takes a tenth of a second."""
+"""Limits for unpacking a scan: CPU seconds for a small one, and at most, growing by one per megabyte; seconds in total
+on a busy machine; and megabytes of memory besides its points. A megabyte of a valid scan takes a tenth of a second."""
 UNPACK = """
 import io, resource, sys
 most, seconds = int(sys.argv[1]), int(sys.argv[2])
@@ -32,10 +32,10 @@ sys.stdout.buffer.write(laspy.read(io.BytesIO(sys.stdin.buffer.read())).points.a
 
 
 def read_feather(data: bytes) -> Columns:
-    """Columns of a Feather file, as Argoverse 2 has them.
+    """Columns of a Feather file, as in Argoverse 2.
 
     Raises:
-        CloudError: it is damaged, or holds too many points.
+        CloudError: it is damaged, or has too many points.
     """
     from pyarrow import feather
 
@@ -43,32 +43,32 @@ def read_feather(data: bytes) -> Columns:
 
 
 def read_parquet(data: bytes) -> Columns:
-    """Columns of a Parquet file; errors as of `read_feather`."""
+    """Columns of a Parquet file; raises as `read_feather` does."""
     from pyarrow import parquet
 
     return read_table(parquet.read_table, data)
 
 
 def read_las(data: bytes) -> Columns:
-    """x, y, z and intensity of a LAS file; a compressed one is unpacked apart, see `unpacked`.
+    """x, y, z and intensity of a LAS file; a compressed one is unpacked by another process, see `unpacked`.
 
     Raises:
-        CloudError: it is damaged, or holds too many points.
+        CloudError: it is damaged, or has too many points.
     """
     if len(data) < LAS_HEADER or data[:4] != b"LASF":
-        raise CloudError("it is truncated or no LAS file")
+        raise CloudError("it is truncated or not a LAS file")
     start, kind = struct.unpack_from("<I", data, 96)[0], data[104]
     length, count = struct.unpack_from("<HI", data, 105)
     if data[25] >= 4 and len(data) >= LAS_HEADER_1_4:
         (count,) = struct.unpack_from("<Q", data, 247)
     scales, offsets = (np.frombuffer(data, "<f8", 3, at) for at in (131, 155))
     if count > MOST_POINTS:
-        raise CloudError(f"its header promises {count:,} points, and {MOST_POINTS:,} are the most that are read")
+        raise CloudError(f"its header states {count:,} points, but at most {MOST_POINTS:,} are read")
     if not LAS_POINT <= length <= LONGEST_ROW or not LAS_HEADER <= start <= len(data):
         raise CloudError("its header is damaged")
     points = unpacked(data, count * length) if kind >= COMPRESSED else data[start : start + count * length]
     if len(points) < count * length:
-        raise CloudError(f"it is truncated, its header promises {count:,} points")
+        raise CloudError(f"it is truncated: its header states {count:,} points")
     layout = np.dtype({"names": ["xyz", "i"], "formats": [("<i4", 3), "<u2"], "offsets": [0, 12], "itemsize": length})
     table = np.frombuffer(points, layout, count)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -77,13 +77,13 @@ def read_las(data: bytes) -> Columns:
 
 
 def unpacked(data: bytes, most: int) -> bytes:
-    """The points of a LAZ file, as an uncompressed one has them.
+    """The points of a LAZ file, in uncompressed form.
 
-    A process of its own does it: what unpacks them aborts the process on damaged files, or never comes back.
+    Unpacked by a process of its own, since the library aborts or hangs on damaged files.
 
     Args:
-        data: of the whole file.
-        most: bytes that its header promises.
+        data: content of the whole file.
+        most: number of bytes according to its header.
 
     Raises:
         CloudError: it is damaged.
@@ -101,14 +101,14 @@ def unpacked(data: bytes, most: int) -> bytes:
 
 
 def read_table(read: Callable[[Any], Any], data: bytes) -> Columns:
-    """The columns of numbers of a table.
+    """The numeric columns of a table.
 
     Args:
-        read: makes a table of pyarrow's of an open file.
+        read: reads a pyarrow table from an open file.
         data: of the file.
 
     Raises:
-        CloudError: it is damaged, or holds too many points.
+        CloudError: it is damaged, or has too many points.
     """
     import pyarrow as pa
 
@@ -116,9 +116,9 @@ def read_table(read: Callable[[Any], Any], data: bytes) -> Columns:
         table = read(pa.BufferReader(data))
         table.validate(full=True)
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise CloudError(f"it is truncated, damaged or no such file ({one_line(error, 160).rstrip('.')})") from None
+        raise CloudError(f"it is truncated, damaged or of another kind ({one_line(error, 160).rstrip('.')})") from None
     if table.num_rows > MOST_POINTS:
-        raise CloudError(f"it holds {table.num_rows:,} points, and {MOST_POINTS:,} are the most that are read")
+        raise CloudError(f"it has {table.num_rows:,} points, but at most {MOST_POINTS:,} are read")
     columns: Columns = {}
     names = [name.lower() for name in table.column_names]
     for name, column in zip(names, table.columns, strict=True):

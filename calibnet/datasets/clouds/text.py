@@ -1,4 +1,4 @@
-"""Clouds as text: ``.csv``, ``.xyz`` and the like, a point a line, its columns named by a line before them."""
+"""Clouds as text (``.csv``, ``.xyz`` and others), with one point per line and column names in a line before them."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from calibnet.runtime.text import one_line
 
 TEXT_SUFFIXES = (".csv", ".txt", ".xyz", ".asc", ".pts")
 SEPARATORS = (";", "\t", ",")
-"""Between columns, where they are not blanks; a comma may be in the numbers where there is another one."""
+"""Separators of columns other than blanks; with another separator, a comma may be a decimal point."""
 COMMENTS = ("#", "//", "%")
 MOST_LINES_BEFORE = 1000
-"""Lines that may stand before the first point."""
+"""Largest number of lines before the first point."""
 UNIT = re.compile(r"\s*[\[(].*[\])]$")
 AXIS = re.compile(r"points?(?:_m_xyz)?:([012])|(?:pos_?|coord_?|points?_?)?([xyz])(?:_?m)?")
-"""How an axis is called, in lower case and without a unit in brackets; VeloView writes ``Points_m_XYZ:0``."""
+"""Names of axes, in lower case and without a unit in brackets; VeloView writes ``Points_m_XYZ:0``."""
 UNNAMED = {3: ("x", "y", "z"), 4: ("x", "y", "z", "intensity")}
-"""What numbers without names are, by how many there are in a line."""
+"""Columns without names, by their number."""
 DECLARE = f"name them in its first line, or {SAY}"
 
 
 class _Head(NamedTuple):
-    """What stands before the points.
+    """The head of a file, before the points.
 
     Attributes:
-        names: of the columns; None where nothing names them.
-        start: where the first point begins.
-        separator: between its columns; None for blanks.
-        width: how many columns it has.
+        names: names of the columns; None if there are none.
+        start: offset of the first point.
+        separator: separator of columns; None for blanks.
+        width: number of columns.
     """
 
     names: tuple[str, ...] | None
@@ -48,15 +48,15 @@ class _Head(NamedTuple):
 def read_text(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
     """Positions and intensity of a text file.
 
-    The columns are named in a line before the points (also as a comment, as CloudCompare does), or by ``layout``; three
-    or four without names are x, y, z and intensity.
+    Columns are named by a line before the points (or a comment, as in CloudCompare's files), or by ``layout``; three or
+    four columns without names are x, y, z and intensity.
 
     Args:
-        data: of the file.
-        layout: names of the columns, of a file that does not name them.
+        data: content of the file.
+        layout: names of the columns, for a file that does not name them.
 
     Raises:
-        CloudError: nothing names the columns, or a point lacks some, or holds a word.
+        CloudError: columns have no names, or a point lacks a number or has a word.
     """
     from pyarrow import csv
 
@@ -88,10 +88,10 @@ def read_text(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
 
 
 def _head(data: bytes) -> _Head:
-    """Read on to the first point.
+    """Read up to the first point.
 
     Raises:
-        CloudError: there is none, or what stands before it names no columns.
+        CloudError: there is none, or the lines before it do not name columns.
     """
     names: tuple[str, ...] | None = None
     file = io.BytesIO(data)
@@ -106,19 +106,19 @@ def _head(data: bytes) -> _Head:
         words = [word.strip().strip('"') for word in text.split(separator)]
         is_comment = line.startswith(COMMENTS)
         if not text or (not is_comment and names is None and len(words) == 1 and words[0].isdecimal()):
-            continue  # a .pts file begins with the number of its points
+            continue  # a .pts file starts with the number of its points
         if not is_comment and (names is not None or all(_is_number(word, separator) for word in words)):
             return _Head(names, start, separator, len(words))
         called = tuple(map(_called, words))
         if set("xyz") <= set(called):
             names = called
         elif not is_comment:
-            raise CloudError(f"its first line ({one_line(text, 80)}) names no columns x, y and z; {DECLARE}")
-    raise CloudError("it holds no point")
+            raise CloudError(f"its first line ({one_line(text, 80)}) does not name columns x, y and z; {DECLARE}")
+    raise CloudError("it has no points")
 
 
 def _called(word: str) -> str:
-    """What a column is called here."""
+    """The standard name of a column."""
     name = UNIT.sub("", word.lower())
     match = AXIS.fullmatch(name)
     return name if match is None else match[2] or "xyz"[int(match[1])]
@@ -133,15 +133,15 @@ def _is_number(word: str, separator: str | None) -> bool:
 
 
 def _check_positions(columns: Columns) -> None:
-    """See that none of three columns without names counts something, as a number of points or of rings does.
+    """Check that none of three columns without names is a counter, such as a ring number.
 
     Raises:
-        CloudError: one holds whole numbers alone, and the others do not.
+        CloudError: only one of them has whole numbers.
     """
     whole = [axis for axis in "xyz" if _is_whole(columns[axis])]
     if whole and len(whole) < 3:
         place = "xyz".index(whole[0]) + 1
-        raise CloudError(f"its columns have no names, and number {place} holds whole numbers alone; {DECLARE}")
+        raise CloudError(f"its columns have no names, and column {place} has only whole numbers; {DECLARE}")
 
 
 def _is_whole(values: Sequence[float] | np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""From what a camera stores to eight bits a channel: the same for all pictures of a drive, as its exposure is seen."""
+"""Converts images as stored to eight bits per channel, in the same way for all images of a drive."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ BAYER = {
     "gbrg": cv2.COLOR_BayerGBRG2RGB,
     "grbg": cv2.COLOR_BayerGRBG2RGB,
 }
-"""Colours of the first two pixels of the first two rows of a sensor, by name."""
+"""OpenCV's conversion of each Bayer pattern, named by the first two pixels of the first two rows."""
 BITS = (8, 10, 12, 14, 16)
-"""That cameras give; a file has 16 to hold them."""
+"""Bit depths of cameras, stored in 8 or 16 bits."""
 BRIGHT = 99.5
-"""Percentile of a float picture's levels that counts as white where these have no usual scale."""
+"""Percentile of a float image's levels that becomes white if they have no usual scale."""
 
 Levels = NDArray[Any]
-"""A picture ``[H, W, 3]`` RGB as it is stored: uint8, uint16 or float32; the three are alike where it has no colour."""
+"""An image ``[H, W, 3]`` RGB as stored: uint8, uint16 or float32; the channels of a grey image are equal."""
 
 
 class ImageError(ValueError):
-    """What is wrong with a picture, in words that continue a sentence."""
+    """An error in an image, in words that continue a sentence."""
 
 
 @dataclass(frozen=True)
 class Development:
-    """How stored levels become eight bits.
+    """Conversion of stored levels to eight bits.
 
     Attributes:
-        white: level that becomes 255, of pictures of more than 8 bits; None to tell it of each picture by itself.
-        bayer: name of the pattern of a sensor whose pictures are not demosaiced, one of `BAYER`; None for others.
+        white: level that becomes 255, for images of more than 8 bits; None to find it for each image.
+        bayer: pattern of a sensor whose images are not demosaiced, one of `BAYER`; None for others.
     """
 
     white: float | None = None
@@ -44,15 +44,15 @@ class Development:
 
     @classmethod
     def of(cls, pictures: Iterable[Levels], bayer: str | None = None) -> Development:
-        """That of a drive, by some of its pictures."""
+        """The conversion for a drive, from some of its images."""
         deep = [picture for picture in pictures if picture.dtype != np.uint8]
         return cls(white_of(deep) if deep else None, bayer)
 
     def __call__(self, levels: Levels) -> NDArray[np.uint8]:
-        """The picture ``[H, W, 3]`` RGB.
+        """The image ``[H, W, 3]`` RGB in eight bits.
 
         Raises:
-            ImageError: it is to be demosaiced and has colours.
+            ImageError: it is to be demosaiced but has colours.
         """
         white = 256.0
         if levels.dtype != np.uint8:
@@ -62,7 +62,7 @@ class Development:
             white = 65_536.0
         if self.bayer is not None:
             if not (levels == levels[..., :1]).all():
-                raise ImageError("has colours, though its calibration says 'bayer'; leave that out there")
+                raise ImageError("has colours, although its calibration has 'bayer'; remove that")
             levels = np.asarray(cv2.cvtColor(np.ascontiguousarray(levels[..., 0]), BAYER[self.bayer]))
         if levels.dtype == np.uint8:
             return levels.astype(np.uint8, copy=False)
@@ -70,9 +70,9 @@ class Development:
 
 
 def white_of(pictures: list[Levels]) -> float:
-    """The level of white in pictures of more than 8 bits: the end of the depth that the camera uses.
+    """The level of white in images of more than 8 bits: the largest value of the camera's bit depth.
 
-    Of floats 1, 255 or a depth if all lie within; else what all but the brightest stay below.
+    For floats, 1, 255 or that of a bit depth if all are within; else the level of all but the brightest.
     """
     if all(picture.dtype != np.float32 for picture in pictures):
         deepest = max(int(picture.max(initial=0)) for picture in pictures)

@@ -1,4 +1,4 @@
-"""Camera images: read whole, as stored, RGB; resized without aliasing."""
+"""Reads camera images as RGB, and resizes them without aliasing."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import MEGABYTE, read_file
 
-logging.getLogger("PIL").addHandler(logging.NullHandler())  # what Pillow thinks of a damaged file is in our sentence
+logging.getLogger("PIL").addHandler(logging.NullHandler())  # our own sentence reports damaged files
 LARGEST_BYTES = 256 * MEGABYTE
-"""Largest file of a picture."""
+"""Largest size of an image file."""
 MOST_PIXELS = 100_000_000
-"""Most pixels of a picture: 300 MB once it is decoded."""
+"""Largest number of pixels of an image, which takes 300 MB once decoded."""
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM")
 DEPTHS = {"1", "L", "LA", "P", "PA", "RGB", "RGBA", "RGBX", "CMYK", "I;16", "I;16B", "I;16L"}
-"""Kinds of pixels, as Pillow calls them, that are a camera's; others have 32 bits."""
+"""Pillow's pixel modes of camera images; others have 32 bits."""
 IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, SAMPLE_FORMAT = 256, 257, 258, 339
-"""TIFF's tags."""
+"""Tags of TIFF."""
 FLOATS = 3
-"""Sample format of TIFF."""
+"""TIFF's sample format of floats."""
 MISSING, MISSING_ROWS = 128, 8
-"""What a JPEG decoder puts where data is missing, and rows of it at the end that are no accident."""
+"""Grey level that a JPEG decoder puts where data is missing, and the number of such rows at the end that show it."""
 _END_OF_FILE = {b"\x89PNG": b"IEND\xaeB`\x82", b"\xff\xd8\xff": b"\xff\xd9"}
-"""First bytes of a PNG or JPEG file to the marker that ends a whole one."""
+"""First bytes of PNG and JPEG files, and the marker at the end of a complete one."""
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
 
 
 ADAM7 = ((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2))
-"""Column and row that each pass of an interlaced PNG starts at, and steps from one to the next."""
+"""First column and row of each pass of an interlaced PNG, and its steps."""
 
 
 BY_ITSELF = Development()
-"""Each picture developed as it is, without others of its drive."""
+"""Conversion of each image by itself, without others of its drive."""
 
 
 def read_image(
@@ -53,11 +53,11 @@ def read_image(
 
     Args:
         path: the file.
-        size: width and height that the calibration is for, if it says.
-        development: of the drive.
+        size: width and height of the calibration, if known.
+        development: conversion of the drive's images.
 
     Raises:
-        DatasetError: the file is missing, truncated, no image, or of another size.
+        DatasetError: the file is missing, truncated, not an image, or of another size.
     """
     try:
         return development(read_levels(path, size))
@@ -66,7 +66,7 @@ def read_image(
 
 
 def read_levels(path: Path, size: tuple[int, int] | None = None) -> Levels:
-    """Read an image as it is stored; see `read_image`."""
+    """Read an image as stored; see `read_image`."""
     data = read_file(path, "Image", LARGEST_BYTES)
     try:
         return decode_levels(data, size)
@@ -75,22 +75,22 @@ def read_levels(path: Path, size: tuple[int, int] | None = None) -> Levels:
 
 
 def decode_image(data: bytes, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """An image as ``[H, W, 3]`` uint8 RGB, developed by itself; see `decode_levels`."""
+    """An image as ``[H, W, 3]`` uint8 RGB, converted by itself; see `decode_levels`."""
     return BY_ITSELF(decode_levels(data, size))
 
 
 def decode_levels(data: bytes, size: tuple[int, int] | None = None) -> Levels:
-    """An image ``[H, W, 3]`` RGB of the depth that it is stored in; grey images get three equal channels.
+    """An image ``[H, W, 3]`` RGB at its stored bit depth; grey images get three equal channels.
 
-    An orientation tag is ignored: a calibration is of the pixels as they are stored. The size is taken from the header,
-    before any pixel is decoded.
+    An orientation tag is ignored, since a calibration applies to the pixels as stored. The size is checked in the
+    header, before any pixel is decoded.
 
     Args:
-        data: of a PNG, JPEG, BMP, TIFF, WebP or PGM/PPM file.
-        size: width and height that it must have.
+        data: content of a PNG, JPEG, BMP, TIFF, WebP or PGM/PPM file.
+        size: required width and height.
 
     Raises:
-        ImageError: it is truncated, damaged, no image, too large, or of another size.
+        ImageError: it is truncated, damaged, not an image, too large, or of another size.
     """
     floats = _size_of_floats(data)
     if floats is not None:
@@ -100,46 +100,47 @@ def decode_levels(data: bytes, size: tuple[int, int] | None = None) -> Levels:
     if any(data.startswith(start) and data.rfind(end) < 0 for start, end in _END_OF_FILE.items()):
         raise ImageError(truncated)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # what is odd but can be read
+        warnings.simplefilter("ignore")  # about oddities that can be read
         try:
             image = Image.open(io.BytesIO(data), formats=FORMATS)
         except Image.DecompressionBombError:
             raise ImageError(f"has more than {MOST_PIXELS // 10**6} million pixels; resize it") from None
-        except Exception:  # a header is parsed by many hands, which fail in as many ways
+        except Exception:  # Pillow's parsers raise many kinds of errors
             raise ImageError(damaged) from None
         _check_size(image.width, image.height, size)
         if image.mode not in DEPTHS and not _is_deep(image, data):
-            raise ImageError(f"has pixels of an unusual kind ({image.mode}); store 8 or 16 bits a channel")
+            raise ImageError(f"has pixels of an unsupported kind ({image.mode}); store 8 or 16 bits per channel")
         try:
             if image.format == "PNG" and _ends_flat(image) and not _is_whole(data):
-                raise ImageError(truncated)  # Pillow leaves rows that are not there as zeros
+                raise ImageError(truncated)  # Pillow fills missing rows with zeros
             eight = np.array(image.convert("RGB"), np.uint8)
         except (MemoryError, ImageError):
             raise
         except Exception as error:
             raise ImageError(truncated if "truncated" in str(error) else damaged) from None
     if image.format in ("JPEG", "MPO") and (eight[-MISSING_ROWS:] == MISSING).all():
-        raise ImageError("is truncated, its lower part is missing; copy or download it again")
+        raise ImageError("is truncated (its lower part is missing); copy or download it again")
     return _sixteen(data, damaged) if _is_deep(image, data) else eight
 
 
 def _check_size(width: int, height: int, size: tuple[int, int] | None) -> None:
-    """Hold a picture's size against what can be read, and against its calibration's."""
+    """Check an image's size against the largest possible one and against its calibration's."""
     if width * height > MOST_PIXELS:
         raise ImageError(f"is {width}x{height}, more than {MOST_PIXELS // 10**6} million pixels; resize it")
     if size is not None and (width, height) != size:
         raise ImageError(
-            f"is {width}x{height} and its calibration is for {size[0]}x{size[1]}; calibrate at the images' size or "
+            f"is {width}x{height} but its calibration is for {size[0]}x{size[1]}; calibrate at the size of the images, "
+            "or "
             "resize them"
         )
 
 
 def _size_of_floats(data: bytes) -> tuple[int, int] | None:
-    """Width and height of a TIFF whose pixels are floats; None of anything else."""
+    """Width and height of a TIFF with float pixels; None for anything else."""
     if data[:4] not in (b"II*\0", b"MM\0*"):
         return None
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of a damaged header, which is told where it is decoded
+        warnings.simplefilter("ignore")  # about a damaged header, which is reported when it is decoded
         try:
             tags = TiffImagePlugin.ImageFileDirectory_v2(data[:8])
             file = io.BytesIO(data)
@@ -153,19 +154,19 @@ def _size_of_floats(data: bytes) -> tuple[int, int] | None:
 
 
 def _floats(data: bytes) -> Levels:
-    """A TIFF of floats, of one channel or three, whose size was looked at."""
+    """A TIFF of floats, with one channel or three, whose size was checked."""
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         image = None
     if image is None or image.dtype.kind != "f" or (image.ndim == 3 and image.shape[2] != 3):
-        raise ImageError("is damaged, or has float pixels of an unusual kind; store one channel or three")
+        raise ImageError("is damaged, or has an unsupported number of float channels; store one or three")
     floats = image.astype(np.float32)
     return np.repeat(floats[..., None], 3, axis=2) if floats.ndim == 2 else np.ascontiguousarray(floats[..., ::-1])
 
 
 def _ends_flat(image: Image.Image) -> bool:
-    """Whether the last row is of one value."""
+    """Whether all pixels of the last row are equal."""
     last = np.asarray(image)[-1]
     return bool(np.all(last == last[0]))
 
@@ -187,7 +188,7 @@ def _is_whole(png: bytes) -> bool:
 
 
 def _is_deep(image: Image.Image, data: bytes) -> bool:
-    """Whether a channel has 16 bits, of which Pillow keeps eight."""
+    """Whether channels have 16 bits, of which Pillow would keep eight."""
     if image.format == "TIFF":
         return bool(max(getattr(image, "tag_v2", {}).get(BITS_PER_SAMPLE, (8,))) > 8)
     if image.format == "PPM":
@@ -196,7 +197,7 @@ def _is_deep(image: Image.Image, data: bytes) -> bool:
 
 
 def _sixteen(data: bytes, damaged: str) -> Levels:
-    """A picture of 16 bits a channel, which is known to be whole."""
+    """An image of 16 bits per channel, which is known to be complete."""
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), AS_STORED)
     except cv2.error:
@@ -207,7 +208,7 @@ def _sixteen(data: bytes, damaged: str) -> Levels:
 
 
 def resize_image(image: NDArray[np.uint8], camera: PinholeCamera) -> NDArray[np.uint8]:
-    """Resize ``[H, W, 3]`` to the size of ``camera``; averaging, as fine texture would alias."""
+    """Resize ``[H, W, 3]`` to the size of ``camera`` by averaging, since fine texture would alias."""
     size = (camera.width, camera.height)
     shrinks = camera.width <= image.shape[1] and camera.height <= image.shape[0]
     resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

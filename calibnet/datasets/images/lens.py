@@ -1,4 +1,4 @@
-"""Pictures as they are taken, and as the networks see them: through the pinhole cameras in the place of a lens."""
+"""Rectifies images for the networks, by one or more pinhole cameras in the place of a lens."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from calibnet.geometry.rectification import Rectification, central, degrees_acro
 from calibnet.geometry.types import Extrinsic
 
 LOOKED_AT = 3
-"""Pictures of a drive that tell which part of them a fisheye fills."""
+"""Number of images of a drive from which the part filled by a fisheye is found."""
 
 
 class Picture(NamedTuple):
-    """A rectified image ``[H, W, 3]`` RGB, the picture it was made from, if it was made from one, and its faces."""
+    """A rectified image ``[H, W, 3]`` RGB, the original image if it was rectified here, and its faces."""
 
     image: NDArray[np.uint8]
     original: Original | None = None
@@ -30,11 +30,11 @@ class Picture(NamedTuple):
 
 @dataclass(frozen=True)
 class Lens:
-    """How the pictures of a camera are rectified.
+    """Rectification of a camera's images.
 
     Attributes:
-        middle: the pinhole that looks ahead.
-        faces: of a lens that is wider than that, see `calibnet.geometry.faces`.
+        middle: the pinhole along the optical axis.
+        faces: faces of a wider lens, see `calibnet.geometry.faces`.
     """
 
     middle: Rectification
@@ -45,9 +45,9 @@ class Lens:
         """The lens of a camera.
 
         Args:
-            camera: as it is.
-            guess: of ``camera_from_lidar``, which says where the horizon is.
-            images: some of its pictures ``[H, W, 3]``; a fisheye may fill only a circle of them.
+            camera: the camera with its lens.
+            guess: guess of ``camera_from_lidar``, which gives the horizon.
+            images: some of its images ``[H, W, 3]``, of which a fisheye may fill only a circle.
         """
         middle = central(camera)
         if images and camera.model not in ("plumb_bob", "rational_polynomial"):
@@ -56,27 +56,27 @@ class Lens:
 
     @property
     def camera(self) -> CameraModel:
-        """The camera as it is, lens included."""
+        """The camera, lens included."""
         return self.middle.camera
 
     @property
     def pinhole(self) -> PinholeCamera:
-        """The pinhole camera of the picture's middle."""
+        """The pinhole camera along the optical axis."""
         return self.middle.pinhole
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A sentence for the user where it is not seen through one pinhole."""
+        """A sentence for the user if one pinhole does not show all of it."""
         if not self.faces:
             return said_of(self.middle)
         widths = "°, ".join(f"{degrees_across(face.pinhole):.0f}" for face in self.faces)
         return (
-            f"The lens is wide: it is looked through by {len(self.faces)} pinhole cameras in its place ({widths}° "
-            "across), which are solved as one; shown is the whole picture.",
+            f"The lens is wide: it is replaced by {len(self.faces)} pinhole cameras in its place ({widths}° "
+            "across), which are solved as one; the whole image is shown.",
         )
 
     def __call__(self, taken: NDArray[np.uint8]) -> Picture:
-        """A picture ``[H, W, 3]`` RGB as it was taken, rectified."""
+        """Rectify an image ``[H, W, 3]`` RGB."""
         seen = tuple(Face(face(taken), face.pinhole, face.pinhole_from_camera) for face in self.faces)
         if self.camera.is_pinhole:
             return Picture(taken, None, seen)

@@ -8,20 +8,21 @@ from numpy.typing import NDArray
 from calibnet.datasets.plausibility import Implausible
 
 DARK, DARKEST = 24, 15
-"""A picture that shines no brighter than the first seems to have lost its upper bits; the second is four bits of eight,
-which is all that 12 bits leave where the high byte of 16 is read."""
+"""Largest brightness of an image that seems to have lost its upper bits, and of one that certainly has: four bits of
+eight are left of 12 bits if the high byte of 16 is read."""
 WRAPPED, GREY = 0.01, 0.3
-"""Shares of neighbouring pixels half the range apart, and of grey pixels, where upper bits were cut off. Real pictures
-have 0.0005 of the former; 10 or 12 bits cut to their lower eight have 0.01 to 0.2, and black and white is not grey."""
+"""Smallest shares of neighbouring pixels that differ by half the range, and of grey pixels, in an image whose upper
+bits were cut off. Real images have 0.0005 of the former; 10 or 12 bits cut to their lower eight have 0.01 to 0.2, and
+images of black and white are not grey."""
 SAME_COLOUR = 0.85
-"""The difference of neighbouring pixels to that of the next but one: at most 0.61 in pictures of 13 cameras, and 1.02
-or more in the mosaics that their sensors would have given."""
+"""Ratio of the difference between neighbouring pixels to that of the next but one: at most 0.61 in images of 13
+cameras, and at least 1.02 in Bayer mosaics made from them."""
 ROW_STEP = 8
 """Rows of a picture from one to the next that are looked at."""
 
 
 def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
-    """Whether a picture ``[H, W, 3]`` lost its upper or its lower bits on the way to eight."""
+    """Check that an image ``[H, W, 3]`` did not lose its upper or lower bits in the conversion to eight."""
     rows = image[::ROW_STEP, :, 1].astype(np.int16)
     if 0 < rows.max() <= DARK:
         text = (
@@ -40,9 +41,10 @@ def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
 
 
 def mosaic(image: NDArray[np.uint8]) -> Implausible | None:
-    """Whether a grey picture ``[H, W, 3]`` is that of a Bayer sensor, before its colours were made.
+    """Check that a grey image ``[H, W, 3]`` is not the raw mosaic of a Bayer sensor.
 
-    The next pixel but one has the same colour there, and is more alike than the next one; never so in other pictures.
+    In a mosaic the next pixel but one has the same colour, and is more similar than the next one; in other images it
+    never is.
     """
     if not (image[::ROW_STEP, :, 0] == image[::ROW_STEP, :, 2]).all():
         return None

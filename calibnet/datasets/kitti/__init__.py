@@ -1,1 +1,1 @@
-"""The KITTI datasets, one module per layout; `calibration` has what they share."""
+"""The KITTI datasets, one module per layout, with shared functions in `calibration`."""

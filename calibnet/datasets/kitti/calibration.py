@@ -1,4 +1,4 @@
-"""What the three KITTI layouts share: calibration files, the exact extrinsic, cameras, times."""
+"""Functions shared by KITTI's layouts: calibration files, the exact extrinsic, cameras and times."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from calibnet.runtime.reading import TEXT_BYTES, read_text
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 NOMINAL_PERIOD = 0.1
-"""Seconds between two frames of KITTI's 10 Hz, for frames without a recorded time."""
+"""Seconds between two frames at KITTI's 10 Hz, for frames without a recorded time."""
 
 LATEST_S = 1e11
-"""Seconds since 1970, of the year 5138."""
+"""Largest time in seconds since 1970, in the year 5138."""
 
 DATE_OF_FOCAL_LENGTH = {721.5377: "2011_09_26", 707.0912: "2011_09_30", 718.856: "2011_10_03"}
-"""Recording date, and so the rig, of a rectified focal length: odometry folders name no date."""
+"""Recording date, and so the rig, by rectified focal length, since odometry folders do not name the date."""
 
 
 def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Floats]:
@@ -34,14 +34,14 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
             or a rigid transform, 9 for a rotation, 3 for a translation.
 
     Raises:
-        DatasetError: the file or a key is missing, a row has another count or no finite numbers, or
-            its matrix is singular or no rotation.
+        DatasetError: the file or a key is missing, a row has another count or numbers that are not finite, or its
+            matrix is singular or not a rotation.
     """
     lines = read_text(path, "Calibration", remedy="get it from KITTI's calib zip").split("\n")
     rows: dict[str, list[str]] = {}
     for line in lines:
         key, colon, text = line.partition(":")
-        if not colon:  # KITTI tracking leaves it out behind some names
+        if not colon:  # KITTI tracking omits it after some names
             key, colon, text = line.strip().partition(" ")
         name = key.strip()
         if colon and rows.setdefault(name, text.split()) != text.split() and name in sizes:
@@ -55,9 +55,9 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
         except ValueError:
             row = np.array([np.nan])
         if not np.isfinite(row).all():
-            raise DatasetError(f"Calibration {path}: row {key!r} holds something other than finite numbers; repair it.")
+            raise DatasetError(f"Calibration {path}: row {key!r} does not have finite numbers; correct it.")
         if row.size != size:
-            raise DatasetError(f"Calibration {path}: row {key!r} has {row.size} numbers instead of {size}; repair it.")
+            raise DatasetError(f"Calibration {path}: row {key!r} has {row.size} numbers instead of {size}; correct it.")
         if size in (9, 12):
             check = checked_intrinsics if key.startswith("P") else checked_rotation
             check(row.reshape(3, -1)[:, :3], path, key)
@@ -66,10 +66,10 @@ def read_calibration_file(path: Path, sizes: Mapping[str, int]) -> dict[str, Flo
 
 
 def read_calibration_row(path: Path, size: int) -> Floats:
-    """Read a KITTI calibration file that is one row of numbers without a name, of a rigid transform if they are 12.
+    """Read a KITTI calibration file of one row of numbers without a name; 12 numbers must be a rigid transform.
 
     Raises:
-        DatasetError: the file is missing, or holds anything else.
+        DatasetError: the file is missing, or has other content.
     """
     remedy = "get it from KITTI's calibration"
     try:
@@ -108,7 +108,7 @@ def camera_folder(parent: Path, prefix: str, camera: int) -> Path:
     if camera not in range(4) or not folder.is_dir():
         present = ", ".join(sorted(path.name[-1] for path in parent.glob(f"{prefix}[0-3]") if path.is_dir()))
         raise DatasetError(
-            f"{folder} does not exist, there is no camera {camera}; "
+            f"{folder} does not exist, so there is no camera {camera}; "
             f"cameras there: {present or 'none, unpack the images'}."
         )
     return folder
@@ -118,11 +118,11 @@ def read_times(path: Path, seconds: Callable[[str], float]) -> list[float]:
     """The times of a drive's frames, in seconds.
 
     Args:
-        path: the file, one time a line.
-        seconds: the time of a line; it raises ``ValueError`` where it is none.
+        path: the file, with one time per line.
+        seconds: converts a line to seconds; raises ``ValueError`` if it is not a time.
 
     Raises:
-        DatasetError: the file is missing, or a line is no time.
+        DatasetError: the file is missing, or a line is not a time.
     """
     remedy = "get it from KITTI"
     times = []
@@ -134,18 +134,18 @@ def read_times(path: Path, seconds: Callable[[str], float]) -> list[float]:
         except (ValueError, OverflowError):
             times.append(math.nan)
         if not abs(times[-1]) < LATEST_S:
-            raise DatasetError(f"List of times {path}: line {number} is no time ({line[:40]!r}); {remedy}.")
+            raise DatasetError(f"List of times {path}: line {number} is not a time ({line[:40]!r}); {remedy}.")
     return times
 
 
 def times_of(files: Mapping[str, Path], times: Sequence[float], path: Path) -> dict[str, float]:
     """Seconds of every file, by stem.
 
-    ``times`` holds one entry a file, or, where only a part of the frames was kept, one for every
-    file number of the whole drive; where it is neither, KITTI's nominal 10 Hz count.
+    ``times`` has one entry per file or, if only a part of the frames was kept, one for every file number of the whole
+    drive; otherwise, KITTI's nominal 10 Hz are used.
 
     Raises:
-        DatasetError: there are fewer times than files; the message names ``path``, the times' file.
+        DatasetError: there are fewer times than files; the message names ``path``, the file of times.
     """
     numbers = [frame_number(file) for file in files.values()]
     if 0 < len(times) < len(numbers):
@@ -169,8 +169,8 @@ def frame_number(path: Path) -> int:
     """The number that a KITTI file is named by.
 
     Raises:
-        DatasetError: its name is no number.
+        DatasetError: its name is not a number.
     """
     if not path.stem.isdecimal():
-        raise DatasetError(f"{path} is not named by a number, as KITTI's 000000.png is; rename or remove it.")
+        raise DatasetError(f"The name of {path} is not a number like KITTI's 000000.png; rename or remove it.")
     return int(path.stem)

@@ -1,4 +1,4 @@
-"""KITTI-360: perspective cameras 0 and 1, which look ahead, and fisheyes 2 and 3, which look to the sides.
+"""KITTI-360: perspective cameras 0 and 1, which face forward, and fisheye cameras 2 and 3, which face sideways.
 
 ``calibration/{perspective,calib_cam_to_pose,calib_cam_to_velo}.txt`` and ``image_0{2,3}.yaml``,
 ``data_2d_raw/DRIVE/image_0N/{data_rect,data_rgb}`` and ``data_3d_raw/DRIVE/velodyne_points/data``. Poses of the car are
@@ -35,7 +35,7 @@ from calibnet.geometry.types import Extrinsic, Floats, Intrinsics, Transform
 
 LAYOUT = "a KITTI-360 root holds calibration/, data_2d_raw/ and data_3d_raw/"
 PICTURES = {0: "data_rect", 1: "data_rect", 2: "data_rgb", 3: "data_rgb"}
-"""Folder of each camera's pictures: rectified ones of the perspective cameras, those of fisheyes as they were taken."""
+"""Folder of each camera's images: rectified for the perspective cameras, original for the fisheyes."""
 
 
 class Kitti360(PairedSequence):
@@ -46,7 +46,7 @@ class Kitti360(PairedSequence):
 
         Args:
             root: the folder that holds ``calibration``, ``data_2d_raw`` and ``data_3d_raw``.
-            drive: its number, ``"0003"`` or 3.
+            drive: number of the drive, ``"0003"`` or 3.
             camera: 0 or 1 (perspective), 2 or 3 (fisheye), as far as the drive has them.
 
         Raises:
@@ -64,7 +64,9 @@ class Kitti360(PairedSequence):
         scans = files_by_stem(require_folder(velodyne / "data", LAYOUT), (".bin",), "scans")
         both = {stem: path for stem, path in images.items() if stem in scans}
         if not both:
-            raise DatasetError(f"No image of {images_at} has a scan of its number in {velodyne / 'data'}; unpack both.")
+            raise DatasetError(
+                f"No image of {images_at} has a scan of the same number in {velodyne / 'data'}; unpack both."
+            )
         left_out = len(images) + len(scans) - 2 * len(both)
         self.notes = (f"{left_out} images and scans have no partner and are left out.",) if left_out else ()
         found = camera_of(root / "calibration", camera)
@@ -106,7 +108,7 @@ def drive_folder(parent: Path, drive: str | int) -> Path:
 
 
 def camera_of(folder: Path, camera: int) -> CameraModel | Intrinsics:
-    """The lens of a fisheye, or the 3x3 matrix of a perspective camera, whose pictures are rectified.
+    """The lens of a fisheye, or the 3x3 matrix of a perspective camera, whose images are rectified.
 
     Raises:
         DatasetError: its file is missing or malformed.
@@ -115,16 +117,16 @@ def camera_of(folder: Path, camera: int) -> CameraModel | Intrinsics:
         path = folder / f"image_0{camera}.yaml"
         lens = read_calibration(path).camera
         if lens is None:
-            raise DatasetError(f"Calibration {path} knows no camera; get it from KITTI-360's calibrations.")
+            raise DatasetError(f"Calibration {path} has no camera; get it from KITTI-360's calibrations.")
         return lens
     row = f"P_rect_0{camera}"
     return read_calibration_file(folder / "perspective.txt", {row: 12})[row].reshape(3, 4)[:, :3]
 
 
 def camera_from_lidar(folder: Path, camera: int) -> Extrinsic:
-    """The extrinsic of a camera, of a perspective one after rectification.
+    """The extrinsic of a camera, for a perspective one after rectification.
 
-    ``calib_cam_to_velo.txt`` has the LiDAR from camera 0, and ``calib_cam_to_pose.txt`` the car's pose frame from each
+    ``calib_cam_to_velo.txt`` is the LiDAR from camera 0, and ``calib_cam_to_pose.txt`` the car's pose frame from each
     camera, both before rectification.
 
     Raises:

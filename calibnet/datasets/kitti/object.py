@@ -22,13 +22,13 @@ PARTS = ("training", "testing")
 
 
 class KittiObject(PairedSequence):
-    """The frames of KITTI object detection; they follow no order in time."""
+    """The frames of KITTI object detection, which are not in temporal order."""
 
     def __init__(self, root: Path | str, split: str = "training", camera: int = 2) -> None:
         """Open a split.
 
         Args:
-            root: the folder that holds ``training`` (and ``ImageSets`` where lists are used).
+            root: the folder that holds ``training`` (and ``ImageSets`` if lists are used).
             split: ``"training"`` or ``"testing"`` for that whole folder, or the name of a list
                 ``ImageSets/SPLIT.txt`` of frames of ``training``, for instance ``"val"``.
             camera: 2, or another whose images are there.
@@ -51,7 +51,7 @@ class KittiObject(PairedSequence):
                 if stem not in images and stem not in scans:
                     raise DatasetError(
                         f"{root / 'ImageSets' / split}.txt lists {stem[:60]!r}, which {folder} does not have; "
-                        "get the frame or take it off the list."
+                        "get the frame or remove it from the list."
                     )
         check_paired(images, scans)
         times = {stem: NOMINAL_PERIOD * position for position, stem in enumerate(images)}
@@ -72,8 +72,8 @@ def _listed(folder: Path, split: str) -> list[str]:
     path = folder / f"{split}.txt"
     if not path.exists():
         present = ", ".join([*PARTS, *(file.stem for file in sorted(folder.glob("*.txt")))])
-        raise DatasetError(f"{path} does not exist, there is no split {split!r}; splits there: {present}.")
+        raise DatasetError(f"{path} does not exist, so there is no split {split!r}; splits there: {present}.")
     stems = read_text(path, "List of frames", TEXT_BYTES).split()
     if not stems:
-        raise DatasetError(f"{path} is empty; list one frame a line, for instance 000007.")
+        raise DatasetError(f"{path} is empty; list one frame per line, for instance 000007.")
     return stems

@@ -1,6 +1,6 @@
 """KITTI odometry: ``sequences/SS/{calib.txt,times.txt,image_N,velodyne}``.
 
-Read here rather than by pykitti, which opens whatever has a file's name and waits for it.
+Not read by pykitti, which opens anything with a file's name, even if that blocks.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class KittiOdometry(PairedSequence):
 
         Args:
             root: the folder that holds ``sequences``.
-            sequence: its number, ``"04"`` or 4.
+            sequence: number of the sequence, ``"04"`` or 4.
             camera: 0 to 3, as far as the folder has them.
 
         Raises:
@@ -49,7 +49,7 @@ class KittiOdometry(PairedSequence):
             rows[f"P{camera}"].reshape(3, 4), transform(camera0_from_lidar[:, :3], camera0_from_lidar[:, 3])
         )
         times = folder / "times.txt"
-        # own data may have none; a link that leads nowhere is not none
+        # own data may have no times; a broken link is an error
         seconds = read_times(times, float) if os.path.lexists(times) else []
         files = frame_files(images, scans, times_of(images, seconds, times))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))

@@ -1,8 +1,7 @@
 """KITTI raw, synced and rectified drives: ``DATE/DATE_drive_NNNN_sync``.
 
-Calibration and times come through pykitti, which opens whatever has a file's name and waits for it. So every file is
-read here before, and what is wrong with it is said in a sentence. The frames are listed here: pykitti looks for one
-type of image at a time.
+Calibration and times are read by pykitti, which opens anything with a file's name, even if that blocks; so every file
+is checked here before. Frames are listed here, since pykitti looks for one type of image only.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ CALIBRATION_ROWS = {
 }
 
 KNOWN_GAPS = {"2011_09_26_drive_0009_sync": {f"{number:010d}" for number in range(177, 181)}}
-"""Images whose scans KITTI itself never published, by drive; they are left out."""
+"""Images whose scans KITTI never published, by drive, which are left out."""
 
 
 class KittiRaw(PairedSequence):
@@ -46,8 +45,8 @@ class KittiRaw(PairedSequence):
 
         Args:
             root: the folder that holds the dates.
-            date: for instance ``"2011_09_26"``.
-            drive: its number, ``"0005"`` or 5.
+            date: date, for instance ``"2011_09_26"``.
+            drive: number of the drive, ``"0005"`` or 5.
             camera: 0 to 3, as far as the drive has them.
 
         Raises:
@@ -75,7 +74,7 @@ class KittiRaw(PairedSequence):
 
 
 class _Reader(pykitti.raw):  # type: ignore[misc]  # pykitti has no types
-    """pykitti's reader without the GPS/IMU packets, and content with a drive that has no times."""
+    """pykitti's reader without GPS/IMU packets, which accepts a drive without times."""
 
     @property
     def timestamp_file(self) -> Path:
@@ -83,7 +82,7 @@ class _Reader(pykitti.raw):  # type: ignore[misc]  # pykitti has no types
 
     def _load_timestamps(self) -> None:
         self.timestamps: list[Any] = []
-        if os.path.lexists(self.timestamp_file):  # a link that leads nowhere is no drive without times
+        if os.path.lexists(self.timestamp_file):  # a broken link is an error rather than a drive without times
             read_times(self.timestamp_file, lambda line: datetime.fromisoformat(line[:26]).timestamp())
             super()._load_timestamps()
 

@@ -1,4 +1,4 @@
-"""KITTI tracking: ``training/{image_02/SSSS,velodyne/SSSS,calib/SSSS.txt}``, a calibration for each sequence."""
+"""KITTI tracking: ``training/{image_02/SSSS,velodyne/SSSS,calib/SSSS.txt}``, with a calibration for each sequence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, f
 from calibnet.geometry import transform
 
 KNOWN_GAPS = {"0001": {f"{number:06d}" for number in range(177, 181)}}
-"""Images whose scans KITTI never published, by sequence; they are left out."""
+"""Images whose scans KITTI never published, by sequence, which are left out."""
 
 
 class KittiTracking(PairedSequence):
@@ -29,7 +29,7 @@ class KittiTracking(PairedSequence):
 
         Args:
             root: the folder that holds ``training``.
-            sequence: its number, ``"0004"`` or 4.
+            sequence: number of the sequence, ``"0004"`` or 4.
             camera: 2 or 3, as far as the folder has them.
             part: ``"training"`` or ``"testing"``.
 

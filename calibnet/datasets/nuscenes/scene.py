@@ -1,7 +1,7 @@
 """nuScenes by its published tables, without its SDK: one camera and the LiDAR in one scene.
 
 A keyframe is an image and a sweep of one sample. The two are up to 50 ms apart, in which the car moves; both poses of
-the car are in the tables, so that the points are taken to where they were when the image was taken.
+the car are in the tables, so the points are moved to the time of the image.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from calibnet.geometry import invert, transform, transform_points
 from calibnet.geometry.types import Transform
 
 OURS_FROM_THEIRS = transform([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0])
-"""nuScenes's LiDAR has x to the right and y ahead."""
+"""Rotation to our axes; nuScenes's LiDAR has x to the right and y ahead."""
 
 
 class NuScenes(PairedSequence):
@@ -45,10 +45,10 @@ class NuScenes(PairedSequence):
 
         Args:
             root: the folder that holds ``samples`` and the folder of the tables, for instance ``v1.0-mini``.
-            scene: its name, ``"scene-0061"``, or its number; the first one by default.
-            camera: its channel.
+            scene: name of the scene, ``"scene-0061"``, or its number; the first one by default.
+            camera: channel of the camera.
             version: folder of the tables; the only one by default.
-            compensate: take the points to where they were when the image was taken, by the car's poses.
+            compensate: whether to move the points to the time of the image, by the car's poses.
 
         Raises:
             DatasetError: a table is missing or malformed, or there is no such scene or camera.
@@ -70,7 +70,7 @@ class NuScenes(PairedSequence):
         if compensate:
             apart = max(abs(pair.image.seconds - pair.sweep.seconds) for pair in pairs)
             self.notes = (
-                f"Scans are moved to the time of their images, by up to {1e3 * apart:.0f} ms of the car's way.",
+                f"Scans are moved to the time of their images, by up to {1e3 * apart:.0f} ms of the car's motion.",
             )
         start = pairs[0].image.seconds
         files = [
@@ -93,11 +93,11 @@ class NuScenes(PairedSequence):
 
 
 def _motion(pair: Pair, sensors: dict[str, Sensor], poses: dict[str, Transform] | None) -> Transform:
-    """4x4, from the points of a sweep's file to those of our axes when the image was taken; without poses, by then."""
+    """4x4, from the points of a sweep's file to our axes at the time of the image or, without poses, of the sweep."""
     if poses is None:
         return OURS_FROM_THEIRS
     if np.array_equal(poses[pair.image.pose], poses[pair.sweep.pose]):
-        return OURS_FROM_THEIRS  # which changes no digit
+        return OURS_FROM_THEIRS  # an exact permutation of axes
     car_from_lidar = sensors[pair.sweep.sensor].car_from_sensor
     world_from_lidar, world_from_later = (poses[taken.pose] @ car_from_lidar for taken in (pair.sweep, pair.image))
     return OURS_FROM_THEIRS @ invert(world_from_later) @ world_from_lidar

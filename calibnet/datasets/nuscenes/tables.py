@@ -1,4 +1,4 @@
-"""nuScenes's tables: JSON lists of flat records, read one by one, since a table of the whole dataset has a gigabyte."""
+"""nuScenes's tables: JSON lists of flat records, read one by one since tables of the whole dataset take a gigabyte."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from calibnet.geometry.types import Intrinsics, Transform
 from calibnet.runtime.reading import MEGABYTE, open_file
 
 LARGEST_BYTES = 4096 * MEGABYTE
-"""Largest table."""
+"""Largest size of a table."""
 LARGEST_RECORD = MEGABYTE
 BETWEEN = re.compile(r"\s*,?\s*")
-"""Two records."""
+"""Separator of two records."""
 REMEDY = "get it from nuScenes's metadata"
 LATEST = 1e16
-"""Microseconds since 1970: the year 2286."""
+"""Largest time in microseconds since 1970, in the year 2286."""
 LIDAR = "LIDAR_TOP"
 NEEDED = ("sample_data", "calibrated_sensor", "sensor", "ego_pose")
-"""Tables without which nothing can be read; ``sample`` and ``scene`` tell scenes apart."""
+"""Required tables; ``sample`` and ``scene`` are needed to tell scenes apart."""
 EVERYTHING = "all"
-"""Name of the sequence where nothing tells scenes apart."""
+"""Name of the sequence if scenes cannot be told apart."""
 
 Record = Mapping[str, Any]
 
@@ -46,11 +46,11 @@ class Taken:
     """An image or a sweep.
 
     Attributes:
-        file: its file.
-        seconds: when it was taken.
+        file: path of its file.
+        seconds: time at which it was taken.
         sensor: token of the sensor's calibration.
-        pose: token of the car's pose then.
-        size: width and height of an image; zeros of a sweep.
+        pose: token of the car's pose at that time.
+        size: width and height of an image; zeros for a sweep.
     """
 
     file: Path
@@ -68,11 +68,11 @@ class Pair(NamedTuple):
 
 
 def find_tables(root: Path, version: str = "") -> Path:
-    """The folder of the tables below a root, or the root itself.
+    """The folder of the tables in a root, or the root itself.
 
     Args:
-        root: of nuScenes.
-        version: the folder's name; the only one by default.
+        root: root folder of nuScenes.
+        version: name of the folder; the only one by default.
 
     Raises:
         DatasetError: there is none, several, or one lacks a table.
@@ -85,7 +85,7 @@ def find_tables(root: Path, version: str = "") -> Path:
         names = ", ".join(path.name for path in found)
         raise DatasetError(f"{root} has tables of several versions ({names}); choose one with --version.")
     if not found:
-        raise DatasetError(f"{root} has no tables; unpack nuScenes's metadata there: v1.0-mini/*.json, for instance.")
+        raise DatasetError(f"{root} has no tables; unpack nuScenes's metadata there, for instance v1.0-mini/*.json.")
     for name in NEEDED:
         if not (found[0] / f"{name}.json").exists():
             raise DatasetError(f"Table {found[0] / name}.json does not exist; {REMEDY}.")
@@ -96,16 +96,18 @@ def chosen_scene(tables: Path, asked: str) -> tuple[str, frozenset[str] | None]:
     """Name of a scene, and the tokens of its samples; None for all.
 
     Args:
-        tables: their folder.
+        tables: folder of the tables.
         asked: the scene's name or number; the first one if empty.
 
     Raises:
-        DatasetError: there is no such scene, or the tables do not tell.
+        DatasetError: there is no such scene, or scenes cannot be told apart.
     """
     if not all((tables / f"{name}.json").exists() for name in ("scene", "sample")):
         if asked in ("", EVERYTHING):
             return EVERYTHING, None
-        raise DatasetError(f"{tables} has no scene.json and sample.json, which tell scenes apart; {REMEDY}.")
+        raise DatasetError(
+            f"{tables} has no scene.json and sample.json, which are needed to tell scenes apart; {REMEDY}."
+        )
     scenes = {
         text(one, "name", tables, "scene"): text(one, "token", tables, "scene") for one in records(tables, "scene")
     }
@@ -123,7 +125,7 @@ def chosen_scene(tables: Path, asked: str) -> tuple[str, frozenset[str] | None]:
 
 
 def scene_names(tables: Path) -> list[str]:
-    """The scenes, in their order; one without a name where nothing tells them apart."""
+    """The names of the scenes, in order; a single empty name if they cannot be told apart."""
     if not all((tables / f"{name}.json").exists() for name in ("scene", "sample")):
         return [""]
     return [text(one, "name", tables, "scene") for one in records(tables, "scene")]
@@ -140,7 +142,7 @@ def read_sensors(tables: Path) -> dict[str, Sensor]:
         token = text(one, "token", tables, "calibrated_sensor")
         channel = channels.get(text(one, "sensor_token", tables, "calibrated_sensor"))
         if channel is None:
-            raise DatasetError(f"{path}: {token} is of a sensor that sensor.json does not have; {REMEDY}.")
+            raise DatasetError(f"{path}: {token} refers to a sensor that sensor.json does not have; {REMEDY}.")
         intrinsic = one.get("camera_intrinsic")
         matrix = values.numbers(intrinsic, f"{token}.camera_intrinsic", path, (3, 3)) if intrinsic else None
         found[token] = Sensor(channel, pose(one, path), matrix)
@@ -150,14 +152,14 @@ def read_sensors(tables: Path) -> dict[str, Sensor]:
 def read_pairs(
     tables: Path, root: Path, sensors: Mapping[str, Sensor], camera: str, samples: Collection[str] | None
 ) -> list[Pair]:
-    """The keyframes of a camera with those of the LiDAR, in the order of time.
+    """The keyframes of a camera with those of the LiDAR, in temporal order.
 
     Args:
-        tables: their folder.
-        root: that files are relative to.
-        sensors: by token.
-        camera: its channel.
-        samples: tokens of those that are wanted; None for all.
+        tables: folder of the tables.
+        root: folder to which paths of files are relative.
+        sensors: sensors by token.
+        camera: channel of the camera.
+        samples: tokens of the wanted samples; None for all.
     """
     images, sweeps = dict[str, Taken](), dict[str, Taken]()
     of_channel = {camera: images, LIDAR: sweeps}
@@ -176,7 +178,7 @@ def read_poses(tables: Path, tokens: Collection[str]) -> dict[str, Transform]:
     """``world_from_car`` by token.
 
     Raises:
-        DatasetError: one of them is not there.
+        DatasetError: one of them is missing.
     """
     path = tables / "ego_pose.json"
     wanted = set(tokens)
@@ -188,7 +190,7 @@ def read_poses(tables: Path, tokens: Collection[str]) -> dict[str, Transform]:
 
 
 def pose(record: Record, path: Path) -> Transform:
-    """4x4 of ``translation`` and ``rotation`` (w x y z)."""
+    """The transform 4x4 of ``translation`` and ``rotation`` (w x y z)."""
     token = str(record.get("token"))
     turn = values.quaternion(record.get("rotation"), "wxyz", path, f"{token}.rotation")
     return transform(turn, values.numbers(record.get("translation"), f"{token}.translation", path, (3,)))
@@ -198,11 +200,11 @@ def records(tables: Path, table: str) -> Iterator[Record]:
     """The records of a table, one in memory at a time.
 
     Raises:
-        DatasetError: the file is missing, damaged, or no list of records.
+        DatasetError: the file is missing, damaged, or not a list of records.
     """
     path = tables / f"{table}.json"
     decoder, decode = json.JSONDecoder(), codecs.getincrementaldecoder("utf-8")()
-    damaged = DatasetError(f"Table {path} is damaged or no list of records; {REMEDY}.")
+    damaged = DatasetError(f"Table {path} is damaged or not a list of records; {REMEDY}.")
     buffer, at, begun, ended = "", 0, False, False
     try:
         with open_file(path, LARGEST_BYTES) as file:
@@ -218,7 +220,7 @@ def records(tables: Path, table: str) -> Iterator[Record]:
                     return
                 try:
                     record, end = decoder.raw_decode(buffer, at) if at < len(buffer) else (None, 0)
-                except ValueError:  # the rest of it may come with the next bytes
+                except ValueError:  # the rest of the record may be in the next bytes
                     record, end = None, 0
                 if end:
                     if not isinstance(record, dict):
@@ -236,10 +238,10 @@ def records(tables: Path, table: str) -> Iterator[Record]:
 
 
 def text(record: Record, key: str, tables: Path, table: str) -> str:
-    """A value that is a text.
+    """A text value of a record.
 
     Raises:
-        DatasetError: it is none.
+        DatasetError: it is missing or not a text.
     """
     value = record.get(key)
     if not isinstance(value, str):
@@ -250,11 +252,11 @@ def text(record: Record, key: str, tables: Path, table: str) -> str:
 def _taken(one: Record, tables: Path, root: Path) -> Taken:
     name = Path(text(one, "filename", tables, "sample_data"))
     if name.is_absolute() or ".." in name.parts:
-        raise DatasetError(f"Table {tables / 'sample_data.json'} names {name}, which is not below {root}; {REMEDY}.")
+        raise DatasetError(f"Table {tables / 'sample_data.json'} names {name}, which is outside {root}; {REMEDY}.")
     sides = [one.get(side) if isinstance(one.get(side), int) else 0 for side in ("width", "height")]
     time = one.get("timestamp")
     if isinstance(time, bool) or not isinstance(time, int | float) or not 0 <= time < LATEST:
-        raise DatasetError(f"Table {tables / 'sample_data.json'} has a timestamp that is none; {REMEDY}.")
+        raise DatasetError(f"Table {tables / 'sample_data.json'} has an invalid timestamp; {REMEDY}.")
     return Taken(
         root / name,
         time * 1e-6,

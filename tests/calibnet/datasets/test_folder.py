@@ -205,7 +205,7 @@ def test_lens_distortion_is_undone(coefficients, write_layout, write_calibration
 def test_image_of_another_size(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(width=80))
-    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 and its calibration is for 80x48"):
+    with pytest.raises(DatasetError, match=r"0000\.png is 64x48 but its calibration is for 80x48"):
         layout.open()[0]
 
 
@@ -216,7 +216,7 @@ IDENTITY = np.eye(4).tolist()
     ("changes", "problem"),
     [
         *(({key: None}, f"no key '{key}'") for key in ("width", "camera_matrix", "distortion")),
-        ({"camera_from_lidar": None}, "does not say where the LiDAR is; give a first guess with --guess FILE"),
+        ({"camera_from_lidar": None}, "has no pose of the LiDAR; give a first guess with --guess FILE"),
         ({"width": 64.5}, "width is 64.5"),
         ({"height": -1}, "height is -1"),
         ({"camera_matrix": [[1, 2], [3, 4]]}, "camera_matrix has 2x2 numbers instead of 3x3"),
@@ -307,7 +307,7 @@ def test_a_camera_is_named_in_whichever_file_holds_several(write_layout, tmp_pat
     guess.write_text(f"P0: 50 0 32 0 0 50 24 0 0 0 1 0\nP2: 50 0 32 10 0 50 24 0 0 0 1 0\nTr: {row}\n")
     found = Folder(layout.root, guess=guess, camera="2").calibration
     assert_allclose(found.camera_from_lidar[:3, 3], [0.2, -0.1, -0.2])
-    with pytest.raises(DatasetError, match=r"calib\.txt holds cameras 0, 2; say which one with --camera"):
+    with pytest.raises(DatasetError, match=r"calib\.txt has the cameras 0, 2; choose one with --camera"):
         Folder(layout.root, guess=guess)
-    with pytest.raises(DatasetError, match=r"calibration\.yaml holds one camera, and none by the name 2"):
+    with pytest.raises(DatasetError, match=r"calibration\.yaml has one camera, which is not called 2"):
         Folder(layout.root, camera="2")

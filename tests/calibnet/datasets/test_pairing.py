@@ -22,7 +22,7 @@ def test_a_name_without_its_partner_is_a_bad_frame(write_layout):
     layout = write_layout("folder")
     layout.scans[1].unlink()
     sequence = layout.open()
-    assert sequence.notes == ("1 of 3 names have an image or a scan only (0001).",)
+    assert sequence.notes == ("1 of 3 names have only an image or only a scan (0001).",)
     assert [sequence[0].index, sequence[2].index] == [0, 2]
     with pytest.raises(DatasetError, match=r"no scan for 0001 \(.*0001\.png\); add it, or remove this file"):
         sequence[1]
@@ -54,9 +54,9 @@ def test_names_that_differ_but_in_their_number_pair_by_it(images, scans, write_l
     rename(layout.scans, scans)
     sequence = layout.open()
     assert [(one.image.stem, one.scan.stem) for one in sequence.files] == list(zip(images, scans, strict=True))
-    assert sequence.notes == (f"Paired by the number in their names, as {images[0]} and {scans[0]}.",)
+    assert sequence.notes == (f"Paired by the number in their names, for instance {images[0]} and {scans[0]}.",)
     layout.scans[1].unlink()
-    assert "1 of 3 names have an image or a scan only" in layout.open().notes[1]
+    assert "1 of 3 names have only an image or only a scan" in layout.open().notes[1]
 
 
 def test_numbers_are_in_order_whatever_their_length(write_layout):
@@ -103,7 +103,7 @@ def test_a_large_difference_is_said_in_centimetres(write_layout):
     write_times(layout.scans, [1.03, 2.00, 3.00])
     assert layout.open(max_time_difference=50).notes[1].startswith("At 50 km/h 30 ms are 42 cm")
     with pytest.raises(
-        DatasetError, match=r"has a scan within 1 ms, the nearest is 2000 ms off; check that both clocks"
+        DatasetError, match=r"has a scan within 1 ms, the nearest is 2000 ms away; check that both clocks"
     ):
         write_times(layout.scans, [5.0, 6.0, 7.0])
         layout.open(max_time_difference=1)
@@ -152,9 +152,9 @@ def test_dates_of_kitti_are_times(write_layout):
 @pytest.mark.parametrize(
     ("times", "problem"),
     [
-        (["1.0", "soon", "3.0"], "'soon' is no time"),
+        (["1.0", "soon", "3.0"], "'soon' is not a time"),
         (["1.0", "2.0"], "has 2 times for 3 files"),
-        (["2011-99-26 13:02:25", "1", "2"], "is no time"),
+        (["2011-99-26 13:02:25", "1", "2"], "is not a time"),
     ],
 )
 def test_times_that_are_none(times, problem, write_layout):
@@ -166,5 +166,5 @@ def test_times_that_are_none(times, problem, write_layout):
 
 def test_times_that_are_asked_for_and_missing(write_layout):
     layout = write_layout("folder")
-    with pytest.raises(DatasetError, match=r"images knows no times to pair by; write .*timestamps\.txt"):
+    with pytest.raises(DatasetError, match=r"images has no times for pairing; write .*timestamps\.txt"):
         layout.open(max_time_difference=20)

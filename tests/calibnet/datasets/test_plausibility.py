@@ -151,7 +151,7 @@ def test_a_mirrored_extrinsic_is_refused_as_left_handed(write_layout, write_cali
     layout = write_layout("folder")
     mirrored = np.diag([-1.0, 1, 1, 1]) @ EXTRINSIC
     layout.calibration.write_text(write_calibration(camera_from_lidar=mirrored.tolist()))
-    with pytest.raises(ImplausibleError, match=r"is a reflection .* left-handed; negate one axis") as caught:
+    with pytest.raises(ImplausibleError, match=r"is a reflection .* left-handed; negate one of its axes") as caught:
         layout.open()
     assert caught.value.cause == "left-handed"
 

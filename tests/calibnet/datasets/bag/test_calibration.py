@@ -58,12 +58,12 @@ def test_other_images_have_the_matrix_k_and_its_lens(topic: str, tmp_path: Path)
 
 
 def test_rectified_images_without_their_matrix_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="this camera_info lacks their matrix P"):
+    with pytest.raises(DatasetError, match="this camera_info has no matrix P"):
         Bag([bag_of(tmp_path / "drive", {"/cam/image_rect": "/cam/camera_info"})])
 
 
 def test_a_camera_that_nobody_calibrated_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="the camera matrix is zero, as drivers write it"):
+    with pytest.raises(DatasetError, match="the camera matrix is zero, which drivers write"):
         Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, k=np.zeros(9))])
 
 
@@ -91,7 +91,7 @@ def test_a_projection_that_is_no_camera_says_nothing_of_others(p: Sequence[float
 
 def test_a_calibration_of_another_camera_is_not_taken(tmp_path: Path) -> None:
     path = bag_of(tmp_path / "drive", {"/left/image_raw": "/left/camera_info", "/right/image_raw": None})
-    with pytest.raises(DatasetError, match="does not say which CameraInfo is that of /right/image_raw, choose it"):
+    with pytest.raises(DatasetError, match="has several CameraInfo topics for /right/image_raw; choose one"):
         Bag([path], BagOptions(image="/right/image_raw"))
     assert Bag([path], BagOptions(image="/right/image_raw", info="/left/camera_info"))[0].camera.width == 128
 
@@ -119,7 +119,7 @@ def test_a_file_that_is_named_holds_rather_than_what_is_found(tmp_path: Path) ->
     path, guess = bag_of(tmp_path / "drive", topics), tmp_path / "chain.yaml"
     camera = "{camera_model: pinhole, intrinsics: [%d, 80, 64, 24], resolution: [128, 48]}"
     guess.write_text("".join(f"cam{number}: {camera % (80 + number)}\n" for number in range(2)))
-    with pytest.raises(DatasetError, match="holds cam0, cam1; say which one with --camera"):
+    with pytest.raises(DatasetError, match="has the cameras cam0, cam1; choose one with --camera"):
         Bag([path], BagOptions(guess=guess))
     frame = Bag([path], BagOptions(guess=guess, camera="cam1"))[0]
     assert frame.camera.matrix[0, 0] == 81.0
@@ -143,5 +143,5 @@ def test_a_file_that_does_not_say_the_size_gets_that_of_the_images(tmp_path: Pat
 def test_a_file_that_says_nothing_is_refused(tmp_path: Path) -> None:
     path, guess = bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}), tmp_path / "notes.yaml"
     guess.write_text("source: a colleague\n")
-    with pytest.raises(DatasetError, match="says neither where the LiDAR is nor what the camera is"):
+    with pytest.raises(DatasetError, match="has neither a camera nor the pose of the LiDAR"):
         Bag([path], BagOptions(guess=guess))

@@ -82,5 +82,5 @@ def test_it_is_unpacked_up_to_a_bound_and_leaves_nothing(packed_whole: Path, mon
 
 def test_it_is_not_unpacked_to_a_full_disk(packed_whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=unpacking.RESERVE_BYTES + 1000))
-    with pytest.raises(DatasetError, match=r"more than 0 MB, all the room that .*temporary has"):
+    with pytest.raises(DatasetError, match=r"more than 0 MB, the space available in .*temporary"):
         BagRecording([packed_whole])

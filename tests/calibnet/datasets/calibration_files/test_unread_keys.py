@@ -39,7 +39,8 @@ def test_geometry_under_another_name_is_refused_with_what_is_right(remedy, keys,
         with pytest.raises(DatasetError) as caught:
             layout.open()
         assert str(caught.value) == (
-            f"Calibration {layout.calibration} holds geometry that is not read: instead of '{key}' give {remedy}."
+            f"Calibration {layout.calibration} has geometry under keys that are not read: "
+            f"instead of '{key}' give {remedy}."
         )
 
 
@@ -47,7 +48,7 @@ def test_geometry_under_another_name_is_refused_with_what_is_right(remedy, keys,
 def test_a_lens_that_is_not_known_is_refused(model, write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(distortion_model=model))
-    with pytest.raises(DatasetError, match=f"distortion_model is '{model}', which is no lens that is known here"):
+    with pytest.raises(DatasetError, match=f"distortion_model is '{model}' is not a supported lens"):
         layout.open()
 
 

@@ -57,7 +57,7 @@ def test_frames_are_named_where_there_are_several(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('name="top" type="fixed"', 'name="top" type="revolute"', "no frame that is called like a lidar"),
+        ('name="top" type="fixed"', 'name="top" type="revolute"', "no frame with the name of a lidar"),
         ("0.7 0.0 1.4", "${x} 0.0 1.4", r"is a xacro; expand it: xacro cart\.urdf > robot\.urdf"),
         ("0.7 0.0 1.4", "0.7 0.0", r"transform 2\.translation has 2 numbers instead of 3"),
         ("0.7 0.0 1.4", "0.7 0.0 high", r"transform 2\.translation is not 3 numbers"),

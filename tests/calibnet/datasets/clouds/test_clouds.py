@@ -80,7 +80,7 @@ def test_float64_is_called_so(columns):
 def test_a_declared_layout_of_other_columns_is_refused(held, named):
     rows = scan(6000)[:, :held]
     names = ("x", "y", "z", "intensity", "ring")[:named]
-    with pytest.raises(CloudError, match=f"names {named} columns .* and its numbers look like rows of {held}"):
+    with pytest.raises(CloudError, match=f"names {named} columns .* but its numbers look like rows of {held}"):
         read_bin(rows.tobytes(), names)
     assert read_bin(rows.tobytes(), tuple("xyz") + ("a", "b", "c")[: held - 3])["x"] == pytest.approx(rows[:, 0])
 
@@ -97,7 +97,7 @@ def test_declared_columns_are_taken_as_they_are(write_layout, write_calibration)
         np.column_stack([rows[:, 4], rows[:, :4], rows[:, 5], rows[:, 5]]).astype(np.float32).tofile(path)
     assert_array_equal(layout.open()[1].points, rows[:, :4])
     layout.scans[1].write_bytes(layout.scans[1].read_bytes()[:-4])
-    with pytest.raises(DatasetError, match=r"no whole rows of 7 columns \(ring, x, y, z, Intensity, time, tag"):
+    with pytest.raises(DatasetError, match=r"number of rows of 7 columns \(ring, x, y, z, Intensity, time, tag"):
         layout.open()[1]
 
 
@@ -215,9 +215,9 @@ def test_clouds_as_numpy_saves_them(name, write_layout):
 @pytest.mark.parametrize(
     ("arrays", "problem"),
     [
-        ({"a": scan(), "b": scan()}, r"of its arrays \(a \(4000, 6\), b \(4000, 6\)\) not one alone is \[N, 4\]"),
-        ({"x": np.zeros(5), "y": np.zeros(4), "z": np.zeros(5)}, "its x, y and z are of different lengths"),
-        ({}, r"of its arrays \(none\) not one"),
+        ({"a": scan(), "b": scan()}, r"not have exactly one array \[N, 4\] among a \(4000, 6\), b \(4000, 6\)"),
+        ({"x": np.zeros(5), "y": np.zeros(4), "z": np.zeros(5)}, "its x, y and z have different lengths"),
+        ({}, r"exactly one array \[N, 4\] among none"),
     ],
 )
 def test_an_archive_without_one_cloud_says_what_it_holds(arrays, problem, write_layout):
@@ -235,7 +235,7 @@ def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(write_layout):
 
 
 def test_python_objects_are_not_opened(write_layout):
-    with pytest.raises(DatasetError, match="holds Python objects, which are not opened"):
+    with pytest.raises(DatasetError, match="contains Python objects, which are not read"):
         in_folder(write_layout("folder"), "0001.npy", lambda path, _: np.save(path, np.array([{}], object)))
 
 
@@ -280,7 +280,7 @@ def test_points_without_a_return_are_dropped():
 
 
 def test_points_of_a_map_are_no_scan():
-    with pytest.raises(DatasetError, match="its points are more than 100 km away, as those of a map are"):
+    with pytest.raises(DatasetError, match="its points are more than 100 km away, like those of a map"):
         clean_points(scan(300)[:, :4] + [5e5, 5e6, 100.0, 0.0], Path("a.bin"))
 
 
@@ -322,12 +322,12 @@ def test_columns_of_text_are_found_by_name_among_words_and_dropouts():
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("1.5 2.5 3.5 4.5 5.5\n", r"its 5 columns have no names; name them in its first line, or say them in cal"),
-        ("0 1.5 2.5 3.5\n1 2.5 3.5 4.5\n", "no names, and number 1 holds whole numbers alone"),
-        ("a,b,c\n1,2,3\n", r"its first line \(a,b,c\) names no columns x, y and z"),
+        ("1.5 2.5 3.5 4.5 5.5\n", r"its 5 columns have no names; name them in its first line, or name them in cal"),
+        ("0 1.5 2.5 3.5\n1 2.5 3.5 4.5\n", "no names, and column 1 has only whole numbers"),
+        ("a,b,c\n1,2,3\n", r"its first line \(a,b,c\) does not name columns x, y and z"),
         ("x,y,z\n1,2,far\n", "invalid value 'far'"),
         ("1.5 2.5 3.5\n1.5 2.5\n", r"Row #2: Expected 3 columns, got 2"),
-        ("x,y,z\n", "it holds no point"),
+        ("x,y,z\n", "it has no points"),
     ],
 )
 def test_text_that_is_no_cloud_is_one_sentence(text, sentence):

@@ -80,7 +80,7 @@ def test_a_named_pattern_is_demosaiced(write_layout, write_calibration, pattern,
 def test_a_picture_with_colours_is_not_demosaiced(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(bayer="rggb"))
-    with pytest.raises(DatasetError, match=r"has colours, though its calibration says 'bayer'; leave that out there"):
+    with pytest.raises(DatasetError, match=r"has colours, although its calibration has 'bayer'; remove that"):
         layout.open()[0]
     layout.calibration.write_text(write_calibration(bayer="rgbg"))
     with pytest.raises(DatasetError, match="bayer is 'rgbg'; give one of rggb, bggr, gbrg, grbg"):
@@ -95,7 +95,7 @@ def test_each_frame_s_size_is_checked_whatever_its_depth(write_layout):
     sequence = layout.open()
     assert sequence[0].image.shape == (48, 64, 3)
     for position in (1, 2):
-        with pytest.raises(DatasetError, match="is 64x24 and its calibration is for 64x48"):
+        with pytest.raises(DatasetError, match="is 64x24 but its calibration is for 64x48"):
             sequence[position]
 
 

@@ -40,7 +40,7 @@ def test_a_wide_lens_has_faces_and_the_user_is_told(write_layout, write_calibrat
     layout.calibration.write_text(write_calibration(**FISHEYE | {"camera_matrix": matrix, "distortion": [0.0] * 4}))
     wide = layout.open()
     (note,) = wide.notes
-    assert note.startswith("The lens is wide: it is looked through by 3 pinhole cameras in its place (")
+    assert note.startswith("The lens is wide: it is replaced by 3 pinhole cameras in its place (")
     frame = wide[0]
     assert len(frame.faces) == 3
     assert_array_equal(frame.as_taken.image, layout.pixels[0])
@@ -59,14 +59,14 @@ def ros(layout) -> str:
 def test_a_file_without_a_lidar_needs_a_guess(write_layout):
     layout = write_layout("folder")
     layout.calibration.write_text(ros(layout))
-    with pytest.raises(DatasetError, match=r"\(ROS's camera_info\) does not say where the LiDAR is; give a"):
+    with pytest.raises(DatasetError, match=r"\(ROS's camera_info\) has no pose of the LiDAR; give a"):
         layout.open()
     guess = layout.root.parent / "guess.yaml"
     guess.write_text(f"camera_from_lidar: {layout.camera_from_lidar.tolist()}\n")
     frame = layout.open(guess=guess)[0]
     assert_array_equal(frame.camera_from_lidar, layout.camera_from_lidar)
     assert_array_equal(frame.camera.matrix, layout.matrix)
-    with pytest.raises(DatasetError, match="has no extrinsic of a LiDAR"):
+    with pytest.raises(DatasetError, match="has no pose of a LiDAR"):
         layout.open(guess=layout.calibration)
 
 
@@ -96,7 +96,7 @@ def test_a_file_of_transforms_knows_no_camera(write_layout):
     layout.calibration.write_text(
         "- {parent: velo, child: cam_optical, translation: [0, 0, 0], rpy_deg: [-90, 0, -90]}"
     )
-    with pytest.raises(DatasetError, match="knows no camera; put the file of the camera there"):
+    with pytest.raises(DatasetError, match="has no camera; put the file of the camera there"):
         layout.open()
 
 
@@ -109,5 +109,5 @@ def test_size_of_the_picture_serves_files_that_do_not_say_it(write_layout):
     (layout.root / "calib.json").write_text(content)
     assert layout.open()[0].camera.width == 64
     cv2.imwrite(str(layout.images[2]), np.zeros((24, 32, 3), np.uint8))
-    with pytest.raises(DatasetError, match="is 32x24 and its calibration is for 64x48"):
+    with pytest.raises(DatasetError, match="is 32x24 but its calibration is for 64x48"):
         layout.open()[2]

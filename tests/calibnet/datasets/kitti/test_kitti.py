@@ -91,7 +91,7 @@ def test_odometry_times_come_from_the_file(write_layout):
     with pytest.raises(DatasetError, match=r"times\.txt has 2 times for 3 frames"):
         layout.open()
     times.write_text("0.0\nsoon\n0.2\n")
-    with pytest.raises(DatasetError, match=r"times\.txt: line 2 is no time"):
+    with pytest.raises(DatasetError, match=r"times\.txt: line 2 is not a time"):
         layout.open()
     times.unlink()
     assert_allclose([frame.timestamp for frame in layout.open()], [0.0, 0.1, 0.2])
@@ -140,7 +140,7 @@ def test_raw_times_are_optional_and_fall_back_to_ten_hertz(write_layout):
     assert [frame.timestamp for frame in layout.open()] == [0.0, 1.0, 2.0]
     stamps = next(layout.root.rglob("oxts/timestamps.txt"))
     stamps.write_text("2011-01-02 10:00:00.000000000\nyesterday\n")
-    with pytest.raises(DatasetError, match=r"timestamps\.txt: line 2 is no time"):
+    with pytest.raises(DatasetError, match=r"timestamps\.txt: line 2 is not a time"):
         layout.open()
     stamps.unlink()
     assert_allclose([frame.timestamp for frame in layout.open()], [0.0, 0.3, 0.6])

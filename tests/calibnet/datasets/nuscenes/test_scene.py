@@ -22,7 +22,7 @@ def test_only_the_keyframes_of_a_scene_are_read(write_layout):
     sequence = layout.open()
     assert sequence.name == "nuscenes/scene-0103" and len(sequence) == 3
     assert [round(frame.timestamp, 6) for frame in sequence] == [0.0, 0.5, 1.0]
-    assert sequence.notes == ("Scans are moved to the time of their images, by up to 40 ms of the car's way.",)
+    assert sequence.notes == ("Scans are moved to the time of their images, by up to 40 ms of the car's motion.",)
     assert open_sequence("nuscenes", layout.root, scene="103").name == "nuscenes/scene-0103"
     assert [one.name for one in find_sequences("nuscenes", layout.root, "scene-0103")] == ["nuscenes/scene-0103"]
 
@@ -75,7 +75,7 @@ def test_a_file_outside_of_the_root_is_not_read(write_layout):
     content = json.loads(table.read_text())
     content[1]["filename"] = "../../secret.png"
     table.write_text(json.dumps(content))
-    with pytest.raises(DatasetError, match=r"names \.\./\.\./secret\.png, which is not below"):
+    with pytest.raises(DatasetError, match=r"names \.\./\.\./secret\.png, which is outside"):
         layout.open()
 
 
