@@ -12,6 +12,8 @@ Rgb = tuple[int, int, int]
 
 NEAR_M: Final = 3.0
 FAR_M: Final = 80.0
+LABELLED_DEPTHS_M: Final = (3, 5, 10, 20, 40, 80)
+"""Depths in metres that are labelled on the scale of their colours."""
 EMPTY: Final[Rgb] = (62, 63, 72)
 """Cells that hold no LiDAR point."""
 EDGE: Final[Rgb] = (255, 60, 220)

@@ -24,8 +24,8 @@ def check_dataset(open_: Callable[[], Sequence]) -> None:
     sequence = open_()
     require(isinstance(sequence, Sequence), "A sequence has name, rig, __len__, __getitem__ and __iter__.")
     require(isinstance(sequence.name, str) and bool(sequence.name), "The sequence has no name.")
-    require(isinstance(sequence.rig, str) and bool(sequence.rig), f"{sequence.name} does not say its rig.")
-    require(len(sequence) > 0, f"{sequence.name} has no frame.")
+    require(isinstance(sequence.rig, str) and bool(sequence.rig), f"{sequence.name} has no rig.")
+    require(len(sequence) > 0, f"{sequence.name} has no frames.")
     frames = list(sequence)
     require(len(frames) == len(sequence), f"{sequence.name} has {len(sequence)} frames and yields {len(frames)}.")
     for frame in frames:
@@ -33,7 +33,7 @@ def check_dataset(open_: Callable[[], Sequence]) -> None:
     _check_order(frames)
     for position, frame in enumerate(frames):
         told = index_of(sequence, position)
-        require(told == frame.index, f"Frame {frame.index} is called {told} before it is read: see `Numbered`.")
+        require(told == frame.index, f"Frame {frame.index} has the number {told} before it is read, see `Numbered`.")
     _check_reading(sequence, frames)
     _same(frames[0], open_()[0], "opened again")
 
@@ -62,9 +62,9 @@ def check_frame(frame: Frame) -> None:
 
 def _check_order(frames: list[Frame]) -> None:
     indices, times = [frame.index for frame in frames], [frame.timestamp for frame in frames]
-    require(all(one < two for one, two in itertools.pairwise(indices)), f"Indices do not rise: {indices}.")
+    require(all(one < two for one, two in itertools.pairwise(indices)), f"Indices are not ascending: {indices}.")
     require(times[0] == 0.0, f"The first frame is at {times[0]} s and not at 0.")
-    require(times == sorted(times), f"Times do not rise: {times}.")
+    require(times == sorted(times), f"Times are not ascending: {times}.")
 
 
 def _check_reading(sequence: Sequence, frames: list[Frame]) -> None:
@@ -87,4 +87,4 @@ def _check_reading(sequence: Sequence, frames: list[Frame]) -> None:
 def _same(one: Frame, other: Frame, when: str) -> None:
     same = one.index == other.index and one.timestamp == other.timestamp and one.source == other.source
     same = same and np.array_equal(one.image, other.image) and np.array_equal(one.points, other.points)
-    require(same and np.array_equal(one.camera_from_lidar, other.camera_from_lidar), f"A frame is another when {when}.")
+    require(same and np.array_equal(one.camera_from_lidar, other.camera_from_lidar), f"A frame differs when {when}.")

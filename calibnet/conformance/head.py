@@ -44,7 +44,7 @@ def check_head(
             pose, again = module(*inputs), module(*inputs)
             alone = module(*_first(inputs))
         _check_pose(pose, len(inputs[1]))
-        require(torch.equal(pose.correction, again.correction), "The same field gives another correction.")
+        require(torch.equal(pose.correction, again.correction), "The same field gives different corrections.")
         same = torch.allclose(pose.correction[:1], alone.correction, atol=SINGLE_PRECISION)
         require(same, "A frame's correction depends on the other frames of its batch.")
     require(len(save(module.state_dict())) > 0, "The head's state cannot be stored.")
@@ -86,7 +86,7 @@ def _check_pose(pose: Pose, batch: int) -> None:
     for correction in pose.correction:
         require_rigid(correction.numpy(), "a correction", SINGLE_PRECISION)
     if pose.information is not None:
-        require(len(pose.information) == batch, "There is not one information a frame.")
+        require(len(pose.information) == batch, "There is not one information matrix per frame.")
         for information in pose.information:
             require_definite(information.numpy(), "an information")
 
@@ -101,6 +101,6 @@ def _check_gradient(module: nn.Module, inputs: tuple[DisplacementField, Tensor, 
     if loss.requires_grad:
         loss.backward()
     gradients = [leaf.grad for leaf in leaves if leaf.grad is not None]
-    require(bool(gradients), "No gradient reaches the displacement field, so that nothing could be trained.")
+    require(bool(gradients), "No gradient reaches the displacement field, so nothing could be trained.")
     finite = all(bool(torch.isfinite(gradient).all()) for gradient in gradients)
     require(finite and any(bool(gradient.any()) for gradient in gradients), "The gradient is zero or not finite.")

@@ -31,7 +31,7 @@ def check_method(calibrator: Calibrator, frame: Frame | None = None, drive: Fram
     """
     require(isinstance(calibrator, Calibrator), "A method has calibrate(frame, initial, detail=False).")
     if drives_only(calibrator):
-        require(drive is not None, "A method that tells something of drives alone is tested with a drive.")
+        require(drive is not None, "A method that calibrates only whole drives has to be tested with a drive.")
         assert isinstance(calibrator, DriveCalibrator)
         assert drive is not None
         _check_drives_only(calibrator, drive)
@@ -44,9 +44,9 @@ def check_method(calibrator: Calibrator, frame: Frame | None = None, drive: Fram
     untouched = np.array_equal(before.image, chosen.image) and np.array_equal(before.points, chosen.points)
     require(untouched and np.array_equal(initial, start), "The method changes the frame or the extrinsic it is given.")
     again = calibrator.calibrate(chosen, initial)
-    require(np.array_equal(trace.corrected, again.corrected), "The same frame and start give another result.")
+    require(np.array_equal(trace.corrected, again.corrected), "The same frame and start give different results.")
     blind = calibrator.calibrate(replace(chosen, camera_from_lidar=np.eye(4)), initial)
-    require(np.array_equal(trace.corrected, blind.corrected), "The method looks at the frame's own extrinsic.")
+    require(np.array_equal(trace.corrected, blind.corrected), "The method uses the frame's own extrinsic.")
     shown = calibrator.calibrate(chosen, initial, detail=True)
     check_trace(shown, start)
     _check_exhibits(shown)
@@ -61,7 +61,7 @@ def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
     stages = (*trace.wider, *trace.stages)
     numbers = [stage.number for stage in stages]
     rising = numbers == sorted(set(numbers)) and set(numbers) <= set(range(1, len(RANGES) + 1))
-    require(rising, f"The stages are numbered {numbers}; numbers rise, from 1 to {len(RANGES)}.")
+    require(rising, f"The stages are numbered {numbers} instead of ascending within 1 to {len(RANGES)}.")
     expected = initial
     for stage in stages:
         name = f"stage {stage.number}"
@@ -70,7 +70,7 @@ def check_trace(trace: CascadeTrace, initial: Extrinsic) -> None:
         require(np.allclose(stage.after, stage.correction @ stage.before), f"{name}: after is not correction @ before.")
         if stage.information is not None:
             require_definite(stage.information, f"the information of {name}")
-        require(min(stage.milliseconds.values(), default=0.0) >= 0, f"{name} took less than no time.")
+        require(min(stage.milliseconds.values(), default=0.0) >= 0, f"{name} has a negative time.")
         expected = stage.after
     require_rigid(trace.corrected, "the corrected extrinsic")
 
@@ -79,7 +79,10 @@ def _check_exhibits(trace: CascadeTrace) -> None:
     """Pictures and curves can be shown, and have names of their own."""
     for stage in trace.stages:
         names = [*(shown.name for shown in stage.exhibits), *(curve.name for curve in stage.curves)]
-        require(len(set(names)) == len(names) and all(names), f"What stage {stage.number} shows is called {names}.")
+        require(
+            len(set(names)) == len(names) and all(names),
+            f"The exhibits of stage {stage.number} do not have distinct names: {names}.",
+        )
         for shown in stage.exhibits:
             values: np.ndarray[tuple[int, ...], np.dtype[np.generic]] = np.asarray(shown.picture)
             is_map = values.ndim == 2 and values.dtype == np.float32
@@ -87,14 +90,14 @@ def _check_exhibits(trace: CascadeTrace) -> None:
             require(is_map or is_picture, f"{shown.name!r} is neither [H, W] float32 nor [H, W, 3] uint8.")
         for curve in stage.curves:
             finite = np.ndim(curve.values) == 1 and bool(np.isfinite(curve.values).all())
-            require(finite, f"{curve.name!r} is no curve of finite numbers.")
+            require(finite, f"{curve.name!r} is not a curve of finite numbers.")
 
 
 def _check_drives_only(calibrator: DriveCalibrator, drive: Frames) -> None:
     """The drive's promises, and those of what is shown of its frames."""
     initial = miscalibration([0.6, -0.6, 0.5], [0.03, -0.03, 0.03]) @ drive[0].camera_from_lidar
     estimate = _check_drive(calibrator, drive, initial)
-    require(bool(estimate.traces), "Nothing is told of the drive's frames: the estimate has no traces.")
+    require(bool(estimate.traces), "The estimate has no traces of the drive's frames.")
     for trace in estimate.traces.values():
         check_trace(trace, initial)
         _check_exhibits(trace)
@@ -110,9 +113,9 @@ def _check_drive(calibrator: DriveCalibrator, frames: Frames, initial: Extrinsic
     require_definite(estimate.covariance, "the covariance of the drive's extrinsic")
     require(0 < estimate.frames <= len(frames), f"The estimate is from {estimate.frames} of {len(frames)} frames.")
     reads, totals = [read for read, _ in told], {total for _, total in told}
-    require(reads == list(range(len(reads))), f"The observer hears of {reads} frames read.")
+    require(reads == list(range(len(reads))), f"The observer is called with {reads} frames read.")
     ended = totals in ({len(reads)}, {len(reads) - 1})  # with or without a last call that all are read
-    require(ended, f"The observer hears of {totals} frames to read, and {len(reads)} times of one.")
+    require(ended, f"The observer is called with totals {totals}, and {len(reads)} times with a frame.")
     return estimate
 
 

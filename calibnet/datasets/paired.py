@@ -67,7 +67,7 @@ class FrameFiles:
         there = self.image or self.scan
         assert there is not None, "a frame has one file at least"
         what = "image" if self.image is None else "scan"
-        raise DatasetError(f"{there} has no {what} of the same name; add it, or remove this file.")
+        raise DatasetError(f"There is no {what} for {there.stem} ({there}); add it, or remove this file.")
 
 
 class PairedSequence(ABC):

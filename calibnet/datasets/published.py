@@ -45,7 +45,7 @@ class Published:
         words = re.split(r"[/\s]", text.strip())
         if not (self.example.count("/") < len(words) <= len(self.parts) and all(words)):
             form = "/".join(self.parts).upper()
-            raise ConfigError(f"Sequence {text!r} is not {form}, for instance {self.example}.")
+            raise ConfigError(f"Sequence {text!r} is not {form}; give for instance {self.example}.")
         return dict(zip(self.parts, words, strict=False))
 
     def files_of(self, text: str, camera: str = "") -> tuple[str, ...]:

@@ -55,5 +55,7 @@ def open_sequence(dataset: str, root: Path | str, **options: Any) -> Sequence:
     opened = source(Path(root), **options)
     lacks = [name for name in ("name", "rig", "__len__", "__getitem__", "__iter__") if not hasattr(opened, name)]
     if lacks:
-        raise ConfigError(f"Dataset {dataset} is no sequence, for it lacks {', '.join(lacks)}; update its package.")
+        raise ConfigError(
+            f"Dataset {dataset} is not a sequence, since it lacks {', '.join(lacks)}; update its package."
+        )
     return cast(Sequence, opened)

@@ -27,10 +27,10 @@ def select_frames(sequence: Sized, text: str = ":") -> list[int]:
     """
     match = _PATTERN.fullmatch(text)
     if match is None:
-        raise ConfigError(f"Frames {text!r} are neither a position nor START:STOP:STEP, for instance 0:100:5.")
+        raise ConfigError(f"Frames {text!r} are not a position or START:STOP:STEP; write for instance 7 or 0:100:5.")
     position, *bounds = (None if number is None else int(number) for number in match.groups())
     if bounds[2] == 0:
-        raise ConfigError(f"Frames {text!r} step by 0; a step is at least 1, for instance 0:100:5.")
+        raise ConfigError(f"Frames {text!r} have a step of 0; write for instance 0:100:5.")
     count = len(sequence)
     if position is None:
         selected = list(range(count)[slice(*bounds)])
@@ -38,7 +38,9 @@ def select_frames(sequence: Sized, text: str = ":") -> list[int]:
         selected = [position % count] if -count <= position < count else []
     if not selected:
         name = getattr(sequence, "name", "the sequence")
-        raise DatasetError(f"Frames {text!r} select nothing of {name}, which has {count} frames (0 to {count - 1}).")
+        raise DatasetError(
+            f"Frames {text!r} select nothing of {name}; choose from its {count} frames (0 to {count - 1})."
+        )
     return selected
 
 

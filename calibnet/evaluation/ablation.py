@@ -74,7 +74,7 @@ def measure_ablation(
             if frame is not None and timed:
                 row["latency_ms"] = latency(stage or _untrained(network, range_), frame, timed)
             if stage is None or not sequences:
-                yield row | {"why": why or "No frames were given to measure errors on."}
+                yield row | {"why": why or "No frames were given for measuring errors."}
                 continue
             for rig, of_rig in by_rig(sequences).items():
                 errors = _errors(stage, of_rig, repeats, seed, f"{preset}, {name}, {rig}", told)
@@ -91,15 +91,17 @@ def _trained(
     """
     train = f"`calib-inspect train --preset {preset} --ablation {name} --range {range_} --output"
     if weights is None:
-        return None, MethodCard(), f"No folder of weights was given; {train} DIR` fills one."
+        return None, MethodCard(), f"No folder of weights was given; {train} DIR` makes them."
     folder = ablation_folder(weights, name)
     path = weights_path(preset, range_, folder)
     if not path.exists():
-        return None, MethodCard(), f"There are no weights at {path}; {train} {weights}` makes them."
+        return None, MethodCard(), f"Weights {path} do not exist; {train} {weights}` makes them."
     stage = Cascade.load(preset, (RANGES.index(range_) + 1,), folder).stages[0]
     wanted, found = ablated(load_preset(preset), name), stage.network.config
     if any(getattr(wanted, switch) != getattr(found, switch) for switch in ABLATIONS.values() if switch):
-        raise WeightsError(f"{path} holds the network of another row of the ablation; {train} {weights}` makes it.")
+        raise WeightsError(
+            f"{path} has the network of another row of the ablation; {train} {weights}` makes the right one."
+        )
     return stage, MethodCard.trained(0, 0, [read_record(path)]), ""
 
 

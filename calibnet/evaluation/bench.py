@@ -188,10 +188,10 @@ def measure_row(
         if time.monotonic() - began > bench.limit_s:
             break
     if not errors:
-        return {"runs": 0, "refused": 0, "why": "There is no drive of several frames on one mount among them."}
+        return {"runs": 0, "refused": 0, "why": "None of the data is a drive of several frames on one mount."}
     row: dict[str, Any] = {"runs": len(errors), "of_runs": len(tries), "refused": refused}
     if refused == len(errors):
-        return row | {"why": why or "The method rejects all that it finds."}
+        return row | {"why": why or "The method rejects all its results."}
     return row | Metrics.of(errors).as_dict()
 
 

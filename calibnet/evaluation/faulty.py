@@ -38,7 +38,9 @@ class Faulty:
         for fault in self._faults(number):
             if (fault.name, fault.strength) == (self.fault.name, self.fault.strength):
                 return fault.put(frame)
-        raise DatasetError(f"Frame {position} of {self.sequence.name} cannot have the fault {self.fault.name}.")
+        raise DatasetError(
+            f"The fault {self.fault.name} cannot be applied to frame {position} of {self.sequence.name}."
+        )
 
     def _faults(self, number: int) -> Iterable[Corruption]:
         yield from corruptions(self.sequence, self.positions[number], self.donors)

@@ -83,7 +83,8 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
     if counts.min() < FEWEST:
         told = ", ".join(f"{count} {name}" for name, count in zip(("none", *FAULTS), counts, strict=True))
         raise CalibrationError(
-            f"Too few runs tell faults of the lens apart ({told}); {FEWEST} of each are needed. Make more runs."
+            f"There are too few runs with faults of the lens ({told}); at least {FEWEST} of each are needed. Make more "
+            "runs."
         )
     names = list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])

@@ -119,7 +119,7 @@ class _Measurement:
             method, self.sequences, self.range, self.repeats, self.seed, lambda name, *_: advance(name)
         )
         if solved is None:
-            raise CalibrationError(f"{row} needs drives of several frames on one mount, and there is none.")
+            raise CalibrationError(f"{row} needs drives of several frames on one mount; give such data.")
         return solved.estimate
 
     def with_drives(self, evaluation: Evaluation, cascade: DriveCalibrator) -> Evaluation:

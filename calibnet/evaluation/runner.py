@@ -231,7 +231,7 @@ def evaluate_frames(
                 if observer is not None:
                     observer(runs[-1])
     if not runs:
-        raise DatasetError("There is no frame to evaluate; check the sequences and the frame selection.")
+        raise DatasetError("There are no frames to evaluate; check the sequences and the frame selection.")
     if not ranges:
         raise failure or CalibrationError("No stage of the cascade ran, so there is nothing to measure.")
     return Evaluation(

@@ -151,8 +151,8 @@ def fit_classifier(
     good = np.array([run.good for run in asked], bool)
     if min(int(good.sum()), int((~good).sum())) < fewest:
         raise CalibrationError(
-            f"Of {len(runs)} runs {int(good.sum())} end right and {int((~good).sum())} wrong though picture and scan "
-            f"seem to fit; {fewest} of each at least are needed to tell them apart. Make more runs, or add other data."
+            f"Of {len(runs)} runs {int(good.sum())} are right and {int((~good).sum())} wrong although image and scan "
+            f"seem to fit; at least {fewest} of each are needed. Make more runs, or add other data."
         )
     names = list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])

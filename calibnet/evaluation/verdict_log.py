@@ -71,7 +71,7 @@ class Source:
         found = [sequence for spec in self.data for sequence in open_data(spec)]
         found += [SyntheticSequence(SYNTHETIC_SEED + number, SYNTHETIC_LENGTH) for number in range(self.synthetic)]
         if not found:
-            raise ConfigError("There is nothing to run on: give --data, or --synthetic-drives above 0.")
+            raise ConfigError("There are no drives; give --data, or --synthetic-drives above 0.")
         return found
 
     def open(self) -> RunStream | DriveStream:

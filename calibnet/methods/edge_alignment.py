@@ -49,6 +49,6 @@ def exhibits(frame: Frame) -> tuple[Exhibit, ...]:
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
     across, any_way = picture_edges(grey, camera)
     return (
-        Exhibit("Edges across the rows: depth edges are drawn to them", across.image),
-        Exhibit("All edges: those of reflectance are drawn to them", any_way.image),
+        Exhibit("Edges across the rows, to which depth edges are aligned", across.image),
+        Exhibit("All edges, to which those of reflectance are aligned", any_way.image),
     )

@@ -46,7 +46,7 @@ class InformationDistance:
         clock = Clock(torch.device("cpu"))
         terms = [term for term in gather(frame, initial).terms if isinstance(term, Reflectance)]
         if not terms:
-            raise CalibrationError(f"Frame {frame.index} has too few points with reflectance in the picture.")
+            raise CalibrationError(f"Frame {frame.index} has too few points with reflectance inside the image.")
         evidence = Evidence(tuple(terms))
         clock("histogram")
         generator = np.random.default_rng(SEED)
@@ -58,7 +58,7 @@ class InformationDistance:
         change, camera = pose_from_vector(found[int(distances.argmin())]), picture_camera(frame.camera)
         stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
         if detail:
-            brightness = Exhibit("Brightness held against the scan's reflectance", terms[0].brightness.image)
-            curve = Curve("How far above the best each start came down, sorted", np.sort(distances) - distances.min())
+            brightness = Exhibit("Brightness compared with the scan's reflectance", terms[0].brightness.image)
+            curve = Curve("Final distance of each start above the best, sorted", np.sort(distances) - distances.min())
             stage = replace(stage, exhibits=(brightness,), curves=(curve,))
         return CascadeTrace(initial, (stage,))

@@ -49,11 +49,11 @@ def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calib
     asked = {option: value for option, value in options.items() if value is not None and value is not False}
     for option in asked:
         if not accepts(maker, option):
-            raise ConfigError(f"The method {name!r} takes no --{option.replace('_', '-')}; leave it out.")
+            raise ConfigError(f"--{option.replace('_', '-')} does not apply to the method {name!r}; leave it out.")
     try:
         inspect.signature(maker).bind(range_, **asked)
     except TypeError as error:
-        raise ConfigError(f"The method {name!r} is not made with a range ({error}); update its package.") from None
+        raise ConfigError(f"The method {name!r} cannot be made with a range ({error}); update its package.") from None
     method: Calibrator = maker(range_, **asked)
     return method
 

@@ -42,7 +42,7 @@ class Unjudged:
     def _verdict(self, initial: Extrinsic, found: Extrinsic, own: Verdict | None) -> Verdict:
         if own is not None and own.word == REJECTED:
             return own
-        reason = f"{self.name} finds an extrinsic and does not judge it: only results of the cascade can be accepted."
+        reason = f"Results of {self.name} are not judged; only results of the cascade can be accepted."
         if own is not None and own.word == CANNOT_TELL:
             reason = f"{reason} {own.reason}"
         stated = None if own is None else own.covariance

@@ -64,33 +64,36 @@ class NetworkConfig:
             raise ConfigError(f"Preset {self.name!r}: head must be one of {', '.join(HEADS.names())}.")
         for wrong, message in (
             (len(self.widths) != len(self.blocks), "widths and blocks must have the same length"),
-            (not self.scales, "there must be a scale"),
+            (not self.scales, "there must be at least one scale"),
             (
                 any(coarse != 2 * fine for fine, coarse in itertools.pairwise(self.scales)),
-                "each scale must be twice the one before",
+                "each scale must be twice the previous one",
             ),
             (
                 not set(self.scales) <= {2 ** (level + 1) for level in range(len(self.widths))},
-                f"scales must be powers of two, of 2 to {2 ** len(self.widths)} for {len(self.widths)} widths",
+                f"scales must be powers of two from 2 to {2 ** len(self.widths)} for {len(self.widths)} widths",
             ),
             (
                 self.radius < 2 or self.radius % 2 != 0,
                 "the radius must be even and at least 2, so that windows align across scales",
             ),
             (self.feature_channels % self.groups != 0, "groups must divide feature_channels"),
-            (self.hourglasses < 1, "there must be a hourglass; switch `aggregation` off instead"),
-            (len(_each(self.volume_channels, len(self.scales))) != len(self.scales), "volume_channels has one a scale"),
+            (self.hourglasses < 1, "there must be at least one hourglass; switch `aggregation` off instead"),
+            (
+                len(_each(self.volume_channels, len(self.scales))) != len(self.scales),
+                "volume_channels must have one value per scale",
+            ),
             (
                 len(_each(self.hourglass_blocks, self.hourglasses)) != self.hourglasses,
-                "hourglass_blocks has one a hourglass",
+                "hourglass_blocks must have one value per hourglass",
             ),
             (
                 self.image_encoder != "own" and self.share_extractor,
-                "a pretrained image_encoder takes pictures only: share_extractor must be false with it",
+                "share_extractor must be false with a pretrained image_encoder, which takes only images",
             ),
             (
                 self.image_encoder != "own" and len(self.widths) < 4,
-                "a pretrained image_encoder has four levels, so there must be four widths or more",
+                "there must be at least four widths with a pretrained image_encoder, which has four levels",
             ),
         ):
             if wrong:
@@ -140,6 +143,6 @@ def preset_names() -> list[str]:
 def load_preset(name: str) -> NetworkConfig:
     """Read a shipped preset; ``ConfigError`` lists the ones there are."""
     if name not in preset_names():
-        raise ConfigError(f"There is no preset {name!r}; choose one of {', '.join(preset_names())}.")
+        raise ConfigError(f"{name!r} is not a preset; choose from {', '.join(preset_names())}.")
     text = (resources.files("calibnet.network") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     return parse_config({"name": name, **parse_toml(text)}, f"Preset {name!r}")

@@ -29,7 +29,7 @@ def ablated(config: NetworkConfig, name: str) -> NetworkConfig:
         ConfigError: there is no such row.
     """
     if name not in ABLATIONS:
-        raise ConfigError(f"There is no ablation {name!r}; choose one of {', '.join(ABLATIONS)}.")
+        raise ConfigError(f"{name!r} is not a row of the ablation; choose from {', '.join(ABLATIONS)}.")
     switch = ABLATIONS[name]
     changes: dict[str, Any] = {switch: False} if switch else {}
     return replace(config, **changes)

@@ -100,7 +100,7 @@ def inherited_licence(options: TrainingOptions) -> str:
     if not options.initialize:
         return ""
     said = read_record(Path(options.initialize)).get("licence_note")
-    return one_line(said or "It is not said what these were trained on.", 10 * LONGEST)
+    return one_line(said or "It is not recorded what these were trained on.", 10 * LONGEST)
 
 
 def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNetwork:
@@ -134,7 +134,8 @@ def initialize(network: TrainedNetwork, options: TrainingOptions) -> TrainedNetw
         other = load_method_network(Path(options.initialize))
         if type(other) is not type(network):
             raise ConfigError(
-                f"{options.initialize} is of {other.NAME}, not of {network.NAME}; start from its weights."
+                f"{options.initialize} has the weights of {other.NAME}, not of {network.NAME}; give weights of that "
+                "network."
             )
         network.load_state_dict(other.state_dict())
         return other
@@ -147,8 +148,7 @@ def initialize(network: TrainedNetwork, options: TrainingOptions) -> TrainedNetw
         network.load_state_dict(given)
     except RuntimeError:  # lists every name and shape
         raise ConfigError(
-            f"{options.initialize} holds another network than preset {options.preset}; "
-            "start from weights of that preset."
+            f"{options.initialize} is not a network of preset {options.preset}; give weights of that preset."
         ) from None
     if network.config.share_image_branch and not options.train_image_branch:
         for name, parameter in network.features.named_parameters():
@@ -170,7 +170,7 @@ def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]
     if not options.packed:
         return training_sources(options)
     if options.data:
-        raise ConfigError("Give either --packed, frames that were packed beforehand, or --data.")
+        raise ConfigError("Give either --packed or --data, not both.")
     return read_packed(Path(options.packed)), validation_sequences(options)
 
 

@@ -54,7 +54,7 @@ def training_sources(options: TrainingOptions) -> tuple[list[Source], list[Seque
         pool = SyntheticPool(options.scenes, options.seed, cache)
         sources.append(Source(pool, options.synthetic, synthetic=True))
     if not sources:
-        raise ConfigError("There is nothing to train on: give --data, or a --synthetic share above 0.")
+        raise ConfigError("There is no training data; give --data, or a --synthetic share above 0.")
     return sources, validation
 
 
@@ -79,9 +79,7 @@ def open_data(spec: str) -> list[Sequence]:
     if dataset == LIST and root_text:
         listed = list(open_list(Path(root_text), name))
         if not listed:
-            raise DatasetError(
-                f"{root_text} lists no drive that is {name or ACCEPTED}; nothing of it can be trained on."
-            )
+            raise DatasetError(f"{root_text} has no drive that is {name or ACCEPTED}; give a list that has some.")
         return listed
     if dataset not in dataset_names() or not root_text:
         raise ConfigError(
@@ -90,10 +88,10 @@ def open_data(spec: str) -> list[Sequence]:
         )
     root = Path(root_text)
     if not root.is_dir():
-        raise DatasetError(f"There is no folder {root}; {spec!r} names it.")
+        raise DatasetError(f"Folder {root} of {spec!r} does not exist; check the path.")
     found = list(find_sequences(dataset, root, name))
     if not found:
         raise DatasetError(
-            f"Nothing of dataset {dataset} is found for {spec!r}; check the folder and the sequence's name."
+            f"No sequence of dataset {dataset} was found for {spec!r}; check the folder and the sequence's name."
         )
     return found

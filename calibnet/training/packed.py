@@ -53,7 +53,7 @@ def unpack_scan(data: bytes) -> NDArray[np.float32]:
     unpacker = zlib.decompressobj()
     flat = np.frombuffer(unpacker.decompress(data, LARGEST_SCAN), np.uint8)
     if not unpacker.eof:
-        raise ValueError("its scan is cut short or too large")
+        raise ValueError("its scan is truncated or too large")
     octets = flat.reshape(7, len(flat) // 7)
     difference = octets[:6].reshape(3, 2, -1).transpose(0, 2, 1).copy().view(np.int16)[..., 0]
     points = np.empty((octets.shape[1], 4), np.float32)
@@ -165,7 +165,9 @@ def read_packed(folder: Path) -> list[Source]:
     sequences = [PackedSequence(source.name, source.rig or source.name) for source in parts[0].sources]
     for part in parts:
         if part.sources != parts[0].sources:
-            raise DatasetError(f"{part.path} is of another packing than {parts[0].path}; keep one in a folder.")
+            raise DatasetError(
+                f"{part.path} belongs to another packing than {parts[0].path}; keep one packing per folder."
+            )
         for position, number in enumerate(part.tensors["sources"].tolist()):
             sequences[number].take(part, position)
     return [

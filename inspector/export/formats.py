@@ -6,6 +6,7 @@ import json
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation as ScipyRotation
 
 from calibnet.geometry import CameraModel, invert
 from calibnet.geometry.types import Floats, Rotation
@@ -138,18 +139,9 @@ def covariance_lines(exported: Exported) -> list[str]:
 
 
 def quaternion_xyzw(rotation: Rotation) -> Floats:
-    """The unit quaternion of a 3x3 rotation, ``w`` not negative; exact at half turns as well (Bar-Itzhack)."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
-    symmetric = np.array(
-        [
-            [xx - yy - zz, xy + yx, xz + zx, zy - yz],
-            [xy + yx, yy - xx - zz, yz + zy, xz - zx],
-            [xz + zx, yz + zy, zz - xx - yy, yx - xy],
-            [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-        ]
-    )
-    quaternion: Floats = np.linalg.eigh(symmetric)[1][:, -1]
-    return -quaternion if quaternion[3] < 0.0 else quaternion
+    """The unit quaternion of a 3x3 rotation, with ``w`` not negative."""
+    quaternion: Floats = ScipyRotation.from_matrix(rotation).as_quat(canonical=True)
+    return quaternion
 
 
 def _entry(name: str, matrix: Floats) -> str:

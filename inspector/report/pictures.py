@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calibnet.datasets.images.development import ImageError
 from calibnet.datasets.images.files import decode_image
 from calibnet.errors import CalibnetError
-from inspector.colors import FAR_M, NEAR_M, depth_colors
+from inspector.colors import FAR_M, LABELLED_DEPTHS_M, NEAR_M, depth_colors
 
 PICTURE_WIDTH = 1600
 """Width of all pictures in pixels, so that points look alike for all cameras."""
@@ -28,7 +28,6 @@ TALLEST = 8
 """Largest height of an image, relative to its width."""
 SHIFT = 4
 """Fractional bits of the positions at which cv2 draws."""
-SCALE_LABELS_M = (3, 5, 10, 20, 40, 80)
 
 
 class PictureError(CalibnetError):
@@ -82,7 +81,7 @@ def depth_scale() -> str:
         f'fill="rgb({red},{green},{blue})"/>'
         for index, (red, green, blue) in enumerate(depth_colors(depths).tolist())
     ]
-    for metres in SCALE_LABELS_M:
+    for metres in LABELLED_DEPTHS_M:
         x = width * float(np.log(metres / NEAR_M) / span)
         anchor = {NEAR_M: "start", FAR_M: "end"}.get(metres, "middle")
         label = escape(f"{metres} m" if metres == FAR_M else f"{metres}")

@@ -39,7 +39,10 @@ class SyntheticSequence:
             ConfigError: the seed is negative or there is no frame.
         """
         if seed < 0 or length < 1:
-            raise ConfigError(f"A synthetic drive needs a seed from 0 and a length from 1, not {seed} and {length}.")
+            raise ConfigError(
+                f"A synthetic drive with seed {seed} and length {length} is not possible; give a seed from 0 and a "
+                "length from 1."
+            )
         generator = np.random.default_rng([seed, 1])
         travel = length * EGO_SPEED * FRAME_INTERVAL
         self.seed, self.length = seed, length

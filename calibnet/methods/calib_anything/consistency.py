@@ -43,8 +43,9 @@ class Consistency:
         self.scan = scan.only(self._inside(guess)[0])
         if len(self.scan.points) < FEWEST_POINTS:
             raise CalibrationError(
-                f"Only {len(self.scan.points)} points of {MOST_POINTS} are in the picture under the guess, too few for "
-                "masks; is the guess that far off?"
+                f"Only {len(self.scan.points)} points of {MOST_POINTS} are inside the image under the guess, too few "
+                "for "
+                "masks; give a better guess."
             )
         self.columns = np.concatenate(
             [np.stack([self.scan.reflectance, self.scan.reflectance**2]), self.scan.normals.T]

@@ -45,8 +45,8 @@ def read_masks(folder: Path, frame: Frame, camera: PinholeCamera) -> Labels:
     files = sorted(where.glob("*.png"))[:MOST_MASKS] if where.is_dir() else []
     if not files:
         raise ConfigError(
-            f"There are no masks in {where}: --masks DIR holds, for each picture, a folder of its name without ending, "
-            "with a PNG for each mask, as Segment Anything's amg.py writes them."
+            f"{where} has no masks; --masks DIR needs a folder for each picture, named like it without suffix, "
+            "with one PNG per mask, as written by Segment Anything's amg.py."
         )
     masks = [_read_mask(file, frame) for file in files]
     labels = np.full((camera.height, camera.width), NONE, np.int64)
@@ -62,8 +62,9 @@ def _read_mask(file: Path, frame: Frame) -> NDArray[np.bool_]:
     size = (frame.camera.height, frame.camera.width)
     if pixels.shape[:2] != size:
         raise ConfigError(
-            f"The mask {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels and its picture {size[1]} x {size[0]}; "
-            "make the masks from the pictures as they are calibrated."
+            f"The mask {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels but its picture has {size[1]} x "
+            f"{size[0]}; "
+            "make masks from the same pictures that are calibrated."
         )
     return np.asarray(pixels.max(axis=2) > 127)
 

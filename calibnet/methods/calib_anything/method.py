@@ -53,7 +53,7 @@ class CalibAnything:
         clock("search")
         stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
         if detail:
-            curve = Curve("Gain in score of the best so far, over the search", scores - scores[0])
+            curve = Curve("Gain in the best score so far, over the search", scores - scores[0])
             stage = replace(stage, exhibits=tuple(exhibits(labels, score, stage)), curves=(curve,))
         return CascadeTrace(initial, (stage,))
 
@@ -78,10 +78,10 @@ def exhibits(labels: Labels, score: Consistency, stage: StageTrace) -> Iterator[
     """The masks, and how alike the points in each are at the start and in the end."""
     yield Exhibit("Masks", painted(labels))
     maps = {}
-    for name, extrinsic in (("at the start", stage.before), ("in the end", stage.after)):
+    for name, extrinsic in (("at the start", stage.before), ("at the end", stage.after)):
         scores, counts = score.of_masks(extrinsic)
         known = np.append(np.where(counts >= FEWEST, scores, np.nan), np.nan)  # the last one for no mask
-        maps[f"How alike the points in each mask are, {name}"] = known[labels].astype(np.float32)
+        maps[f"Similarity of the points in each mask, {name}"] = known[labels].astype(np.float32)
     seen = np.concatenate([values[np.isfinite(values)] for values in maps.values()])
     limits = (float(seen.min()), float(seen.max())) if seen.size else None  # of both, since they are to be compared
     yield from (Exhibit(name, values, limits) for name, values in maps.items())

@@ -77,7 +77,7 @@ class MethodNetwork(nn.Module):
             depth = F.max_pool2d(depth, self.POOLING, 1, self.POOLING // 2)
         output = self.estimate(fitted_image(inputs, *size), depth)
         seen = depth[:, 0].masked_fill(depth[:, 0] == 0, torch.nan)
-        return output._replace(shown={"Inverse depth, as the network sees it": seen, **output.shown})
+        return output._replace(shown={"Inverse depth, input of the network": seen, **output.shown})
 
     def estimate(self, image: Tensor, depth: Tensor) -> MethodOutput:
         """From a picture ``[B, 3, H, W]``, about zero mean and unit variance, and inverse depth ``[B, 1, H, W]``."""

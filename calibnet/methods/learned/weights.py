@@ -30,21 +30,21 @@ def load_method_network(path: Path) -> MethodNetwork:
     """
     header = read_header(path)
     if header.config.get("name") not in NETWORKS:
-        raise WeightsError(f"{path} holds no network of {', '.join(NETWORKS.names())}; {REMEDY}.")
+        raise WeightsError(f"{path} is not a network of {', '.join(NETWORKS.names())}; {REMEDY}.")
     config = validated(MethodConfig, header.config, f"The header of {path}", WeightsError, REMEDY)
     try:
         range_ = MiscalibrationRange.parse(header.range)
     except ConfigError as error:
         raise WeightsError(f"{path}: {error} Copy it again, or {REMEDY}.") from None
     if (config.input_height, config.input_width) != (MethodConfig.input_height, MethodConfig.input_width):
-        raise WeightsError(f"{path} is of another size of input than this version's networks; {REMEDY}.")
+        raise WeightsError(f"{path} has another input size than the networks of this version; {REMEDY}.")
     with torch.device("meta"):  # its size costs no memory there
         promised = method_network(config, range_).state_dict()
     stored = load_file(path)
     if {name: t.shape for name, t in promised.items()} != {name: t.shape for name, t in stored.items()}:
         raise WeightsError(f"{path} does not fit the network of this version; {REMEDY}.")
     if not all(torch.isfinite(tensor).all() for tensor in stored.values() if tensor.is_floating_point()):
-        raise WeightsError(f"{path} holds numbers that are not finite; copy it again, or {REMEDY}.")
+        raise WeightsError(f"{path} contains numbers that are not finite; copy it again, or {REMEDY}.")
     network = method_network(config, range_)
     network.load_state_dict(stored)
     return network.eval()
@@ -68,7 +68,7 @@ def load_method_stage(name: str, range_: MiscalibrationRange, folder: Path) -> M
         return None
     network = load_method_network(path)
     if name != network.NAME or network.range != range_:
-        raise WeightsError(f"{path} holds the weights of {network.NAME}, {network.range}; give it its own name back.")
+        raise WeightsError(f"{path} has the weights of {network.NAME}, {network.range}; restore its original name.")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     settings = method_settings(load_manifest(name, folder), range_)
     return MethodStage(RANGES.index(range_) + 1 if range_ in RANGES else 0, range_, network.to(device), settings)
@@ -78,7 +78,7 @@ def missing(name: str, range_: MiscalibrationRange, folder: Path | None) -> Weig
     """That a method has not been trained, with the command that does it."""
     where = f"no weights for {range_.label} in {folder}" if folder else "no weights in the package"
     return WeightsError(
-        f"Method {name} has {where}: make them with `calib-inspect train --method {name} --range {range_} "
-        f"--samples 10000 --packed DIR --output {folder or 'WEIGHTS'}` (--data instead of --packed trains on frames "
-        f"of datasets) and name their folder with --weights."
+        f"Method {name} has {where}; make them with `calib-inspect train --method {name} --range {range_} "
+        f"--samples 10000 --packed DIR --output {folder or 'WEIGHTS'}` (or with --data instead of --packed) "
+        f"and give their folder with --weights."
     )

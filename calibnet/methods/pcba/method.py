@@ -93,7 +93,7 @@ class PCBA:
         Raises:
             CalibrationError: always.
         """
-        raise CalibrationError("pcba needs several frames of a drive that moves, and this is one frame.")
+        raise CalibrationError("pcba needs several frames of a moving car; give a drive instead of one frame.")
 
     def calibrate_drive(
         self, frames: Frames, initial: Extrinsic, observer: Callable[[int, int], None] | None = None
@@ -108,8 +108,8 @@ class PCBA:
         metres, _ = path(drive.poses)
         if metres < LEAST_MOTION_M:
             raise CalibrationError(
-                f"pcba needs a drive that moves: this one moves {metres:.1f} m in the {len(drive.poses)} frames whose "
-                f"scans fit onto each other, and {LEAST_MOTION_M:g} m are needed."
+                f"pcba needs a moving car: this one moves {metres:.1f} m in the {len(drive.poses)} frames whose "
+                f"scans can be registered, but {LEAST_MOTION_M:g} m are needed."
             )
         planes = planes_of(drive.scans, drive.poses)
         rounds: list[tuple[Tracks, Adjusted]] = []
@@ -120,8 +120,8 @@ class PCBA:
         if not self.range.contains(initial @ invert(extrinsic), FARTHEST):
             turned, shifted = moved(initial, extrinsic)
             raise CalibrationError(
-                f"pcba ends {turned:.1f}° and {shifted:.0f} cm from the start, far out of the range "
-                f"{self.range.label}: the drive does not tell its extrinsic, or the start is too far off."
+                f"The result of pcba is {turned:.1f}° and {shifted:.0f} cm from the start, far outside the range "
+                f"{self.range.label}: the drive does not determine the extrinsic, or the start is too far off."
             )
         return self._estimate(drive, planes, rounds, initial)
 
@@ -137,8 +137,8 @@ class PCBA:
             rows, on = planes.nearest(landmarks, one.within_m)
             if on.sum() < FEWEST:
                 raise CalibrationError(
-                    f"Only {int(on.sum())} points that could be followed through the pictures lie on planes of the "
-                    f"scans, and {FEWEST} are needed; is the guess that far off?"
+                    f"Only {int(on.sum())} points tracked through the pictures are on planes of the "
+                    f"scans, but {FEWEST} are needed; give a better guess."
                 )
             tracks, landmarks, rows = tracks.only(on), landmarks[on], rows[on]
             problem = Problem(
@@ -158,8 +158,8 @@ class PCBA:
         tracks, found = rounds[-1]
         extrinsic, covariance = found.camera_from_lidar, COVARIANCE_WIDER * found.covariance
         curves = (
-            Curve("Pixels that landmarks are off (median), round by round", _medians(rounds)),
-            Curve("Landmarks on planes, round by round", np.array([float(len(t.start)) for t, _ in rounds])),
+            Curve("Reprojection error of landmarks in pixels (median), by round", _medians(rounds)),
+            Curve("Landmarks on planes, by round", np.array([float(len(t.start)) for t, _ in rounds])),
         )
         correction = extrinsic @ invert(initial)
         stage = StageTrace(1, self.range, found.camera, initial, correction @ initial, correction, curves=curves)
@@ -204,7 +204,7 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
     chosen = alike[first : first + len(poses)]
     if len(chosen) < 3:
         raise CalibrationError(
-            f"pcba needs three frames or more of one camera whose scans fit onto each other, and {len(chosen)} do."
+            f"pcba needs at least three frames of one camera whose scans can be registered, but has {len(chosen)}."
         )
     grey = [np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), np.uint8) for frame in chosen]
     indices, scans = [frame.index for frame in chosen], [frame.points for frame in chosen]

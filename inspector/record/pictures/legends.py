@@ -19,7 +19,6 @@ POINT_BAR_HEIGHT, CERTAINTY_BAR_HEIGHT = 54, 140
 """Heights in pixels of a bar across a whole page, and of one across a third of it."""
 NAMES_HEIGHT = 64
 WHEEL_RADIUS = 40
-LABELLED_DEPTHS_M = (3, 5, 10, 20, 40, 80)
 LABELLED_CERTAINTIES = (0.0, 0.05, 0.2, 0.5, 1.0)
 
 
@@ -79,8 +78,8 @@ def point_bar(coloring: Coloring) -> Bar:
         return Bar(colors.error_colors(colors.WORST_PX * share), labels)
     ratio = colors.FAR_M / colors.NEAR_M
     strip = colors.depth_colors((colors.NEAR_M * ratio**share).astype(np.float32))
-    places = np.log(np.array(LABELLED_DEPTHS_M) / colors.NEAR_M) / np.log(ratio)
-    return Bar(strip, dict(zip(places.tolist(), (f"{metres} m" for metres in LABELLED_DEPTHS_M), strict=True)))
+    places = np.log(np.array(colors.LABELLED_DEPTHS_M) / colors.NEAR_M) / np.log(ratio)
+    return Bar(strip, dict(zip(places.tolist(), (f"{metres} m" for metres in colors.LABELLED_DEPTHS_M), strict=True)))
 
 
 def displacement_wheel() -> NDArray[np.uint8]:

@@ -69,7 +69,7 @@ def test_a_good_dataset_passes() -> None:
         (lambda frame, position: replace(frame, points=frame.points * np.float32("nan")), "not finite"),
         (lambda frame, position: replace(frame, camera_from_lidar=2 * np.eye(4)), "The last row of the extrinsic"),
         (lambda frame, position: replace(frame, camera_from_lidar=np.diag([1.0, 1, -1, 1])), "reflection"),
-        (lambda frame, position: replace(frame, index=7), "Indices do not rise: [7, 7]"),
+        (lambda frame, position: replace(frame, index=7), "Indices are not ascending: [7, 7]"),
         (lambda frame, position: replace(frame, timestamp=1.0), "at 1.0 s and not at 0"),
     ],
 )
@@ -115,17 +115,20 @@ class Method:
     ("broken", "sentence"),
     [
         ({"starts": True}, "does not start from the extrinsic that was given"),
-        ({"peeks": True}, "looks at the frame's own extrinsic"),
+        ({"peeks": True}, "uses the frame's own extrinsic"),
         ({"moody": True}, "give another result"),
         ({"writes": True}, "changes the frame"),
         ({"scales": True}, "rotation of the correction of stage 1"),
         ({"elsewhere": True}, "after is not correction @ before"),
         ({"fields": {"information": -np.eye(6)}}, "not positive definite"),
-        ({"fields": {"milliseconds": {"all": -1.0}}}, "less than no time"),
-        ({"number": 6}, "numbers rise, from 1 to 5"),
+        ({"fields": {"milliseconds": {"all": -1.0}}}, "has a negative time"),
+        ({"number": 6}, "instead of ascending within 1 to 5"),
         ({"fields": {"exhibits": (Exhibit("Map", np.zeros((2, 2), int)),)}}, "'Map' is neither [H, W] float32"),
-        ({"fields": {"exhibits": (Exhibit("", np.zeros((2, 2), np.float32)),)}}, "What stage 1 shows is called ['']"),
-        ({"fields": {"curves": (Curve("Score", np.array([np.nan])),)}}, "'Score' is no curve of finite numbers"),
+        (
+            {"fields": {"exhibits": (Exhibit("", np.zeros((2, 2), np.float32)),)}},
+            "stage 1 do not have distinct names: ['']",
+        ),
+        ({"fields": {"curves": (Curve("Score", np.array([np.nan])),)}}, "'Score' is not a curve of finite numbers"),
     ],
 )
 def test_what_a_method_does_wrong_is_named(broken: dict[str, Any], sentence: str) -> None:

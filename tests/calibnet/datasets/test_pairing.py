@@ -101,7 +101,7 @@ def test_a_large_difference_is_said_in_centimetres(write_layout):
     layout = write_layout("folder")
     write_times(layout.images, [1.00, 2.00, 3.00])
     write_times(layout.scans, [1.03, 2.00, 3.00])
-    assert layout.open(max_time_difference=50).notes[1].startswith("At 50 km/h 30 ms are 42 cm")
+    assert layout.open(max_time_difference=50).notes[1].startswith("At 50 km/h, 30 ms are 42 cm")
     with pytest.raises(
         DatasetError, match=r"has a scan within 1 ms, the nearest is 2000 ms away; check that both clocks"
     ):

@@ -65,16 +65,16 @@ def test_errors_are_of_the_rows_that_have_weights(tiny_preset: None, tmp_path: P
             assert row["in_rig"] is (name == "full") and row["samples_trained"] == 64
             assert row["rotation_deg"]["mean"] > 0 and row["translation_cm"]["median"] > 0
         else:
-            assert row["why"].startswith("There are no weights at ") and "rotation_deg" not in row
+            assert row["why"].startswith("Weights ") and "rotation_deg" not in row
     assert told.count((4, 4)) == 2
 
 
 def test_weights_of_another_row_are_refused(tiny_preset: None, tmp_path: Path) -> None:
     save_row(tmp_path, "aggregation", of="full")
-    with pytest.raises(WeightsError, match="holds the network of another row"):
+    with pytest.raises(WeightsError, match="has the network of another row"):
         list(measure_ablation(["tiny"], RANGES[2], tmp_path, [Scenes(1)], timed=0))
 
 
 def test_an_unknown_row_is_named() -> None:
-    with pytest.raises(ConfigError, match="no ablation 'colour'; choose one of multi-scale-features"):
+    with pytest.raises(ConfigError, match="'colour' is not a row of the ablation; choose from multi-scale-features"):
         ablated(TINY, "colour")

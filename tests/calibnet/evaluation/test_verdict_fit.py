@@ -108,7 +108,7 @@ def test_the_spread_is_found_and_covers_the_errors(spread: CovarianceModel) -> N
 
 def test_too_few_runs_of_a_kind_are_a_sentence() -> None:
     few = [run for run in runs(200, CovarianceModel()) if run.good][:40]
-    with pytest.raises(CalibrationError, match="Of 40 runs 40 end right and 0 wrong"):
+    with pytest.raises(CalibrationError, match="Of 40 runs 40 are right and 0 wrong"):
         fit_frames(few, BOTH)
 
 

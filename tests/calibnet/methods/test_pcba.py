@@ -121,9 +121,9 @@ def test_planes_have_the_normals_of_their_walls() -> None:
 def test_a_drive_that_stands_still_is_refused() -> None:
     still = scan_of(room(np.random.default_rng(5), 20_000), np.eye(4))
     frames = [replace(boxes(), index=index, points=still) for index in range(4)]
-    with pytest.raises(CalibrationError, match=r"needs a drive that moves: this one moves 0\.0 m"):
+    with pytest.raises(CalibrationError, match=r"needs a moving car: this one moves 0\.0 m"):
         PCBA(MiscalibrationRange(1, 0.1)).calibrate_drive(frames, frames[0].camera_from_lidar)
-    with pytest.raises(CalibrationError, match="several frames of a drive that moves"):
+    with pytest.raises(CalibrationError, match="several frames of a moving car"):
         PCBA(MiscalibrationRange(1, 0.1)).calibrate(frames[0], frames[0].camera_from_lidar)
 
 
@@ -136,5 +136,5 @@ def test_a_synthetic_drive_is_solved_and_keeps_the_promises_of_a_method(monkeypa
     initial = miscalibration([0.3, -0.5, 0.9], [0.05, 0.05, -0.05]) @ frames[0].camera_from_lidar
     left = pose_error(method.calibrate_drive(frames, initial).camera_from_lidar, frames[0].camera_from_lidar)
     assert left.rotation_deg < 0.4 and left.translation_cm < 12
-    with pytest.raises(CalibrationError, match=r"far out of the range ±0\.2°/0\.01 m"):
+    with pytest.raises(CalibrationError, match=r"far outside the range ±0\.2°/0\.01 m"):
         PCBA(MiscalibrationRange(0.2, 0.01)).calibrate_drive(frames, initial)

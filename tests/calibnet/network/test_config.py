@@ -13,7 +13,7 @@ from tests.support.tiny import TINY
 
 def test_presets_are_named_in_the_error() -> None:
     assert preset_names() == ["compact", "paper"]
-    with pytest.raises(ConfigError, match="no preset 'big'; choose one of compact, paper"):
+    with pytest.raises(ConfigError, match="'big' is not a preset; choose from compact, paper"):
         load_preset("big")
 
 
@@ -30,10 +30,10 @@ def test_presets_survive_json_as_in_a_weights_header(name: str) -> None:
         ({"radius": 3}, "radius must be even"),
         ({"radius": 0}, "radius: input should be greater than or equal to 2"),
         ({"blocks": [1, 2]}, "widths and blocks"),
-        ({"scales": [8, 32]}, "twice the one before"),
+        ({"scales": [8, 32]}, "twice the previous one"),
         ({"scales": [6, 12]}, "powers of two"),
         ({"scales": [32, 64]}, "powers of two"),
-        ({"scales": []}, "must be a scale"),
+        ({"scales": []}, "must be at least one scale"),
         ({"groups": 3}, "groups must divide"),
         ({"hourglasses": 0}, "switch `aggregation` off"),
         ({"volume_channels": [8, 8]}, "volume_channels"),

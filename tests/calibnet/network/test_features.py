@@ -169,7 +169,7 @@ def test_gradients_of_depthwise_convolutions_are_single_precision_under_autocast
     ("changes", "sentence"),
     [
         ({"share_extractor": True}, "share_extractor must be false"),
-        ({"widths": (8, 8, 16), "blocks": (0, 0, 1), "scales": (2, 4, 8)}, "four widths or more"),
+        ({"widths": (8, 8, 16), "blocks": (0, 0, 1), "scales": (2, 4, 8)}, "at least four widths"),
     ],
 )
 def test_a_pretrained_encoder_that_cannot_be_is_refused(changes: dict[str, object], sentence: str) -> None:

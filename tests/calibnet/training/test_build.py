@@ -71,7 +71,7 @@ def test_weights_of_another_network_are_no_start(
 ) -> None:
     start = saved(tmp_path / "start.safetensors", "5/0.5")
     monkeypatch.setattr(build_module, "load_preset", lambda name: replace(TINY, context_channels=24))
-    with pytest.raises(ConfigError, match=f"{start}.*another network than preset tiny") as raised:
+    with pytest.raises(ConfigError, match=f"{start}.*not a network of preset tiny") as raised:
         build(options(tmp_path, initialize=start))
     assert "\n" not in str(raised.value)
 

@@ -70,10 +70,10 @@ def test_points_come_back_rounded_and_in_order() -> None:
 
 def test_a_scan_that_is_cut_or_unpacks_without_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = pack_scan(np.zeros((1000, 4), np.float32))
-    with pytest.raises(ValueError, match="cut short or too large"):
+    with pytest.raises(ValueError, match="truncated or too large"):
         unpack_scan(whole[:-3])
     monkeypatch.setattr(packed_module, "LARGEST_SCAN", 6999)
-    with pytest.raises(ValueError, match="cut short or too large"):
+    with pytest.raises(ValueError, match="truncated or too large"):
         unpack_scan(whole)
 
 
@@ -217,7 +217,7 @@ def test_parts_of_two_packings_are_not_mixed(
     pack_training(TrainingOptions("tiny", "", ""), tmp_path / "other", WHOLE)
     next((tmp_path / "other").iterdir()).rename(tmp_path / "frames-001.safetensors")
     (tmp_path / "other").rmdir()
-    with pytest.raises(DatasetError, match=r"frames-001\.safetensors is of another packing"):
+    with pytest.raises(DatasetError, match=r"frames-001\.safetensors belongs to another packing"):
         read_packed(tmp_path)
 
 

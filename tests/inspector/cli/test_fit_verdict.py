@@ -73,8 +73,8 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--synthetic-drives", "0"], "There is nothing to run on: give --data, or --synthetic-drives above 0."),
-        (["--data", "folder:/nowhere"], "There is no folder /nowhere; 'folder:/nowhere' names it."),
+        (["--synthetic-drives", "0"], "There are no drives; give --data, or --synthetic-drives above 0."),
+        (["--data", "folder:/nowhere"], "Folder /nowhere of 'folder:/nowhere' does not exist; check the path."),
         (["--runs", "4"], "Make more runs, or add other data."),
     ],
 )

@@ -286,7 +286,7 @@ def test_a_list_gives_training_the_drives_with_a_good_calibration(invoke: Invoke
     assert (good.name, len(good)) == ("folder/monday", 1)
     (bad,) = open_data(f"list:{file}:rejected")
     assert bad.name == "folder/tuesday"
-    with pytest.raises(DatasetError, match="lists no drive that is failed"):
+    with pytest.raises(DatasetError, match="has no drive that is failed"):
         open_data(f"list:{file}:failed")
 
 
@@ -303,5 +303,5 @@ def test_a_list_hears_what_the_car_of_a_drive_says(cars: Path, tmp_path: Path) -
         if accepted:
             assert [one.name for one in open_data(f"list:{tmp_path / TABLE}")] == ["folder/monday"]
         else:
-            with pytest.raises(DatasetError, match="lists no drive that is accepted"):
+            with pytest.raises(DatasetError, match="has no drive that is accepted"):
                 open_data(f"list:{tmp_path / TABLE}")

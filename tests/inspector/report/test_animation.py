@@ -118,5 +118,5 @@ def test_a_recording_without_the_stages_overlays_is_refused(
 ) -> None:
     record(tmp_path / "curves.rrd", length=1, detail="custom", parts=("curves",))
     assert run(cli, ["pictures", str(tmp_path / "curves.rrd"), "--animate", str(tmp_path / "x.webp")]) == 3
-    assert "holds no overlay/stage_3 of frame 0" in capsys.readouterr().err
+    assert "has no overlay/stage_3 of frame 0" in capsys.readouterr().err
     assert not (tmp_path / "x.webp").exists()

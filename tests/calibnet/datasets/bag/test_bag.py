@@ -115,7 +115,7 @@ def test_one_of_several_topics_has_to_be_named(tmp_path: Path) -> None:
     path = two_cameras(tmp_path)
     with pytest.raises(DatasetError) as caught:
         Bag([path])
-    assert "several topics of images, choose one with --image; there are: /left/image_raw (1 Image), /right" in str(
+    assert "several topics of images; choose one with --image: there are: /left/image_raw (1 Image), /right" in str(
         caught.value
     )
     assert Bag([path], BagOptions(image="/right/image_raw"))[0].camera.width == 130, "with the CameraInfo beside it"

@@ -48,7 +48,7 @@ def test_geometry_under_another_name_is_refused_with_what_is_right(remedy, keys,
 def test_a_lens_that_is_not_known_is_refused(model, write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(distortion_model=model))
-    with pytest.raises(DatasetError, match=f"distortion_model is '{model}' is not a supported lens"):
+    with pytest.raises(DatasetError, match=f"distortion_model '{model}' is not a supported lens"):
         layout.open()
 
 

@@ -60,7 +60,7 @@ def test_frames_are_named_where_there_are_several(tmp_path: Path) -> None:
         ('name="top" type="fixed"', 'name="top" type="revolute"', "no frame with the name of a lidar"),
         ("0.7 0.0 1.4", "${x} 0.0 1.4", r"is a xacro; expand it: xacro cart\.urdf > robot\.urdf"),
         ("0.7 0.0 1.4", "0.7 0.0", r"transform 2\.translation has 2 numbers instead of 3"),
-        ("0.7 0.0 1.4", "0.7 0.0 high", r"transform 2\.translation is not 3 numbers"),
+        ("0.7 0.0 1.4", "0.7 0.0 high", r"transform 2\.translation is not a list of 3 numbers"),
         ('"fixed"', '"floating"', "is a URDF without fixed joints"),
         ("</link>", "", r"is not valid XML \(line 15\)"),
     ],

@@ -87,7 +87,7 @@ def test_an_ablation_is_trained_as_a_preset_without_a_module(
         assert off == ([switch] if switch else [])
     path = trainer_of(options(tmp_path, batches=2, warm_up=BATCH, ablation="aggregation")).run()
     assert not load_network(path).config.aggregation
-    with pytest.raises(ConfigError, match="no ablation 'nothing'; choose one of multi-scale-features"):
+    with pytest.raises(ConfigError, match="'nothing' is not a row of the ablation; choose from multi-scale-features"):
         build(options(tmp_path, ablation="nothing"), RECIPE)
 
 
@@ -99,10 +99,10 @@ def test_weights_of_others_are_refused_in_a_sentence(
     path = trainer_of(options(tmp_path, batches=1, preset="regnet", warm_up=None)).run()
     other = tmp_path / "lccnet-5deg-0.5m.safetensors"
     other.write_bytes(path.read_bytes())
-    with pytest.raises(WeightsError, match=r"holds the weights of regnet, 5/0\.5; give it its own name back"):
+    with pytest.raises(WeightsError, match=r"has the weights of regnet, 5/0\.5; restore its original name"):
         load_method_stage("lccnet", RANGES[2], tmp_path)
     ours = trainer_of(options(tmp_path, batches=2, warm_up=BATCH)).run()
-    with pytest.raises(WeightsError, match="holds no network of regnet, calibnet, lccnet, calibformer"):
+    with pytest.raises(WeightsError, match="is not a network of regnet, calibnet, lccnet, calibformer"):
         load_method_network(ours)
     with pytest.raises(ConfigError, match="is of regnet, not of calibnet"):
         build(options(tmp_path, preset="calibnet", initialize=str(path)), RECIPE)
