@@ -15,7 +15,7 @@ AXES = ("x", "y", "z", "pitch", "yaw", "roll")
 """Axes of an offset: moves along the camera's axes (right, down, ahead), and turns about them."""
 
 
-def word(watched: Watched) -> str:
+def result_word(watched: Watched) -> str:
     """The result in a word: no change, changed or cannot tell."""
     if watched.watch is None or watched.reason:
         return CANNOT_TELL
@@ -26,7 +26,7 @@ def sentences(watched: Watched) -> Iterator[str]:
     """One sentence per change, and a last one with the result."""
     found = watched.watch
     for change in () if found is None else found.changes:
-        yield said(change)
+        yield change_sentence(change)
     skipped = len(watched.skipped)
     frames = f"{watched.used} frames" + (f", {skipped} skipped" if skipped else "")
     if found is None or watched.reason:
@@ -35,12 +35,12 @@ def sentences(watched: Watched) -> Iterator[str]:
         count = len(found.changes)
         yield f"Changed: the mount moved {'once' if count == 1 else f'{count} times'} ({frames})."
     else:
-        turn, shift = told_apart(found)
+        turn, shift = detectable_step(found)
         seen = f"A step of {turn:.2g}° or {shift:.0f} cm that lasts {WINDOW} frames would have been detected."
         yield f"No change ({frames}). {seen}"
 
 
-def said(change: Change) -> str:
+def change_sentence(change: Change) -> str:
     """A sentence on a change."""
     size = f"{change.rotation_deg:.2f}° / {change.translation_cm:.0f} cm"
     turn, shift = most(change)
@@ -58,7 +58,7 @@ def most(change: Change) -> tuple[str, str]:
     return AXES[3 + turn], AXES[shift]
 
 
-def told_apart(found: Watch) -> tuple[float, float]:
+def detectable_step(found: Watch) -> tuple[float, float]:
     """Smallest step, in degrees and centimetres on the worst axis, that two windows of frames show at 4σ."""
     return float(np.degrees(4 * found.smallest[3:].max())), float(100 * 4 * found.smallest[:3].max())
 
@@ -68,7 +68,7 @@ def as_json(watched: Watched) -> dict[str, Any]:
     found = watched.watch
     changes = [] if found is None else [of_change(change) for change in found.changes]
     return {
-        "result": word(watched),
+        "result": result_word(watched),
         "reason": watched.reason,
         "changes": changes,
         "camera_from_lidar": None if watched.camera_from_lidar is None else watched.camera_from_lidar.tolist(),

@@ -16,7 +16,7 @@ OF_RESULT = "Calibration found"
 """Heading of the verdict on the result that it is compared with."""
 
 
-def line(verdict: Verdict) -> str:
+def verdict_line(verdict: Verdict) -> str:
     """The last line of a run."""
     return f"Verdict: {verdict.word}. {explained(verdict)}"
 
@@ -64,7 +64,7 @@ def _once(cause: Cause, verdict: Verdict) -> str:
     return "" if cause.text in verdict.reason else f"{cause.text} "
 
 
-def counted(verdicts: Mapping[int, Verdict]) -> str:
+def verdict_counts(verdicts: Mapping[int, Verdict]) -> str:
     """The number of frames with each verdict, with the numbers of those not accepted and the first one's reason."""
     parts = []
     for word in WORDS:
@@ -97,7 +97,7 @@ def of_frames(verdicts: Mapping[int, Verdict], initial: Extrinsic, skipped: Iter
         return replace(single, skipped=tuple(skipped))
     believed = [one for one in verdicts.values() if one.word != REJECTED] or list(verdicts.values())
     median = median_pose([one.camera_from_lidar for one in believed])
-    reason = counted(verdicts).removeprefix("Verdict: ")
+    reason = verdict_counts(verdicts).removeprefix("Verdict: ")
     return Verdict(
         majority(verdicts.values()),
         f"Of {len(verdicts)} frames {reason}",

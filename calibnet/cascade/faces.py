@@ -16,7 +16,7 @@ from calibnet.judging.covariance import CovarianceModel
 from calibnet.trace import StageTrace
 
 
-def joined(looks: Sequence[StageTrace], limit_px: float, model: CovarianceModel) -> StageTrace:
+def join_looks(looks: Sequence[StageTrace], limit_px: float, model: CovarianceModel) -> StageTrace:
     """Join looks of one stage through faces, all rotated to the camera (`StageTrace.rotated`), to one.
 
     Each is weighted by its measured covariance, which is larger than the one that its network states. A face that does

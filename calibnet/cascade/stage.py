@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from calibnet.cascade.around import extended, projected
-from calibnet.cascade.faces import joined
+from calibnet.cascade.faces import join_looks
 from calibnet.cascade.stage_detail import stage_detail
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import resize_image
@@ -158,7 +158,7 @@ class Stage:
             looks.append(look.rotated(face.face_from_camera.T))
         if not looks and failure is not None:
             raise failure
-        return joined(looks, self.match_error_limit_px, self.covariance_model)
+        return join_looks(looks, self.match_error_limit_px, self.covariance_model)
 
     def _look(self, frame: Frame, view: View, before: Extrinsic, detail: bool) -> StageTrace:
         clock, camera, name = Clock(self.device), self.camera(frame), f"stage {self.number}"

@@ -83,7 +83,7 @@ class Folder(PairedSequence):
         refuse(of_extrinsic(extrinsic), f"Calibration {guess or calibration_path(root)}")
         paths = list(images.values())
         self._development = development_of(paths, real, self.calibration.bayer)
-        self._lens = Lens.of(real, extrinsic, looked_at(paths, real, self._development))
+        self._lens = Lens.of(real, extrinsic, sample_images(paths, real, self._development))
         self.cloud_columns = self.calibration.cloud_columns
         self.prior = prior_of(self.calibration, calibration_path(root))
         self._fixed = Calibration(self._lens.pinhole.matrix, extrinsic)
@@ -111,7 +111,9 @@ def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -
     return Development.of(pictures, bayer)
 
 
-def looked_at(images: list[Path], camera: CameraModel, development: Development = BY_ITSELF) -> list[NDArray[np.uint8]]:
+def sample_images(
+    images: list[Path], camera: CameraModel, development: Development = BY_ITSELF
+) -> list[NDArray[np.uint8]]:
     """Some readable images spread over a drive; empty for a pinhole camera."""
     pictures = list[NDArray[np.uint8]]()
     for position in evenly_spaced(len(images), 0 if camera.is_pinhole else LOOKED_AT):

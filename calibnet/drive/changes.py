@@ -45,7 +45,7 @@ def watch(looks: Sequence[DriveLook]) -> Watch:
     if len(looks) < 2 * SHORTEST:
         raise ValueError(f"{len(looks)} frames are too few to detect a change; {2 * SHORTEST} are needed.")
     frames = np.array([look.frame for look in looks])
-    said = tempered(np.array([look.offset for look in looks]))
+    said = without_outliers(np.array([look.offset for look in looks]))
     covariance = scatter(said)
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
     white = (said - said.mean(axis=0)) @ whitener.T
@@ -73,7 +73,7 @@ def windowed(said: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]
     return means, counts
 
 
-def tempered(said: Floats) -> Floats:
+def without_outliers(said: Floats) -> Floats:
     """The results of frames ``[N, 6]``, with outliers moved closer to their neighbours."""
     half = WINDOW // 2
     around = np.array([np.median(said[max(0, at - half) : at + half + 1], axis=0) for at in range(len(said))])

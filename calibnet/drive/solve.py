@@ -162,7 +162,7 @@ class DriveLooks:
                 frame = self.frames[position]
                 number = frame.index
                 trace = self.stage.look(frame, self.stage.view(frame), self.extrinsic)
-                trace = believed(trace, self.stage.match_error_limit_px, frame)
+                trace = require_match(trace, self.stage.match_error_limit_px, frame)
             except (CalibrationError, DatasetError) as error:
                 failure = error
                 self.skipped.append(BadFrame(number, str(error)))
@@ -185,7 +185,7 @@ def agree(looks: DriveLooks, pose_prior: PosePrior | None = None, common_error: 
     return consensus
 
 
-def believed(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
+def require_match(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace:
     """The look, if its match error is within the limit.
 
     Raises:

@@ -173,7 +173,7 @@ def far_parts(
     places = {look.frame: position for position, look in looks.items()}
     found = watch([looks[position] for position in sorted(looks)])
     borders = {0, len(frames), *(places[change.frame] for change in found.changes if change.until is None)}
-    for lost in runs([position for position in range(len(frames)) if position not in looks]):
+    for lost in consecutive_runs([position for position in range(len(frames)) if position not in looks]):
         borders |= set(lost) if lost[1] - lost[0] >= SHORTEST else set()
     solved = []
     for start, stop in pairwise(sorted(borders)):
@@ -188,7 +188,7 @@ def far_parts(
     return solved
 
 
-def runs(positions: list[int]) -> list[tuple[int, int]]:
+def consecutive_runs(positions: list[int]) -> list[tuple[int, int]]:
     """Runs of consecutive positions, each as its first position and the one after its last."""
     found: list[tuple[int, int]] = []
     for position in positions:

@@ -99,7 +99,7 @@ def mostly(lit: NDArray[np.integer]) -> slice:
     return slice(int(full[0]), int(full[-1]) + 1)
 
 
-def said_of(rectification: Rectification) -> tuple[str, ...]:
+def field_of_view_note(rectification: Rectification) -> tuple[str, ...]:
     """A sentence for the user if the pinhole does not see all that the lens does."""
     camera, pinhole = rectification.camera, rectification.pinhole
     if camera.is_pinhole:

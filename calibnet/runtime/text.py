@@ -30,7 +30,7 @@ def one_line(text: object, longest: int = LONGEST) -> str:
     return "".join(one if one.isprintable() else _escaped(one) for one in plain)
 
 
-def lines(text: object) -> str:
+def quoted_lines(text: object) -> str:
     """Do the same for each line of a text whose line breaks are our own."""
     return "\n".join(one_line(line, 10 * LONGEST) for line in str(text).split("\n"))
 

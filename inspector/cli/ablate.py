@@ -100,7 +100,7 @@ def ablate(
 
         content = read_table(source, "ablate")
     else:
-        content = measured(
+        content = measure_rows(
             presets or ("compact", "paper"), range_, weights, data, frames, repeats, seed, timed, threads
         )
     print_ablation(content, console_beside(json_file))
@@ -109,7 +109,7 @@ def ablate(
         write(markdown_file, as_markdown(content).encode(), Kind.EXPORT)
 
 
-def measured(
+def measure_rows(
     presets: Sequence[str],
     range_: MiscalibrationRange,
     weights: Path | None,

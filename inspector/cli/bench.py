@@ -185,7 +185,7 @@ def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_fi
 
     torch.set_num_threads(threads)
     cv2.setNumThreads(threads)
-    content = described(measured, threads) | {"initial": list(initial_rows(measured)), "methods": {}}
+    content = measurement_settings(measured, threads) | {"initial": list(initial_rows(measured)), "methods": {}}
     bars = Bars()
 
     def show(step: BenchStep) -> None:
@@ -203,7 +203,7 @@ def run(measured: Bench, bench_methods: list[BenchMethod], threads: int, json_fi
     return content
 
 
-def described(measured: Bench, threads: int) -> dict[str, Any]:
+def measurement_settings(measured: Bench, threads: int) -> dict[str, Any]:
     """Settings and machine of the measurement."""
     import platform
 

@@ -62,7 +62,7 @@ def check(
     limits need no reference: --max-sigma-..., --max-scatter-..., --max-unused and --max-fit.
     """
     from inspector.check import KINDS, Limit, check_run, junit, summary
-    from inspector.verdicts import line
+    from inspector.verdicts import verdict_line
 
     given = {option.removeprefix("max_"): value for option, value in largest.items() if value is not None}
     limits = [Limit(kind, given[kind], statistic) for kind in KINDS if kind in given]
@@ -76,7 +76,7 @@ def check(
     write_json(json_file, verdict.as_dict() | {"limits": [outcome.as_dict() for outcome in outcomes]})
     if outcomes:
         say(summary(run, outcomes), err=json_file == "-")
-    say(line(verdict), err=json_file == "-")
+    say(verdict_line(verdict), err=json_file == "-")
     if not all(outcome.passed for outcome in outcomes):
         return ExitCode.CHECK_FAILED
     return VERDICT_CODES[verdict.word]

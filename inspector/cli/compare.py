@@ -57,7 +57,7 @@ def compare(
         return finish(comparison, outputs)
 
 
-def lines(comparison: Comparison) -> Iterator[str]:
+def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """One sentence per run: its error or, without a reference, its distance from the first run."""
     for run in comparison.runs:
         drive, metrics, off = run.run.drive_error, run.corrected, "off"
@@ -75,7 +75,7 @@ def lines(comparison: Comparison) -> Iterator[str]:
 
 def finish(comparison: Comparison, outputs: Outputs) -> int:
     """Print the errors of the runs and where the comparison was saved; with --serve, serve it until Ctrl-C."""
-    for line in lines(comparison):
+    for line in comparison_lines(comparison):
         say(line)
     if outputs.file is not None:
         for line in saved_lines(outputs, len(comparison.indices)):

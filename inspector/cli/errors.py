@@ -17,7 +17,7 @@ import click
 from calibnet.errors import CalibnetError
 from calibnet.runtime.plugins import package_at_fault
 from calibnet.runtime.reading import protecting_inputs
-from calibnet.runtime.text import lines, one_line
+from calibnet.runtime.text import one_line, quoted_lines
 from calibnet.runtime.writing import keeping_others
 
 SYSTEM_PACKAGES = {
@@ -71,7 +71,7 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
         shown = io.StringIO()
         error.show(shown)
         with contextlib.suppress(OSError, AttributeError):  # stderr may be closed
-            click.echo(lines(shown.getvalue()), err=True, nl=False)
+            click.echo(quoted_lines(shown.getvalue()), err=True, nl=False)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         return fail("Interrupted.", ExitCode.INTERRUPTED)

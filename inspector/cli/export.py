@@ -94,7 +94,7 @@ def export(
         return export_rig(recording, camera, form, force, output, frames)
     if camera is not None:
         raise click.UsageError("--camera chooses from the recording of a rig; this has one camera.")
-    exported = replace(chosen(recording, folder, frame, drive, median), frames=frames)
+    exported = replace(selected_calibration(recording, folder, frame, drive, median), frames=frames)
     return put_out(exported, form, force, output)
 
 
@@ -158,7 +158,9 @@ def may_be_written(exported: Exported, force: bool) -> bool:
     return written
 
 
-def chosen(recording: Path | None, folder: Path | None, frame: int | None, drive: bool, median: bool) -> Exported:
+def selected_calibration(
+    recording: Path | None, folder: Path | None, frame: int | None, drive: bool, median: bool
+) -> Exported:
     """The extrinsic that the options select."""
     from inspector.export.exported import exported_drive, exported_folder, exported_frame, exported_median
 

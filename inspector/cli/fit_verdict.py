@@ -144,7 +144,7 @@ def fit_verdict(
         "frames": figures.as_dict(),
     }
     coefficients = Coefficients(classifier, covariance, weights=marks, missing="", fitted=fitted)
-    for line in told(figures):
+    for line in figure_lines(figures):
         console.print(line, soft_wrap=True)
     of_lenses = made(replace(source, kind="lenses"), lenses, "lenses") if lenses else []
     try:
@@ -154,7 +154,7 @@ def fit_verdict(
     else:
         fitted = {**fitted, "lenses": asdict(lens_figures)}
         coefficients = replace(coefficients, lens=lens, fitted=fitted)
-        for line in told_of_lenses(lens_figures):
+        for line in lens_figure_lines(lens_figures):
             console.print(line, soft_wrap=True)
     of_drives = made(of_drive, drives, "drives") if drives else []
     try:
@@ -164,7 +164,7 @@ def fit_verdict(
     else:
         fitted = {**fitted, "drives": figures.as_dict()}
         coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)
-        for line in told(figures, "drives"):
+        for line in figure_lines(figures, "drives"):
             console.print(line, soft_wrap=True)
     coefficients.write(path)
     say(path)
@@ -176,7 +176,7 @@ def short(spec: str) -> str:
     return ":".join([dataset, Path(folder).name, *sequence])
 
 
-def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
+def figure_lines(figures: FitFigures, of: str = "frames") -> Iterator[str]:
     """The figures of the fit, as lines of text."""
     tolerance = (DRIVE_TOLERANCES if of == "drives" else FRAME_TOLERANCES)[1]
     yield f"{figures.runs} runs of {of} on {figures.sequences} sequences."
@@ -194,7 +194,7 @@ def told(figures: FitFigures, of: str = "frames") -> Iterator[str]:
         yield f"  certain to be within {tolerance} though wrong: {figures.coarser.false_accept_rate:.1%} of all runs"
 
 
-def told_of_lenses(figures: LensFigures) -> Iterator[str]:
+def lens_figure_lines(figures: LensFigures) -> Iterator[str]:
     """The figures of the lens classifier, as lines of text."""
     yield f"{figures.runs} runs on {figures.sequences} sequences, {figures.faulty} of them with a fault of the lens."
     yield "Cross-validated, leaving out one sequence at a time:"

@@ -117,7 +117,7 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     from inspector.cli.fleet_console import fleet_progress
     from inspector.cli.fleet_drive import do_drive
     from inspector.fleet.engine import EngineError, run_all
-    from inspector.fleet.ledger import counted
+    from inspector.fleet.ledger import word_counts
     from inspector.fleet.table import TABLE
 
     with ThreadPoolExecutor(LOOKING) as pool:  # errors in options are reported here, before the work
@@ -132,7 +132,7 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     try:
         with StopRequest(STOPPING) as stop, fleet_progress(len(pieces)) as progress:
             for outcome in run_all(engine, do_drive, pieces, stop, lambda text: say(text, err=True)) if pieces else ():
-                rows[outcome.work.drive.folder] = row = settled(outcome)
+                rows[outcome.work.drive.folder] = row = row_of_outcome(outcome)
                 progress.advance(row)
                 if time.monotonic() - written > max(EVERY_S, 10 * took):
                     begun = time.monotonic()
@@ -148,7 +148,7 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
     seconds = time.monotonic() - started
     new = len(in_order) - (len(tasks) - len(pieces))
     now = f"{new} of them were checked or run now, in {seconds:.0f} s."
-    say(f"{len(in_order)} of {len(tasks)} drives: {counted(in_order)}. {now}")
+    say(f"{len(in_order)} of {len(tasks)} drives: {word_counts(in_order)}. {now}")
     for sentence in news(in_order):
         say(sentence)
     say(f"Table: {store.root}/{TABLE}")
@@ -166,9 +166,9 @@ def run_fleet(tasks: Sequence[Task], engine: Engine) -> int:
 def news(rows: Sequence[Row]) -> Iterator[str]:
     """What the owner of a fleet wants to know first: findings across a car's drives, and whose mount moved."""
     from inspector.fleet.history import histories
-    from inspector.fleet.ledger import told_together
+    from inspector.fleet.ledger import joint_verdicts
 
-    if together := told_together(rows):
+    if together := joint_verdicts(rows):
         yield together
     moved = [car for car in histories(rows) if car.moves]
     yield from (f"{car.name}: {car.sentence}" for car in moved[:MOST_NEWS])
@@ -186,7 +186,7 @@ def needs_work_or_checked(task: Task) -> Row | None:
     return row
 
 
-def settled(outcome: Outcome[Task, Row]) -> Row:
+def row_of_outcome(outcome: Outcome[Task, Row]) -> Row:
     """The row of a drive that a worker has finished or failed."""
     from inspector.cli.fleet_drive import DriveFailed, note_failure
     from inspector.fleet.ledger import failed_row

@@ -24,7 +24,7 @@ from inspector.cli.sequences import Opening, over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen
-from inspector.fleet.table import FAILED, Row, flat, of_verdict, row_of
+from inspector.fleet.table import FAILED, Row, of_verdict, row_major, row_of
 from inspector.report.files import METRICS, PAGE, RECORDING
 
 DECIDED = ("save", "serve", "bind", "connect", "report", "json_file", "overwrite")
@@ -198,7 +198,7 @@ def _verified(task: Task, path: Path, started: float) -> Row:
             raise failed from None
         if found.summary is not None and found.summary.interrupted:
             raise KeyboardInterrupt
-        columns = of_verdict(found.verdict) | {"given_camera_from_lidar": flat(found.given)}
+        columns = of_verdict(found.verdict) | {"given_camera_from_lidar": row_major(found.given)}
         columns["reason"] = _at_its_place(columns["reason"], path, drive)
         if not (folder / RECORDING).exists():
             _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])

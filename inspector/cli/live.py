@@ -21,7 +21,7 @@ from inspector.cli.options import FOLDER, FRAMES, KNOWN_OPTIONS, METHOD_OPTIONS,
 from inspector.cli.output import make_console, overwrite_option, say
 from inspector.cli.preparing import UNJUDGED, announce, open_other
 from inspector.cli.recordings import OUTPUT_FILE
-from inspector.cli.run import checked
+from inspector.cli.run import checked_options
 from inspector.cli.sequences import Opening, over_sequences
 from inspector.export.registry import FORMATS, suffix_of
 from inspector.run.options import DEFAULT_RANGE
@@ -149,7 +149,7 @@ def serve_live(sequence: Sequence, keeping: Keeping, **asked: Any) -> int:
         raise click.UsageError("--connect needs --native; add it, or leave --connect out: the page has its own viewer.")
     if keeping.native:
         check_window(keeping.connect)
-    options = checked(sequence, asked)
+    options = checked_options(sequence, asked)
     output = keeping.output or Path(f"calibration.corrected.{suffix_of(keeping.form)}")
     target = Target(output, keeping.form)
     target.check()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from calibnet.runtime.text import lines
+from calibnet.runtime.text import quoted_lines
 from calibnet.runtime.writing import Kind, allow_overwriting, check_output, write_whole
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def make_console(stderr: bool = True) -> Console:
 
     class Quoting(Console):
         def print(self, *objects: Any, **options: Any) -> None:
-            super().print(*(lines(one) if isinstance(one, str) else one for one in objects), **options)
+            super().print(*(quoted_lines(one) if isinstance(one, str) else one for one in objects), **options)
 
     console = Quoting(stderr=stderr, highlight=False, markup=False, emoji=False)  # names are not markup
     if console.width < NARROWEST:
@@ -57,7 +57,7 @@ def make_console(stderr: bool = True) -> Console:
 
 def say(text: object, err: bool = False) -> None:
     """Print text of ours, in which foreign text is quoted."""
-    click.echo(lines(text), err=err)
+    click.echo(quoted_lines(text), err=err)
 
 
 def prepare(file: Path | None, kind: Kind) -> None:

@@ -33,13 +33,13 @@ def calibrate(sequence: Sequence, *, viewing: Viewing, report: Path | None, **as
         report: folder of the report to make.
         **asked: fields of `RunOptions`.
     """
-    options = checked(sequence, asked)
+    options = checked_options(sequence, asked)
     outputs = choose_outputs(options, viewing, report)
     with recording_to(outputs):
         return finish(prepare(options, outputs).run(), outputs, report)
 
 
-def checked(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
+def checked_options(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
     """Make the options of a run, checked not to contradict each other and to select some frames."""
     try:
         options = RunOptions(sequence=sequence, **asked)

@@ -13,7 +13,7 @@ from calibnet.errors import CalibnetError
 from inspector.cli.errors import VERDICT_CODES, ExitCode
 from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
-from inspector.cli.run import checked, choose_outputs, finish, recording_to
+from inspector.cli.run import checked_options, choose_outputs, finish, recording_to
 from inspector.cli.run_options import verify_options
 from inspector.cli.sequences import Opening, disturbed, over_sequences
 
@@ -61,13 +61,13 @@ def verify_sequence(
     except CalibnetError as error:
         if not (causes := named_cause(error)):
             raise
-        return told(Verified(unfit(UNKNOWN, str(error), causes), UNKNOWN), json_file)
+        return report_verdict(Verified(unfit(UNKNOWN, str(error), causes), UNKNOWN), json_file)
     prepare_json(json_file)  # again, now that the input files are known
     options = options_to_verify(sequence, asked)
     record = bool(viewing.save or report or viewing.serve or viewing.connect)
     outputs = choose_outputs(options, viewing, report) if record else Outputs()
     with recording_to(outputs):
-        found = told(verify_session(prepare(options, outputs, verify=True), record), json_file)
+        found = report_verdict(verify_session(prepare(options, outputs, verify=True), record), json_file)
         if found.summary is not None:
             finish(found.summary, outputs, report, on_stderr=json_file == "-")
     return found
@@ -75,7 +75,7 @@ def verify_sequence(
 
 def options_to_verify(sequence: Sequence, asked: Mapping[str, Any]) -> RunOptions:
     """The options of a run that judges one calibration, by the drive where there are several frames."""
-    options = checked(sequence, {**asked, "as_is": not disturbed(asked)})
+    options = checked_options(sequence, {**asked, "as_is": not disturbed(asked)})
     several = len(options.positions) > 1
     if several and options.drive is False:
         raise click.UsageError(
@@ -85,14 +85,14 @@ def options_to_verify(sequence: Sequence, asked: Mapping[str, Any]) -> RunOption
     return replace(options, drive=several)
 
 
-def told(found: Verified, json_file: str | None) -> Verified:
+def report_verdict(found: Verified, json_file: str | None) -> Verified:
     """Write the verdict as JSON and, unless the last line of a summary will, say it."""
     from inspector.run.verify import as_json
-    from inspector.verdicts import line
+    from inspector.verdicts import verdict_line
 
     write_json(json_file, as_json(found.verdict))
     if found.summary is None:
-        say(line(found.verdict), err=json_file == "-")
+        say(verdict_line(found.verdict), err=json_file == "-")
     return found
 
 

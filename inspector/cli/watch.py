@@ -9,7 +9,7 @@ import click
 from inspector.cli.errors import ExitCode
 from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
-from inspector.cli.run import checked, choose_outputs, recording_to
+from inspector.cli.run import checked_options, choose_outputs, recording_to
 from inspector.cli.run_options import watch_options
 from inspector.cli.sequences import Opening, disturbed, over_sequences
 from inspector.cli.sources import SOURCES
@@ -45,10 +45,10 @@ def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing,
         **asked: fields of `RunOptions`.
     """
     prepare_json(json_file)
-    from inspector.mount_changes import CANNOT_TELL, CHANGED, as_json, sentences, word
+    from inspector.mount_changes import CANNOT_TELL, CHANGED, as_json, result_word, sentences
     from inspector.record.outputs import Outputs
 
-    options = checked(
+    options = checked_options(
         opening(), {**asked, "frames": asked["frames"] or ":", "as_is": not disturbed(asked), "drive": True}
     )
     prepare_json(json_file)  # again, now that the input files are known
@@ -74,7 +74,7 @@ def watch_sequence(opening: Opening, *, json_file: str | None, viewing: Viewing,
             say(f"Serving at {outputs.page} until Ctrl-C.", err=json_file == "-")
             outputs.wait_while_serving()
     codes = {CHANGED: ExitCode.CHECK_FAILED, CANNOT_TELL: ExitCode.CANNOT_TELL}
-    return codes.get(word(watched), ExitCode.OK)
+    return codes.get(result_word(watched), ExitCode.OK)
 
 
 def watch_session(session: Session) -> Watched:

@@ -77,13 +77,13 @@ def failed_row(drive: Drive, sentence: str, seconds: float = 0.0, recording: str
     return row_of(drive, verdict=FAILED, reason=sentence, seconds=seconds, recording=recording)
 
 
-def counted(rows: Sequence[Row]) -> str:
+def word_counts(rows: Sequence[Row]) -> str:
     """The number of drives with each `Row.word`, in words."""
     counts = {word: sum(row.word == word for row in rows) for word in reversed(ORDER)}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "none"
 
 
-def told_together(rows: Sequence[Row]) -> str:
+def joint_verdicts(rows: Sequence[Row]) -> str:
     """The number of verdicts that need the other drives of the car, in words; empty for none."""
     count = sum(row.word != row.verdict for row in rows)
     return f"{count} of these verdicts come from all drives of the car together." if count else ""

@@ -13,8 +13,8 @@ from calibnet.runtime.text import number_of, one_line
 from calibnet.runtime.writing import Kind, write_whole
 from calibnet.verdict import APART
 from inspector.fleet.history import History, histories
-from inspector.fleet.ledger import counted, told_together
-from inspector.fleet.table import FAILED, ORDER, TABLE, Row, off, worst_first
+from inspector.fleet.ledger import joint_verdicts, word_counts
+from inspector.fleet.table import FAILED, ORDER, TABLE, Row, severity, worst_first
 from inspector.report.files import PAGE, result_picture
 from inspector.report.template import html_page, stylesheet
 
@@ -46,8 +46,8 @@ def make_page(rows: Sequence[Row], folder: Path) -> str:
     """The HTML of the page, with links relative to the folder."""
     cars, worst = histories(rows), worst_first(rows)
     names = {car.car for car in cars}
-    headline = f"{number_of(len(rows), 'drive')} of {number_of(len(names), 'car')}: {counted(rows)}"
-    about = f"{told_together(rows)} {_moved(len({car.car for car in cars if car.moves}))}".strip()
+    headline = f"{number_of(len(rows), 'drive')} of {number_of(len(names), 'car')}: {word_counts(rows)}"
+    about = f"{joint_verdicts(rows)} {_moved(len({car.car for car in cars if car.moves}))}".strip()
     sections = Template(_resource("page.html")).substitute(
         cars="\n".join(_car(car) for car in cars[:MOST_CARS]),
         more_cars=_more(len(cars), MOST_CARS, "mounts"),
@@ -107,7 +107,7 @@ def _row(row: Row, folder: Path) -> str:
         f"<td>{linked}{recording}</td>",
         f"<td>{escape(row.date[:10])}</td>",
         f'<td class="word {GRADES[row.word]}" data-key="{ORDER.index(row.word)}">{row.word}{cause}{alone}</td>',
-        _pair("moved", row.moved_deg, row.moved_cm, off(row)),
+        _pair("moved", row.moved_deg, row.moved_cm, severity(row)),
         _pair(UNCERTAINTY, row.sigma_deg, row.sigma_cm, row.sigma_deg or 0.0),
         _pair("by its car", row.by_car_moved_deg, row.by_car_moved_cm, row.by_car_moved_deg or 0.0),
         f'<td class="number" data-key="{row.frames}" data-head="frames">{used}</td>',

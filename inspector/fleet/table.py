@@ -146,8 +146,8 @@ def of_verdict(verdict: Verdict) -> dict[str, Any]:
         "moved_cm": verdict.moved[1],
         "sigma_deg": verdict.sigma_rotation_deg,
         "sigma_cm": verdict.sigma_translation_cm,
-        "camera_from_lidar": flat(verdict.camera_from_lidar),
-        "covariance": None if verdict.covariance is None else flat(verdict.covariance),
+        "camera_from_lidar": row_major(verdict.camera_from_lidar),
+        "covariance": None if verdict.covariance is None else row_major(verdict.covariance),
         "frames": verdict.used,
         "skipped": len(verdict.skipped),
     }
@@ -155,10 +155,10 @@ def of_verdict(verdict: Verdict) -> dict[str, Any]:
 
 def worst_first(rows: Iterable[Row]) -> list[Row]:
     """The rows in the order of `ORDER`; among equals, those farthest off come first."""
-    return sorted(rows, key=lambda row: (ORDER.index(row.word), -off(row), row.car, row.date, row.drive))
+    return sorted(rows, key=lambda row: (ORDER.index(row.word), -severity(row), row.car, row.date, row.drive))
 
 
-def off(row: Row) -> float:
+def severity(row: Row) -> float:
     """How far off a drive's calibration is, in tolerances of `calibnet.judging.verify.DRIVE` or in units of 2σ.
 
     The larger unit counts, so that a large but uncertain movement does not come before a certain one.
@@ -198,6 +198,6 @@ def read_table(file: Path) -> list[Row]:
     return list(validated(tuple[Row, ...], rows, str(file), DatasetError, REMEDY))
 
 
-def flat(matrix: Extrinsic | Matrix6) -> tuple[float, ...] | None:
+def row_major(matrix: Extrinsic | Matrix6) -> tuple[float, ...] | None:
     """A matrix row by row, as in the table; None for an unknown one."""
     return tuple(matrix.ravel().tolist()) if np.isfinite(matrix).all() else None

@@ -27,12 +27,12 @@ def points_bytes(frame: Frame) -> bytes:
 
     Intensity is stretched to 0..255 between robust limits; edge is 1 at depth edges.
     """
-    points, intensity, edge = shown(frame)
+    points, intensity, edge = points_to_draw(frame)
     parts = [np.array([len(points)], np.uint32), points.astype(np.float32), intensity, edge]
     return b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
 
 
-def shown(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
+def points_to_draw(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.uint8]]:
     """Positions, intensities and edges of every point, or of every n-th point of a huge cloud."""
     every = -(-len(frame.points) // MOST_POINTS)
     points = frame.points[::every]

@@ -13,7 +13,7 @@ from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector.record.observation import Observation
-from inspector.verdicts import counted, line
+from inspector.verdicts import verdict_counts, verdict_line
 
 
 @dataclass
@@ -148,8 +148,8 @@ class Summary:
     def verdict(self) -> str:
         """The last line of a run: its verdict on the given calibration, the drive or the frames; empty without any."""
         if self.outcome is not None:
-            return line(self.outcome)
-        return counted(self.verdicts) if self.verdicts else ""
+            return verdict_line(self.outcome)
+        return verdict_counts(self.verdicts) if self.verdicts else ""
 
 
 def _middle(errors: list[PoseError]) -> str:

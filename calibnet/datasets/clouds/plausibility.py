@@ -23,7 +23,7 @@ def of_scan(points: NDArray[np.float32]) -> list[Implausible | None]:
 
 def ranges(points: NDArray[np.float32]) -> Implausible | None:
     """Check the distances of the points, which should be in metres."""
-    middle = float(np.median(np.linalg.norm(some(points).astype(np.float64), axis=1)))
+    middle = float(np.median(np.linalg.norm(sample(points).astype(np.float64), axis=1)))
     if NEAREST_M <= middle <= FARTHEST_M:
         return None
     seen = f"half of its points are more than {middle:.3g} m away" if middle > FARTHEST_M else (
@@ -37,7 +37,7 @@ def ranges(points: NDArray[np.float32]) -> Implausible | None:
 
 def up(points: NDArray[np.float32]) -> Implausible | None:
     """Check that z is the vertical axis, since the world is wider than high."""
-    low, high = np.percentile(some(points), (10, 90), axis=0)
+    low, high = np.percentile(sample(points), (10, 90), axis=0)
     spread = np.maximum(high - low, 1e-6)
     flattest = int(spread.argmin())
     if flattest == 2 or spread[flattest] > FLAT * spread[2]:
@@ -60,6 +60,6 @@ def several(points: NDArray[np.float32]) -> Implausible | None:
     return Implausible("accumulated", text)
 
 
-def some(points: NDArray[np.float32]) -> NDArray[np.float32]:
+def sample(points: NDArray[np.float32]) -> NDArray[np.float32]:
     """A sample of the positions ``[N, 3]``, enough for a median."""
     return points[:: max(1, len(points) // ENOUGH_POINTS), :3]

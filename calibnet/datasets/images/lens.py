@@ -13,7 +13,7 @@ from calibnet.datasets.frame import Face, Original
 from calibnet.geometry import PinholeCamera
 from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.faces import faces
-from calibnet.geometry.rectification import Rectification, central, degrees_across, said_of, without_black
+from calibnet.geometry.rectification import Rectification, central, degrees_across, field_of_view_note, without_black
 from calibnet.geometry.types import Extrinsic
 
 LOOKED_AT = 3
@@ -68,7 +68,7 @@ class Lens:
     def notes(self) -> tuple[str, ...]:
         """A sentence for the user if one pinhole does not show all of it."""
         if not self.faces:
-            return said_of(self.middle)
+            return field_of_view_note(self.middle)
         widths = "°, ".join(f"{degrees_across(face.pinhole):.0f}" for face in self.faces)
         return (
             f"The lens is wide: it is replaced by {len(self.faces)} pinhole cameras in its place ({widths}° "

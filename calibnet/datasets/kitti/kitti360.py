@@ -15,7 +15,7 @@ import numpy as np
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import read_calibration
-from calibnet.datasets.folder import looked_at
+from calibnet.datasets.folder import sample_images
 from calibnet.datasets.images.files import read_image
 from calibnet.datasets.images.lens import Lens, Picture
 from calibnet.datasets.kitti.calibration import (
@@ -74,7 +74,7 @@ class Kitti360(PairedSequence):
         where = f"Calibration of camera {camera} in {root / 'calibration'}"
         if isinstance(found, CameraModel):
             refuse([*of_camera(central(found).pinhole), *of_extrinsic(extrinsic)], where)
-            self._lens: Lens | None = Lens.of(found, extrinsic, looked_at(list(both.values()), found))
+            self._lens: Lens | None = Lens.of(found, extrinsic, sample_images(list(both.values()), found))
             self._fixed = Calibration(self._lens.pinhole.matrix, extrinsic)
             self.notes += self._lens.notes
         else:

@@ -129,7 +129,7 @@ class PCBA:
         self, drive: Drive, planes: Planes, schedule: tuple[Round, ...], extrinsic: Extrinsic, initial: Extrinsic
     ) -> Iterator[tuple[Tracks, Adjusted]]:
         """Follow points; then adjust, drop what does not fit, and choose planes anew, round by round."""
-        tracks = some(follow(drive.pictures, drive.scans, drive.poses, drive.camera, extrinsic))
+        tracks = sample_tracks(follow(drive.pictures, drive.scans, drive.poses, drive.camera, extrinsic))
         known = np.array([self.range.translation_m] * 3 + [np.radians(self.range.rotation_deg)] * 3) / 3**0.5
         lidar_from_world = np.stack([invert(pose) for pose in drive.poses])
         landmarks = tracks.start
@@ -216,7 +216,7 @@ def same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
     return (one.width, one.height) == (other.width, other.height) and np.allclose(one.matrix, other.matrix)
 
 
-def some(tracks: Tracks) -> Tracks:
+def sample_tracks(tracks: Tracks) -> Tracks:
     """At most `MOST_LANDMARKS`, evenly from the whole drive."""
     count = len(tracks.start)
     kept = np.zeros(count, bool)

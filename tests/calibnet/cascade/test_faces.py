@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from calibnet.alignment import gather
 from calibnet.cascade import Cascade, Stage
-from calibnet.cascade.faces import joined
+from calibnet.cascade.faces import join_looks
 from calibnet.errors import CalibrationError
 from calibnet.geometry import RANGES, miscalibration, pose_error, project, rotation_from_vector, transform
 from calibnet.geometry.se3 import pose_from_vector
@@ -66,7 +66,7 @@ def test_one_face_s_blind_axis_is_another_s_best():
     ahead, side = saying(np.eye(3), truth, AHEAD_UNKNOWN), saying(SIDE, truth, AHEAD_UNKNOWN)
     alone = pose_error(ahead.after, truth).translation_cm
     assert alone == pytest.approx(30, abs=1)
-    both = joined([ahead, side], 5.0, MODEL)
+    both = join_looks([ahead, side], 5.0, MODEL)
     error = pose_error(both.after, truth)
     assert error.translation_cm < 0.6 * alone, "each also errs alike in all its matches, which nothing else tells"
     assert error.rotation_deg < 0.01
@@ -80,9 +80,9 @@ def test_a_face_that_shows_something_else_is_left_out():
     truth = miscalibration([0.05, 0, 0], [0.02, 0, 0]) @ REFERENCE
     good = saying(SIDE, truth, np.full(6, 0.001))
     lost = saying(np.eye(3), miscalibration([3, 0, 0], [0.5, 0, 0]) @ REFERENCE, np.full(6, 0.001), error_px=9.0)
-    assert joined([lost, good], 5.0, MODEL) is good
-    assert joined([lost], 5.0, MODEL) is lost, "where none fits, that is what is told"
-    torn = joined([lost, good], np.inf, MODEL)
+    assert join_looks([lost, good], 5.0, MODEL) is good
+    assert join_looks([lost], 5.0, MODEL) is lost, "where none fits, that is what is told"
+    torn = join_looks([lost, good], np.inf, MODEL)
     assert pose_error(torn.after, truth).rotation_deg < pose_error(lost.after, truth).rotation_deg / 3
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibnet.drive.changes import SHORTEST, tempered, watch
+from calibnet.drive.changes import SHORTEST, watch, without_outliers
 from calibnet.geometry.types import Floats
 from calibnet.trace import DriveLook
 from calibnet.watch import WINDOW, Change
@@ -74,7 +74,7 @@ def test_single_frames_that_are_wrong_are_no_change() -> None:
     said = noise(80)
     said[[20, 41, 42, 60]] += [1.0, -1.0, 2.0, 0.1, 0.2, -0.1]
     assert watch(looks(said)).changes == ()
-    assert np.abs(tempered(said)[20]).max() < 0.5
+    assert np.abs(without_outliers(said)[20]).max() < 0.5
 
 
 def test_the_windowed_estimate_lies_in_its_band() -> None:

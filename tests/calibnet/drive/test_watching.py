@@ -10,7 +10,7 @@ import pytest
 
 from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.frame import Frame, Frames
-from calibnet.drive.watching import runs, watch_drive, watch_estimate
+from calibnet.drive.watching import consecutive_runs, watch_drive, watch_estimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES, miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
@@ -117,4 +117,4 @@ def test_a_drive_that_is_solved_tells_it_at_no_cost() -> None:
 
 
 def test_runs_of_positions() -> None:
-    assert runs([3, 4, 5, 9, 11, 12]) == [(3, 6), (9, 10), (11, 13)] and runs([]) == []
+    assert consecutive_runs([3, 4, 5, 9, 11, 12]) == [(3, 6), (9, 10), (11, 13)] and consecutive_runs([]) == []

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from calibnet.geometry import CameraModel
-from calibnet.geometry.rectification import Rectification, central, degrees_across, said_of, without_black
+from calibnet.geometry.rectification import Rectification, central, degrees_across, field_of_view_note, without_black
 
 MATRIX = np.array([[150.0, 0.0, 199.0], [0.0, 155.0, 151.0], [0.0, 0.0, 1.0]])
 LENSES = {
@@ -61,10 +61,10 @@ def test_a_pinhole_ends_where_the_lens_does_and_not_beyond_what_is_of_use():
     narrow = fisheye(500.0)
     expected = np.degrees(2 * 200 / 500)  # angles are distances from the centre
     assert degrees_across(central(narrow).pinhole) == pytest.approx(expected, abs=0.6)
-    assert said_of(central(narrow)) == ()
+    assert field_of_view_note(central(narrow)) == ()
     wide = fisheye(120.0)
     assert degrees_across(central(wide).pinhole) == pytest.approx(110, abs=0.5)
-    (sentence,) = said_of(central(wide))
+    (sentence,) = field_of_view_note(central(wide))
     assert sentence.startswith("The lens sees 190° across; the middle 110° are used")
 
 

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from calibnet.runtime.text import lines, one_line
+from calibnet.runtime.text import one_line, quoted_lines
 
 
 @pytest.mark.parametrize(
@@ -34,4 +34,4 @@ def test_a_long_text_loses_its_middle() -> None:
 
 
 def test_our_own_lines_stay_lines() -> None:
-    assert lines("one\ntwo\x1b[0m") == "one\ntwo\\x1b[0m"
+    assert quoted_lines("one\ntwo\x1b[0m") == "one\ntwo\\x1b[0m"
