@@ -20,7 +20,7 @@ from calibnet.runtime.text import one_line
 from calibnet.runtime.writing import keeping_others
 from inspector.cli.errors import environment_sentence
 from inspector.cli.run_options import verify_options
-from inspector.cli.sequences import Opening, over_sequences
+from inspector.cli.subcommands import Opening, over_sequences
 from inspector.fleet.drives import Drive
 from inspector.fleet.ledger import ENTRY, Entry, Key, read_entry, write_entry
 from inspector.fleet.places import Store, content, items_of, on_this_machine, seen

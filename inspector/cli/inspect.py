@@ -10,7 +10,7 @@ import click
 
 from inspector.cli.run import calibrate
 from inspector.cli.run_options import run_options
-from inspector.cli.sequences import Opening, over_sequences
+from inspector.cli.subcommands import Opening, over_sequences
 
 if TYPE_CHECKING:
     from inspector.cli.viewing import Viewing

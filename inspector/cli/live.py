@@ -22,7 +22,7 @@ from inspector.cli.output import make_console, overwrite_option, say
 from inspector.cli.preparing import UNJUDGED, announce, open_other
 from inspector.cli.recordings import OUTPUT_FILE
 from inspector.cli.run import checked_options
-from inspector.cli.sequences import Opening, over_sequences
+from inspector.cli.subcommands import Opening, over_sequences
 from inspector.export.registry import FORMATS, suffix_of
 from inspector.run.options import DEFAULT_RANGE
 

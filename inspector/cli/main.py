@@ -77,7 +77,7 @@ SECTIONS = {
         "bench": LazyCommand("inspector.cli.bench:bench", "Measure all methods on the same frames."),
         "ablate": LazyCommand("inspector.cli.ablate:ablate", "Measure what each module of the network is worth."),
         "benchmark": LazyCommand("inspector.cli.benchmark:benchmark", "Measure milliseconds by part, stage and frame."),
-        "info": LazyCommand("inspector.cli.model:info", "Count parameters and multiply-adds by module."),
+        "info": LazyCommand("inspector.cli.info:info", "Count parameters and multiply-adds by module."),
     },
 }
 """Every command, under the headings and in the order in which ``--help`` lists them."""

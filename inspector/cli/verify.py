@@ -15,7 +15,7 @@ from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
 from inspector.cli.run import checked_options, choose_outputs, finish, recording_to
 from inspector.cli.run_options import verify_options
-from inspector.cli.sequences import Opening, disturbed, over_sequences
+from inspector.cli.subcommands import Opening, disturbed, over_sequences
 
 if TYPE_CHECKING:
     from calibnet.datasets import Sequence

@@ -11,8 +11,8 @@ from inspector.cli.output import prepare_json, say, write_json
 from inspector.cli.preparing import prepare
 from inspector.cli.run import checked_options, choose_outputs, recording_to
 from inspector.cli.run_options import watch_options
-from inspector.cli.sequences import Opening, disturbed, over_sequences
 from inspector.cli.sources import SOURCES
+from inspector.cli.subcommands import Opening, disturbed, over_sequences
 from inspector.cli.viewing import saved_lines
 
 if TYPE_CHECKING:
