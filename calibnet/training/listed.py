@@ -78,8 +78,8 @@ def read_list(file: Path) -> tuple[ListedDrive, ...]:
 def _opened(drive: ListedDrive) -> Sequence:
     if "--guess" in drive.options or drive.dataset == "bag" or "://" in drive.path:
         raise DatasetError(
-            "it is a bag, is on another machine or has a separate calibration (--guess), which training does not support; "
-            "remove it from the list."
+            "it is a bag, is on another machine or has a separate calibration (--guess), which training does not "
+            "support; remove it from the list."
         )
     sequence = open_sequence(drive.dataset, drive.path, **options_of(drive.dataset, drive.sequence, drive.camera))
     return PickedFrames(sequence, select_frames(sequence, drive.selection)) if drive.selection else sequence

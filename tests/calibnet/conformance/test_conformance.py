@@ -116,7 +116,7 @@ class Method:
     [
         ({"starts": True}, "does not start from the extrinsic that was given"),
         ({"peeks": True}, "uses the frame's own extrinsic"),
-        ({"moody": True}, "give another result"),
+        ({"moody": True}, "give different results"),
         ({"writes": True}, "changes the frame"),
         ({"scales": True}, "rotation of the correction of stage 1"),
         ({"elsewhere": True}, "after is not correction @ before"),

@@ -47,5 +47,5 @@ def test_what_is_missing_is_said_with_the_command_that_makes_it(tmp_path: Path) 
     with pytest.raises(WeightsError, match=r"Method lccnet has no weights in the package.* --method lccnet --range 5"):
         open_method("lccnet", RANGES[2])
     save_random("regnet", RANGES[2], tmp_path)
-    with pytest.raises(WeightsError, match=rf"Method regnet has no weights for ±20°/1\.5 m in {tmp_path}: make them"):
+    with pytest.raises(WeightsError, match=rf"Method regnet has no weights for ±20°/1\.5 m in {tmp_path}; make them"):
         open_method("regnet", RANGES[0], weights=tmp_path)
