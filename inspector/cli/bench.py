@@ -50,7 +50,11 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
 )
 @click.option("--data", multiple=True, metavar="DATASET:DIR[:SEQ]", help="Frames, as in train. Repeatable.")
 @click.option(
-    "--range", "ranges", multiple=True, type=RANGE, help="Range of the miscalibrations. Repeatable.  [20/1.5, 5/0.5]"
+    "--range",
+    "ranges",
+    multiple=True,
+    type=RANGE,
+    help="Range of the miscalibrations. Repeatable.  [default: 20/1.5 and 5/0.5]",
 )
 @click.option("--frames", type=FRAMES, default=":", help="Positions in every sequence, for instance 0:100:5.")
 @click.option(

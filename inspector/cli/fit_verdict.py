@@ -59,7 +59,7 @@ MOST_WORKERS = 8
     help="Stop after this time even if --runs and --drives are not finished; the runs made so far are kept for the "
     "next call.",
 )
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers.")
 @click.option(
     "--stages",
     type=STAGES,

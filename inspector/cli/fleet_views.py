@@ -15,7 +15,7 @@ from inspector.cli.output import make_console, overwrite_option, say
 @click.argument("count", type=click.IntRange(1, 100_000), metavar="N")
 @click.option("--output", "out", type=FOLDER, required=True, metavar="DIR", help="New folder of the drives.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=4, show_default=True, help="Frames of each drive.")
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers.")
 def simulate(count: int, out: Path, frames: int, seed: int) -> None:
     """Write a fleet of N synthetic drives, to try `fleet` or to measure it.
 

@@ -32,12 +32,14 @@ if TYPE_CHECKING:
     from inspector.live.session import LiveSession
 
 _OPTIONS: tuple[Callable[..., Any], ...] = (
-    click.option("--frames", type=FRAMES, default=":", help="Positions to choose from, for instance 0:100:5.  [all]"),
+    click.option(
+        "--frames", type=FRAMES, default=":", help="Positions to choose from, for instance 0:100:5.  [default: all]"
+    ),
     click.option(
         "--range",
         type=RANGE,
         help="Start from a miscalibration drawn within ± these degrees and metres, which is also how far the sliders "
-        f"reach.  [{DEFAULT_RANGE}]",
+        f"reach.  [default: {DEFAULT_RANGE}]",
     ),
     click.option(
         "--miscalibrate",
@@ -45,7 +47,7 @@ _OPTIONS: tuple[Callable[..., Any], ...] = (
         type=MISCALIBRATION,
         help="Start from this miscalibration instead of a random one.",
     ),
-    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
+    click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
     click.option("--stages", type=STAGES, help="Stages to run, for instance 3-5.  [default: those within the range]"),
     click.option("--preset", default="compact", show_default=True, help="Network to use."),
     *KNOWN_OPTIONS,

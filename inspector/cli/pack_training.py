@@ -28,7 +28,7 @@ from inspector.cli.output import make_console
     "--after", type=FOLDER, help="Folder of weights whose residuals to measure and pack too, which takes minutes."
 )
 @click.option("--preset", default="compact", show_default=True, help="Network of the weights of --after.")
-@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random.")
+@click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers.")
 @click.option("--output", "out", type=FOLDER, required=True, help="Folder of the parts.")
 @click.option("--max-size", type=SIZE, default="30MiB", show_default=True, help="Largest size of a part.")
 def pack_training(

@@ -52,7 +52,7 @@ def start_options(given: bool, every: str) -> tuple[Decorator, ...]:
             type=MISCALIBRATION,
             help="Use this miscalibration instead of a random one.",
         ),
-        click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of everything random."),
+        click.option("--seed", type=SEED, default=0, show_default=True, help="Seed of all random numbers."),
         *KNOWN_OPTIONS,
     )
 

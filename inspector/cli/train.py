@@ -112,7 +112,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Draw miscalibrations from the range only, for comparisons; always the case with --method.",
 )
-@click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Seed of everything random.")
+@click.option("--seed", type=SEED, default=TrainingOptions.seed, show_default=True, help="Seed of all random numbers.")
 @click.option(
     "--initialize",
     type=click.Path(dir_okay=False, path_type=Path),

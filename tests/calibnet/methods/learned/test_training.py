@@ -104,7 +104,7 @@ def test_weights_of_others_are_refused_in_a_sentence(
     ours = trainer_of(options(tmp_path, batches=2, warm_up=BATCH)).run()
     with pytest.raises(WeightsError, match="is not a network of regnet, calibnet, lccnet, calibformer"):
         load_method_network(ours)
-    with pytest.raises(ConfigError, match="is of regnet, not of calibnet"):
+    with pytest.raises(ConfigError, match="has the weights of regnet, not of calibnet"):
         build(options(tmp_path, preset="calibnet", initialize=str(path)), RECIPE)
 
 
