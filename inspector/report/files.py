@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 from calibnet.verdict import REJECTED
@@ -24,6 +25,7 @@ def picture_file(example: str, shown: str) -> str:
 
 
 def result_picture(folder: Path) -> str | None:
-    """The picture that shows the result of a report, preferably of the median frame; None without any."""
-    files = (picture_file(example, shown) for shown in (AS_ONE, CORRECTED) for example in ("median", "best", "worst"))
+    """The picture that shows the result of a report, or else what it had, preferably of the median frame; or None."""
+    kinds = itertools.product((AS_ONE, CORRECTED, LEFT), ("median", "best", "worst"))
+    files = (picture_file(example, shown) for shown, example in kinds)
     return next((file for file in files if (folder / file).is_file()), None)

@@ -222,6 +222,16 @@ def test_a_long_reason_unfolds_and_loses_nothing(tmp_path: Path) -> None:
     assert '<td class="reason">Short.</td>' in page
 
 
+def test_a_picture_is_of_the_result_or_else_of_what_a_rejected_drive_had(tmp_path: Path) -> None:
+    one = row("d1", "rejected", report="drives/a/d1/index.html")
+    pictures = tmp_path / one.folder / "pictures"
+    pictures.mkdir(parents=True)
+    for name in ("median_start", "worst_rejected-and-left-as-it-was", "best_corrected", "median_whole-drive-as-one"):
+        (pictures / f"{name}.jpg").touch()
+        shown = re.findall(r'<img loading="lazy" src="(.*?)"', make_page([one], tmp_path))
+        assert shown == ([] if name == "median_start" else [f"{one.folder}/pictures/{name}.jpg"])
+
+
 def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
     Path("DRIVES.csv").write_text("path,car,drive\ncar-a/monday,50% <a>,x/y?z#w\n")
     assert invoke("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")[0] == 0
