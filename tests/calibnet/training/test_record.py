@@ -86,7 +86,7 @@ def test_the_licence_of_weights_to_start_from_is_read_at_the_start(tmp_path: Pat
     for name, record in (("a", {"licence_note": "Ours alone."}), ("b", {})):
         save_network(tmp_path / name, network, network.state_dict(), record)
     assert inherited_licence(replace(OPTIONS, initialize=str(tmp_path / "a"))) == "Ours alone."
-    assert "not said" in inherited_licence(replace(OPTIONS, initialize=str(tmp_path / "b")))
+    assert "not recorded" in inherited_licence(replace(OPTIONS, initialize=str(tmp_path / "b")))
     assert inherited_licence(replace(OPTIONS, initialize=None)) == ""
 
 

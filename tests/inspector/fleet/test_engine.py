@@ -259,5 +259,5 @@ def test_a_worker_that_dies_while_it_is_prepared_is_no_end() -> None:
 
 
 def test_workers_that_always_die_before_they_begin_are_one_sentence() -> None:
-    with pytest.raises(EngineError, match="Workers die before they begin"):
+    with pytest.raises(EngineError, match="Workers die before they start"):
         module._register(DyingWorkers(deaths=99), None)  # type: ignore[arg-type]

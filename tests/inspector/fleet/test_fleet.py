@@ -179,7 +179,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(
     code, out, err = invoke(*call, "--force")
     assert code == 130
     assert "1 of 2 drives: 1 accepted" in out
-    assert f"to go on: calib-inspect {shlex.join(call)}" in err
+    assert f"To continue with the others: calib-inspect {shlex.join(call)}" in err
     assert list(rows_of(Path("all"))) == ["monday"]
     monkeypatch.setattr(JudgedCascade, "calibrate_drive", solve)
     assert invoke(*call)[0] == 0
