@@ -74,7 +74,7 @@ def test_a_sequence_is_named_by_its_parts(dataset: str, text: str, options: dict
 )
 def test_another_name_says_what_one_looks_like(tmp_path: Path, dataset: str, text: str) -> None:
     example = PUBLISHED[dataset].example
-    with pytest.raises(click.UsageError, match=f"is not [A-Z/]+, for instance {example}"):
+    with pytest.raises(click.UsageError, match=f"is not [A-Z/]+; give for instance {example}"):
         open_parts(dataset, tmp_path, [text], None)
 
 
