@@ -181,7 +181,8 @@ def try_lines(made: dict[str, Any]) -> list[str]:
     """The result of a try in lines, from `inspector.live.tries.Try.as_dict`."""
     verdict, sigma = made["verdict"], made["sigma"]
     word = "no verdict" if verdict is None else verdict["word"]
-    head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {word.upper()}."
+    told = word.upper() if verdict is None else f"{word.upper()} {verdict['within']}".rstrip()
+    head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {told}."
     reason = [] if verdict is None else [verdict["text"]]
     sure = [] if sigma is None else [f"±{sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
     rows = []

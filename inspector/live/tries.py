@@ -82,7 +82,7 @@ class Try:
                 }
                 for position, step in enumerate(self.steps)
             ],
-            "verdict": None if verdict is None else {"word": verdict.word, "text": explained(verdict)},
+            "verdict": None if verdict is None else _verdict_dict(verdict),
             "sigma": None
             if verdict is None or verdict.covariance is None
             else [verdict.sigma_rotation_deg, verdict.sigma_translation_cm],
@@ -95,3 +95,9 @@ def figures(extrinsic: Extrinsic, other: Extrinsic | None) -> list[float] | None
         return None
     error = pose_error(extrinsic, other)
     return [error.rotation_deg, error.translation_cm]
+
+
+def _verdict_dict(verdict: Verdict) -> dict[str, str]:
+    """The word, the finest tolerance that the result is certain to be within (empty for none), and the explanation."""
+    within = "" if verdict.within is None else f"within {verdict.within}"
+    return {"word": verdict.word, "within": within, "text": explained(verdict)}

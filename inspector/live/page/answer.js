@@ -34,6 +34,7 @@ function showAnswer() {
     const word = answer.verdict ? answer.verdict.word : "no verdict";
     at("word").textContent = word[0].toUpperCase() + word.slice(1);
     at("word").className = word.split(" ")[0];
+    at("within").textContent = answer.verdict?.within ?? "";
     const sure = answer.sigma ? ` ±${answer.sigma[0].toFixed(2)}° / ${answer.sigma[1].toFixed(1)} cm (1σ).` : "";
     at("reason").textContent = `${answer.verdict ? answer.verdict.text : ""}${sure} Try ${answer.number}, frame ${answer.frame}: ${answer.title}, ${answer.milliseconds} ms.`;
   }

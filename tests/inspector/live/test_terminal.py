@@ -16,12 +16,14 @@ import rerun as rr
 from PIL import Image
 
 from calibnet.geometry import pose_error
+from calibnet.verdict import Tolerance, Verdict
 from inspector.live.keys import END, keyboard, split_keys
 from inspector.live.session import LiveSession
-from inspector.live.terminal import Terminal, help_text
+from inspector.live.terminal import Terminal, help_text, try_lines
+from inspector.live.tries import Step, Try
 from inspector.live.window import WindowRecording
 from inspector.live.workspace import Workspace
-from tests.support.fakes import FakeCascade
+from tests.support.fakes import REFERENCE, FakeCascade
 
 Read = Callable[..., list[tuple[Any, Any]]]
 
@@ -178,3 +180,12 @@ def test_a_terminal_is_left_as_it_was_found() -> None:
 
 def test_every_key_that_is_told_does_something() -> None:
     assert all(f"| {key} |" in help_text() for key in ("q a, w s, e d", "Enter", "k"))
+
+
+@pytest.mark.parametrize(
+    ("within", "ends"), [(Tolerance(1.0, 25.0), " ms: CANNOT TELL within 1° / 25 cm."), (None, " ms: CANNOT TELL.")]
+)
+def test_a_try_says_within_what_its_result_is_certain_to_be(within: Tolerance | None, ends: str) -> None:
+    verdict = Verdict("cannot tell", "", REFERENCE, (0.0, 0.0), within=within)
+    made = Try(0, 4, "stages 3 to 5", (Step("start", REFERENCE),), verdict, 12)
+    assert try_lines(made.as_dict(REFERENCE))[0].endswith(ends)
