@@ -29,7 +29,7 @@ def test_slices_of_ten_frames(text, positions):
 
 @pytest.mark.parametrize("text", ["", "a", "1:2:3:4", "0.5", "1,2", "5:x", "1 2", "0:5:0", "٣x"])
 def test_malformed_text(text):
-    with pytest.raises(ConfigError, match="for instance 0:100:5"):
+    with pytest.raises(ConfigError, match="0:100:5"):
         select_frames(range(10), text)
 
 
