@@ -116,6 +116,8 @@ def whole(path: Path) -> bool:
         with contextlib.suppress(ValueError):
             return json.loads(content) is not None
         return False
+    if path.suffix == ".rrd" and not content:
+        return True
     begins, ends = {".rrd": (b"RRF", b""), ".html": (b"<", b">")}.get(path.suffix, (b"", b""))
     return not path.name.endswith(".partial") and content.startswith(begins) and content.rstrip().endswith(ends)
 

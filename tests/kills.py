@@ -1,6 +1,6 @@
-"""Kill -9 at random moments of recording, indexing, reporting, exporting, of a fleet and of `live`, and what is left.
+"""Kills at random moments of recording, indexing, reporting, exporting, training, of a fleet, a rig and of `live`.
 
-    python -m tests.kills [--times 5] [--seed 0] [KIND ...]
+    python -m tests.kills [--times 5] [--seed 0] [--signal KILL] [KIND ...]
 
 A few of each are in the tests (`tests/hostile/test_kills.py`); many are for the hand.
 """
@@ -11,6 +11,7 @@ import argparse
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import tempfile
@@ -57,8 +58,24 @@ Cascade.load = staticmethod(lambda *_, **__: FakeCascade((3, 4, 5)))
 print("begun", flush=True)
 sys.exit(run(cli, sys.argv[1:]))
 """
-"""A command whose cascade costs nothing, beside three cars."""
+"""A command whose cascade costs nothing, beside three cars and a rig of two of them."""
+RIG = FAKED.replace("tests.support.fakes import FakeCascade", "tests.inspector.cli.test_rig import RigCascade").replace(
+    "FakeCascade((3, 4, 5))", "RigCascade()"
+)
+TRAIN = """
+import sys
+from inspector.cli.errors import run
+from inspector.cli.main import cli
+from tests.kills_training import tiny_world
+print("begun", flush=True)
+with tiny_world():
+    sys.exit(run(cli, sys.argv[1:]))
+"""
 CARS = ("car-0", "car-1", "car-2")
+
+TRAINING = (
+    "train --preset tiny --range 5/0.5 --samples 4000 --batch 4 --workers 0 --resume --output runs --save training.rrd"
+)
 
 
 @dataclass(frozen=True)
@@ -78,8 +95,8 @@ class Kind:
     check: Callable[[Path, list[str]], None]
 
 
-def killed(kind: Kind, folder: Path, draw: random.Random) -> bool:
-    """Run and kill once; returns whether it was still running."""
+def killed(kind: Kind, folder: Path, draw: random.Random, by: signal.Signals = signal.SIGKILL) -> bool:
+    """Run and kill once; returns whether it was still running. What a signal asks to end ends in a minute."""
     process = subprocess.Popen(
         kind.command, cwd=folder, env=WITH_TESTS, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
@@ -91,9 +108,11 @@ def killed(kind: Kind, folder: Path, draw: random.Random) -> bool:
             break
     time.sleep(draw.uniform(0, kind.within))
     running = process.poll() is None
-    process.kill()
-    said += [line.strip() for line in process.stdout]
-    process.wait()
+    process.send_signal(by)
+    try:
+        said += process.communicate(timeout=60)[0].split()
+    finally:
+        process.kill()
     kind.check(folder, said)
     return running
 
@@ -140,6 +159,25 @@ def check_cars(folder: Path, _: list[str]) -> None:
         assert {path.name for path in (folder / name).iterdir()} == {"images", "clouds", "calibration.yaml"}
 
 
+def check_rig(folder: Path, said: list[str]) -> None:
+    """What is there of a rig is whole, and the cars are as they were."""
+    from calibnet.datasets.calibration_files import read_calibration
+
+    for file in (folder / "found").glob("*.yaml"):
+        assert read_calibration(file).camera_from_lidar is not None
+    if (folder / "rig.rrd").exists():
+        assert (folder / "rig.rrd").read_bytes()[:3] in (b"RRF", b"")
+    check_cars(folder, said)
+
+
+def check_training(folder: Path, _: list[str]) -> None:
+    """Weights and checkpoints are whole."""
+    from safetensors.torch import load_file
+
+    for file in (folder / "runs").glob("*.[sc][ah]*"):
+        assert load_file(file)
+
+
 KINDS = {
     "recording": Kind([sys.executable, "-c", RECORD, "run.rrd", "1000"], "2", 3.0, check_recording),
     "indexing": Kind([sys.executable, "-c", RECORD, "run.rrd", "25"], "indexing", 0.6, check_recording),
@@ -155,6 +193,13 @@ KINDS = {
     "fleet": Kind(
         [sys.executable, "-c", FAKED, "fleet", *CARS, "--output", "fleet", "--workers", "0"], "begun", 15.0, check_fleet
     ),
+    "rig": Kind(
+        [sys.executable, "-c", RIG, *f"rig {CARS[0]} {CARS[1]} --headless --save rig.rrd --output found".split()],
+        "begun",
+        15.0,
+        check_rig,
+    ),
+    "training": Kind([sys.executable, "-c", TRAIN, *TRAINING.split()], "begun", 20.0, check_training),
     "live": Kind([sys.executable, "-c", FAKED, "live", "folder", CARS[0], "--no-open"], "begun", 15.0, check_cars),
 }
 
@@ -165,7 +210,9 @@ def main() -> None:
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(KINDS))
     parser.add_argument("--times", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--signal", choices=("KILL", "TERM", "INT"), default="KILL")
     asked = parser.parse_args()
+    by = signal.Signals[f"SIG{asked.signal}"]
     draw = random.Random(asked.seed)
     with tempfile.TemporaryDirectory() as base:
         folder = Path(base)
@@ -174,10 +221,10 @@ def main() -> None:
         record = [sys.executable, "-c", RECORD, "whole.rrd", "3"]
         subprocess.run(record, cwd=folder, env=WITH_TESTS, check=True, capture_output=True)
         for name in asked.kinds or KINDS:
-            running = sum(killed(KINDS[name], folder, draw) for _ in range(asked.times))
+            running = sum(killed(KINDS[name], folder, draw, by) for _ in range(asked.times))
             left = sorted(path.name for path in folder.iterdir() if path.name.endswith(".partial"))
             sys.stdout.write(
-                f"{name}: {asked.times} kills, {running} of them while it ran; nothing lost; left {left}\n"
+                f"{name}: {asked.times} of {by.name}, {running} of them while it ran; nothing lost; left {left}\n"
             )
             sys.stdout.flush()
 

@@ -194,7 +194,8 @@ def _verified(task: Task, path: Path, started: float) -> Row:
         except Exception as error:
             failed = _failed(error)
             failed = DriveFailed(_at_its_place(failed.sentence, path, drive), failed.lasting)
-            _record_sentence(drive, folder, FAILED, "", failed.sentence)
+            with suppress(OSError, CalibnetError):  # the disk may be full: why it failed stands in the table as well
+                _record_sentence(drive, folder, FAILED, "", failed.sentence)
             raise failed from None
         if found.summary is not None and found.summary.interrupted:
             raise KeyboardInterrupt

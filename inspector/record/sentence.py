@@ -28,8 +28,8 @@ def record_sentence(file: Path, description: RunDescription, word: str, cause: s
     try:
         view = rrb.TextDocumentView(origin=SENTENCE, name="Why it failed")
         layout = rrb.Blueprint(view, rrb.TimePanel(state="hidden"), auto_views=False, auto_layout=False)
-        sinks = [rr.FileSink(claim.begin())]
-        stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, layout)
+        title = description.title
+        stream = Stream(entities.APPLICATION_ID, description.recording_id, title, [claim.begin()], layout)
         stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         stream.rec.send_property(entities.OUTCOME, rr.AnyValues(word=word, cause=cause, reason=one_line(sentence)))
         stream.rec.log(SENTENCE, rr.TextDocument(f"# {word.capitalize()}\n\n{one_line(sentence)}"), static=True)

@@ -131,10 +131,13 @@ def _file_sink(path: Path, footer: bool = False) -> rr.FileSink:
     Rerun writes in a thread that fails silently, and then waits for it forever. Bytes that are written first, and taken
     back, show that the disk or a quota is full.
     """
-    with path.open("wb") as file:
-        file.write(bytes(BEGINNING_BYTES))
-        file.flush()
-        file.truncate(0)
+    with path.open("wb", buffering=0) as file:
+        left = BEGINNING_BYTES
+        try:
+            while left:
+                left -= file.write(bytes(left))
+        finally:
+            file.truncate(0)
     try:
         return rr.FileSink(path, write_footer=footer)
     except (RuntimeError, ValueError) as error:  # a name that is no UTF-8, for one
