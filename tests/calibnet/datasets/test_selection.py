@@ -35,5 +35,5 @@ def test_malformed_text(text):
 
 @pytest.mark.parametrize("text", ["10", "-11", "10:", "5:5", "5:2"])
 def test_nothing_selected(text):
-    with pytest.raises(DatasetError, match=r"which has 10 frames \(0 to 9\)"):
+    with pytest.raises(DatasetError, match=r"choose from its 10 frames \(0 to 9\)"):
         select_frames(range(10), text)

@@ -66,7 +66,7 @@ def test_a_dataset_of_another_package_is_calibrated(tmp_path: Path, monkeypatch:
     install_toys(tmp_path, monkeypatch)
     done = start(tmp_path, "folder", str(tmp_path), "--dataset", "toy", "--headless", "--frames", "9")
     assert (done.returncode, done.stdout) == (3, "")
-    assert f"Frames '9' select nothing of toy/{tmp_path.name}, which has 2 frames" in done.stderr
+    assert f"Frames '9' select nothing of toy/{tmp_path.name}; choose from its 2 frames" in done.stderr
 
 
 BODIES = {

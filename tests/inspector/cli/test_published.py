@@ -46,7 +46,7 @@ def test_nuscenes(tmp_path: Path, opened: list[tuple[Any, dict[str, Any]]], caps
     assert run(cli, ["nuscenes", "--root", str(tmp_path), "--camera", "CAM_BACK"]) == 3
     assert "no keyframe of CAM_BACK" in capsys.readouterr().err
     assert run(cli, ["nuscenes"]) == 3
-    assert "give --root DIR or set NUSCENES" in capsys.readouterr().err
+    assert "add --root DIR or set NUSCENES" in capsys.readouterr().err
     assert [one.name for one in open_parts("nuscenes", tmp_path, ["103"], None)] == ["nuscenes/scene-0103"]
 
 
