@@ -80,7 +80,7 @@ BODIES = {
         70,
         "Internal error in the package mine (SystemExit: 0). Please report",
     ),
-    "def f(e): return 5": (3, "The export format 'mine' gives int instead of text; update its package."),
+    "def f(e): return 5": (3, "The export format 'mine' returns int instead of text; update its package."),
 }
 
 
