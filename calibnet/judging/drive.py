@@ -77,7 +77,7 @@ def _word(
         return _Said(
             CANNOT_TELL,
             f"The frames determine the extrinsic only to {estimate.rotation_deg:.2g}° and "
-            f"{estimate.translation_cm:.0f} cm (one standard deviation); add frames of other places.",
+            f"{estimate.translation_cm:.0f} cm (1σ); add frames of other places.",
         )
     if isinstance(classifier, str):
         return _Said(CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}")
