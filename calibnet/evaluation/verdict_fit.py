@@ -27,6 +27,9 @@ RIDGE = 6.0
 FALSE_ACCEPTS, FALSE_ACCEPTS_OF_DRIVES = 0.005, 0.01
 """Largest share of the runs that may be accepted and wrong, on sequences left out. One frame in a hundred is what the
 verdict promises; with half of that among some 600 runs it is kept with 95 % confidence. Drives are too few for this."""
+CERTAIN = 0.5
+"""How much of these shares may be certain to be within the coarser tolerance though it is not: half of the runs have
+no fault, and what is certain shall hold where all have one."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; the others that are not accepted are *cannot tell*."""
 LEAST_DEG = 1e-3
@@ -89,7 +92,7 @@ def fit_frames(runs: Sequence[VerdictRun], ranges: Ranges) -> tuple[Classifier, 
     """
     finest, coarser = FRAME_TOLERANCES
     classifier, figures, kept = fit_classifier(runs, finest, FALSE_ACCEPTS)
-    coarse, coarse_figures, _ = fit_classifier(graded(runs, coarser), coarser, FALSE_ACCEPTS)
+    coarse, coarse_figures, _ = fit_classifier(graded(runs, coarser), coarser, CERTAIN * FALSE_ACCEPTS)
     model = fit_covariance(kept, ranges)
     nees = nees_of(kept, ranges, model)
     return replace(classifier, coarser=coarse), model, replace(figures, nees=nees, coarser=coarse_figures)
@@ -104,7 +107,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     finest, coarser = DRIVE_TOLERANCES
     share, fewest = FALSE_ACCEPTS_OF_DRIVES, FEWEST_DRIVES
     classifier, figures, _ = fit_classifier(runs, finest, share, fewest, near_counts=False)
-    coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, share, fewest)
+    coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, CERTAIN * share, fewest)
     # only runs that are vouched for count: a few gross errors would inflate the covariance of all
     accepted = [run for run in kept if error_probability(run, coarse) < coarse.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
