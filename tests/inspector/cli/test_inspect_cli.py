@@ -166,8 +166,8 @@ def test_report_keeps_the_recording_where_no_other_place_is_named(invoke: Invoke
     [
         (("--color", "error"), "has none; give --range or --miscalibrate"),
         (("--log", "curves,pictures"), "'pictures' is not a part of a frame; choose from curves,"),
-        (("--log", "curves", "--detail", "full"), "belong together"),
-        (("--detail", "custom"), "belong together"),
+        (("--log", "curves", "--detail", "full"), "give both or neither"),
+        (("--detail", "custom"), "give both or neither"),
     ],
 )
 def test_contents_that_make_no_sense_are_wrong_usage(

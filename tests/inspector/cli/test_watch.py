@@ -104,7 +104,7 @@ def test_watch_has_no_option_that_it_would_refuse_or_ignore(capsys: pytest.Captu
     shown = capsys.readouterr().out
     for option in ("--per-frame", "--method", "--no-drive", "--headless", "--report", "--log"):
         assert option not in shown
-    assert "[default: none: the calibration as it is]" in " ".join(shown.split())
+    assert "[default: none, start from the calibration as it is]" in " ".join(shown.split())
 
 
 def test_frames_of_several_mounts_cannot_be_watched(capsys: pytest.CaptureFixture[str]) -> None:

@@ -103,7 +103,7 @@ def test_the_command_writes_three_frames_or_the_one_asked_for(
     [
         ([], 2, "Give --output DIR for pictures of the tabs, --animate FILE for an animation, or both."),
         (["--animate", "x.mp4"], 3, "x.mp4 is not a .webp or .gif file; give a name with one of these endings."),
-        (["--animate", "x.gif", "--frame", "9"], 2, "has no frame 9, only 0 to 4."),
+        (["--animate", "x.gif", "--frame", "9"], 2, "has no frame 9; choose one from 0 to 4."),
     ],
 )
 def test_wrong_options_are_one_sentence(
