@@ -155,6 +155,7 @@ def _seeds_of_scans(suffix: str) -> tuple[bytes, ...]:
         ".npy": [clouds.npy(kept), npy(with_fields(kept))],
         ".npz": [npz(kept)],
         ".las": [clouds.LAS],
+        ".laz": [clouds.LAZ],  # unpacked by a process of its own, so that few are tried
         ".bin": [kept.tobytes(), np.tile(clouds.POINTS, (1, 1))[:200].tobytes()],
         ".feather": [clouds.FEATHER],
         ".parquet": [clouds.PARQUET],
@@ -228,7 +229,7 @@ def _small_floats() -> bytes:
 TARGETS: dict[str, Target] = {
     **{
         f"scan{suffix}": Target(partial(_scan, suffix), _seeds_of_scans(suffix), WORDS)
-        for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".feather", ".parquet", ".csv")
+        for suffix in (".pcd", ".ply", ".npy", ".npz", ".bin", ".las", ".laz", ".feather", ".parquet", ".csv")
     },
     **{f"bag{kind}": Target(partial(_bag, kind), (_small_bag(kind),)) for kind in (".bag", ".db3", ".mcap")},
     "foxglove.mcap": Target(partial(_bag, ".mcap"), _small_foxglove()),

@@ -40,16 +40,16 @@ def table(write: Callable[[Any, io.BytesIO], None]) -> bytes:
     return file.getvalue()
 
 
-def las() -> bytes:
+def las(compressed: bool = False) -> bytes:
     """A survey's file of twelve points."""
     data = laspy.LasData(laspy.LasHeader(point_format=0, version="1.2"))
     data.x, data.y, data.z = POINTS[:12, :3].T.astype(np.float64)
     file = io.BytesIO()
-    data.write(file)
+    data.write(file, do_compress=compressed)
     return file.getvalue()
 
 
-LAS = las()
+LAS, LAZ = las(), las(compressed=True)
 CSV = b"x,y,z,intensity\n" + b"\n".join(b",".join(str(value).encode() for value in row) for row in POINTS) + b"\n"
 FEATHER, PARQUET = table(feather.write_feather), table(parquet.write_table)
 OF_TABLES = {".feather": FEATHER, ".parquet": PARQUET}
