@@ -131,15 +131,17 @@ def judge(
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
     fit = "Picture and scan fit together, but less well than in runs with a correct result"
+    causes = why_lens()
+    within = None if causes else within  # nothing is certain of a result that a fault may explain
     if within is not None:
         fit = f"Picture and scan fit together, and the result is within {within}, but perhaps not within {FRAME_LIMITS}"
     reason = f"{fit} (probability of an error: {wrong:.0%})."
     if prior:
         reason = f"{fit} (probability of an error: {wrong:.0%} without prior knowledge, less with {prior})."
-        return verdict(CANNOT_TELL, reason, why_lens(), within)
+        return verdict(CANNOT_TELL, reason, causes, within)
     if within is None and wrong > classifier.rejected_above:
-        return verdict(REJECTED, reason, why_lens())
-    return verdict(CANNOT_TELL, reason, why_lens(), within)
+        return verdict(REJECTED, reason, causes)
+    return verdict(CANNOT_TELL, reason, causes, within)
 
 
 def _suspect(remark: Implausible) -> Cause:

@@ -52,6 +52,10 @@ def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
     assert [verdict.within for verdict in verdicts] == [FRAME_LIMITS, FRAME_TOLERANCES[1], None]
     assert [verdict.word for verdict in verdicts] == [ACCEPTED, CANNOT_TELL, REJECTED]
     assert "the result is within 1.5° / 40 cm, but perhaps not within 1° / 25 cm" in verdicts[1].reason
+    bent = run(GUESS, REFERENCE, matches(np.eye(4), lambda places: 0.96 * places, noise=0.5), match_error=2.0)
+    named = judge(FRAME, GUESS, bent, both, match_error=lambda frame, guess: 1.0)
+    assert named.within is None and [cause.name for cause in named.causes] == ["focal-length"]
+    assert "the result is within" not in named.reason
 
 
 def test_what_is_known_beforehand_is_never_rejected_by_the_classifier_alone() -> None:
