@@ -177,8 +177,9 @@ def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]
 def open_frames(sources: list[Source], recipe: Recipe, stage: TrainedStage, options: TrainingOptions) -> TrainingFrames:
     """Frames at the size of the stage's image, or cuttings of it where that is larger than the preset's input."""
     config, size = stage.network.config, stage.settings.image_size
-    area = config.input_height * config.input_width * min(size, 1.0) ** 2
-    return TrainingFrames(sources, recipe, area, options.batch, options.seed, magnification=max(size, 1.0))
+    seen = size if options.whole_images else min(size, 1.0)
+    area = config.input_height * config.input_width * seen**2
+    return TrainingFrames(sources, recipe, area, options.batch, options.seed, magnification=size / seen)
 
 
 def open_draws(

@@ -49,6 +49,9 @@ class TrainingOptions:
     train_image_branch: bool = False
     """Whether an initialised stage trains the image branch; frozen, all stages share it, and it is computed once a
     frame."""
+    whole_images: bool = False
+    """Whether a stage whose image is larger than the preset's input sees whole images instead of cuttings of that size.
+    A sample then costs as many times more as its image is larger, and the stage sees what it sees when it is used."""
     after: str | None = None
     """Folder of the stages before, whose errors are then many of the miscalibrations."""
     scene_cache: str | None = None

@@ -125,6 +125,12 @@ if TYPE_CHECKING:
     "[default: frozen, as all stages share it]",
 )
 @click.option(
+    "--whole-images",
+    is_flag=True,
+    help="Train a stage whose image is larger than the preset's input on whole images instead of cuttings: slower, and "
+    "better.",
+)
+@click.option(
     "--after",
     type=FOLDER,
     help="Folder with the weights of the stages before: most miscalibrations are then drawn from their residuals, and"
@@ -166,6 +172,7 @@ def train(
     seed: int,
     initialize: Path | None,
     train_image_branch: bool,
+    whole_images: bool,
     after: Path | None,
     output: Path,
     resume: bool,
@@ -228,6 +235,7 @@ def train(
         workers=workers,
         initialize=str(initialize) if initialize else None,
         train_image_branch=train_image_branch,
+        whole_images=whole_images,
         after=str(after) if after else None,
         scene_cache=str(scene_cache) if scene_cache else None,
     )
