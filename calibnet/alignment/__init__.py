@@ -1,8 +1,8 @@
-"""Alignment without training: edges of the scan onto edges of the picture, reflectance onto brightness.
+"""Alignment without training: edges of the scan with edges of the image, and reflectance with brightness.
 
-This is ours, not the paper's. Networks leave a bias that all frames of a drive share; evidence measured in the pictures
-themselves has other errors, so that both together come closer than either. It sees no farther than some pixels: a drive
-has to be corrected by the cascade first.
+This is ours, not the paper's. Networks leave a bias that all frames of a drive share. Evidence measured in the images
+themselves has other errors, so both together come closer than either. It reaches only some pixels, so the cascade has
+to correct a drive first.
 """
 
 from calibnet.alignment.evidence import Evidence, gather, picture_camera

@@ -1,10 +1,10 @@
 """The evidence of one frame for its extrinsic, without training.
 
-Depth edges: after Levinson & Thrun, "Automatic online calibration of cameras and lasers" (2013), points behind
-which the scene falls away belong onto edges of the picture. Edges of reflectance (road markings, signs, plates)
-likewise. Reflectance as a whole: after Pandey et al., "Automatic targetless extrinsic calibration" (2012), and
-Koide et al., "General, single-shot, target-less" (2023), reflectance and the picture's brightness depend on each other
-most where scan and picture fit, which the normalised information distance measures.
+Depth edges, after Levinson & Thrun, "Automatic online calibration of cameras and lasers" (2013): points beside which
+the depth jumps farther belong on edges of the image. Edges of reflectance (road markings, signs, plates) belong there
+too. Reflectance as a whole, after Pandey et al., "Automatic targetless extrinsic calibration" (2012), and Koide et al.,
+"General, single-shot, target-less" (2023): reflectance and brightness depend on each other most where scan and image
+fit, which the normalised information distance measures.
 """
 
 from __future__ import annotations
@@ -24,28 +24,29 @@ from calibnet.geometry.projection import nearest_per_cell
 from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector6
 
 HEIGHT, WIDTH = 320, 1024
-"""The picture is resized to the area of so many pixels, its aspect kept; all lengths in pixels below are its own."""
+"""The image is resized to the area of this size, its aspect kept; lengths in pixels below are those of the result."""
 BLUR = 2.0
-"""Standard deviation, in pixels, of the blur over edges: it is how far they pull, and less than a network's cell."""
+"""Standard deviation, in pixels, of the blur of edges, which is how far they attract; less than a network's cell."""
 BRIGHTNESS_BLUR = 2.5
-"""Standard deviation, in pixels, of the blur over the brightness that reflectance is compared with; finer detail would
+"""Standard deviation, in pixels, of the blur of the brightness that reflectance is compared with; finer detail would
 give the cost local minima."""
 SURROUNDINGS = 61
-"""Side, in pixels, of the square over which the usual contrast is taken, which an edge's strength is relative to."""
+"""Side, in pixels, of the square whose mean contrast the strength of an edge is relative to."""
 FAINTEST, SHARPEST = 1.0, 4.0
-"""What is added to the usual contrast, in grey levels a pixel, so that noise in a plain area is no edge; and the
-strength, in times the usual contrast, beyond which a stronger edge counts no more."""
+"""Grey levels per pixel that are added to the mean contrast, so that noise in a plain area is no edge; and the
+strength, as a multiple of the mean contrast, at which edges are clipped."""
 DEPTH_REACH, REFLECTANCE_REACH = 3, 6
-"""Pixels to either side of a point in which its neighbours lie, for edges of depth and of reflectance."""
+"""Distance, in pixels to either side, of the neighbours that a point is compared with, for edges of depth and of
+reflectance."""
 JUMP_METRES, JUMP_SHARE = 0.5, 0.1
-"""A neighbour lies on another surface if its depth differs by more than so many metres and more than this share."""
+"""A neighbour is on another surface if its depth differs by more than this many metres and by more than this share."""
 REFLECTANCE_JUMP = 0.3
-"""A point is at an edge of reflectance if this share of the scan's points lies between its reflectance and that of a
-darker neighbour."""
+"""A point is at an edge of reflectance if more than this share of the scan's points has a reflectance between its own
+and that of a darker neighbour."""
 FEWEST_POINTS, ENOUGH_POINTS = 30, 100
-"""Points of a term: with fewer than the first it is left out; with fewer than the second it weighs less accordingly."""
+"""A term with fewer points than the first is left out; with fewer than the second, it weighs proportionally less."""
 MOST_POINTS = 2000
-"""Points of a term at most; more are thinned out evenly."""
+"""Largest number of points in a term; more are thinned out evenly."""
 BINS = 16
 """Bins of the histograms of reflectance and of brightness."""
 INFORMATION_WEIGHT = 10.0
@@ -53,7 +54,7 @@ INFORMATION_WEIGHT = 10.0
 
 
 class Edges:
-    """Points at edges of the scan on the edges of a picture."""
+    """Points at edges of the scan, attracted by the edges of an image."""
 
     def __init__(self, edges: Map, points: NDArray[np.float32]) -> None:
         self.edges, self.points = edges, points
@@ -67,10 +68,10 @@ class Edges:
 
 
 class Reflectance:
-    """Points' reflectance and the picture's brightness: how little each tells of the other."""
+    """Reflectance of points and brightness of the image: how little each says about the other."""
 
     def __init__(self, brightness: Map, points: NDArray[np.float32], reflectance: Floats) -> None:
-        """Brightness and ``reflectance [N]`` of ``points [N, 3]``, both 0..1 and about evenly spread over that."""
+        """Brightness and ``reflectance [N]`` of ``points [N, 3]``, both spread about evenly over 0..1."""
         self.brightness, self.points = brightness, points
         self.row, self.into_row = bins(reflectance)
 
@@ -83,27 +84,27 @@ class Reflectance:
             for down, part in ((0, 1 - self.into_row), (1, self.into_row)):
                 joint += np.bincount((column + right) * BINS + self.row + down, share * part, BINS * BINS)
         distance, slope = information_distance(joint.reshape(BINS, BINS) / count)
-        steps = slope[1:] - slope[:-1]  # when a point's brightness goes from one bin to the next
+        steps = slope[1:] - slope[:-1]  # by moving a point's brightness from one bin to the next
         change = steps[column, self.row] * (1 - self.into_row) + steps[column, self.row + 1] * self.into_row
         weights = INFORMATION_WEIGHT * change * (BINS - 1) / count
         return INFORMATION_WEIGHT * distance, sampled.gradient(weights, correction[:3, 3])
 
 
 def bins(levels: Floats) -> tuple[NDArray[np.int64], Floats]:
-    """The lower one of the two bins that each level 0..1 is shared between, and the upper one's share."""
+    """The lower of the two bins between which each level 0..1 is divided, and the share of the upper one."""
     position = levels.clip(0.0, 1.0) * (BINS - 1)
     lower = np.minimum(position.astype(np.int64), BINS - 2)
     return lower, position - lower
 
 
 def information_distance(joint: Floats) -> tuple[float, Floats]:
-    """``(H(x, y) - I(x; y)) / H(x, y)`` of a joint distribution, 0 (each tells the other) to 1, and its derivative."""
+    """``(H(x, y) - I(x; y)) / H(x, y)`` of a joint distribution, 0 (each fixes the other) to 1; and its derivative."""
     log_joint = np.log(np.maximum(joint, 1e-12))
     x, y = joint.sum(1, keepdims=True), joint.sum(0, keepdims=True)
     log_x, log_y = np.log(np.maximum(x, 1e-12)), np.log(np.maximum(y, 1e-12))
     together = -float((joint * log_joint).sum())
     if together < 1e-6:
-        return 1.0, np.zeros_like(joint)  # everything in one bin tells nothing
+        return 1.0, np.zeros_like(joint)  # everything in one bin says nothing
     apart = -float((x * log_x).sum() + (y * log_y).sum())
     slope_of_together, slope_of_apart = -(log_joint + 1), -(log_x + log_y + 2)
     return 2 - apart / together, (apart * slope_of_together - together * slope_of_apart) / together**2
@@ -114,14 +115,14 @@ Term = Callable[[Transform], tuple[float, Vector6]]
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The terms of a frame, or several frames; their sum is smallest where they find that picture and scan fit best."""
+    """The terms of one frame or several; their sum is smallest where image and scan fit best."""
 
     terms: tuple[Term, ...]
 
     def __call__(self, correction: Transform) -> tuple[float, Vector6]:
-        """Sum for a correction, 4x4, and gradient ``[6]`` by a further motion ``(translation m, rotation rad)``.
+        """The sum at a correction, 4x4, and its gradient ``[6]`` by a further motion ``(translation m, rotation rad)``.
 
-        The motion comes after the correction and turns about where that has put the LiDAR's frame.
+        The motion is applied after the correction, and rotates about the origin of the corrected LiDAR frame.
         """
         value, gradient = 0.0, np.zeros(6)
         for term in self.terms:
@@ -132,7 +133,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Share:
-    """A share of some evidence."""
+    """Evidence multiplied by a share."""
 
     evidence: Term
     share: float
@@ -145,7 +146,7 @@ class Share:
 
 @dataclass(frozen=True)
 class InRig:
-    """The evidence of a camera, for corrections of the rig it is on, or of the lens that it is a face of."""
+    """The evidence of one camera of a rig, or of one face of a wide lens, for corrections of the rig or lens."""
 
     evidence: Term
     camera_from_rig: Transform
@@ -155,19 +156,19 @@ class InRig:
         rotation = self.camera_from_rig[:3, :3]
         of_camera = self.camera_from_rig @ correction @ invert(self.camera_from_rig)
         value, gradient = self.evidence(of_camera)
-        pivot = rotation @ correction[:3, 3] + self.camera_from_rig[:3, 3]  # that the rig turns about
+        pivot = rotation @ correction[:3, 3] + self.camera_from_rig[:3, 3]  # the origin about which the rig rotates
         torque = gradient[3:] + np.cross(of_camera[:3, 3] - pivot, gradient[:3])
         return value, np.concatenate([rotation.T @ gradient[:3], rotation.T @ torque])
 
 
 def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
-    """Find a frame's edges; a kind with too few points is left out, and reflectance where a scan has none.
+    """Find the evidence in a frame; terms with too few points are left out, and reflectance if a scan has none.
 
-    Of a wide lens the faces are looked at, which count as one picture together.
+    A wide lens is read face by face; its faces together count as one image.
 
     Args:
-        frame: image, scan and camera; its own extrinsic is not looked at.
-        camera_from_lidar: 4x4, that corrections will be relative to.
+        frame: image, scan and camera; its own extrinsic is not used.
+        camera_from_lidar: 4x4, which corrections will be relative to.
     """
     if frame.faces:
         turns = [transform(face.face_from_camera, np.zeros(3)) for face in frame.faces]
@@ -193,14 +194,14 @@ def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
 
 
 def picture_camera(camera: PinholeCamera) -> PinholeCamera:
-    """The camera of the picture that is looked at."""
+    """The camera of the resized image."""
     return camera.fitted(HEIGHT, WIDTH, 1)
 
 
 def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
-    """Strength of edges relative to their surroundings, ``[H, W]``: of those across the rows, and of all.
+    """Strength of edges relative to their surroundings, ``[H, W]``: of edges across the rows, and of all edges.
 
-    A scan's rows run along the picture's, so depth that jumps along them should meet an edge across.
+    The rows of a scan run along those of the image, so where depth jumps along a row, an edge should run across it.
     """
     smooth = blurred(grey, BLUR / 2)
     along_x, along_y = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy, scale=1 / 8) for dx, dy in ((1, 0), (0, 1)))
@@ -221,12 +222,12 @@ def blurred(image: NDArray[np.floating] | NDArray[np.uint8], sigma: float) -> ND
 def scan_edges(
     winner: NDArray[np.int64], depth: NDArray[np.float32], rank: Floats
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pixels ``[H, W]`` with a point beside which depth falls away, and with one beside which only reflectance does.
+    """Pixels ``[H, W]`` with a point beside which the depth jumps farther, and with one where only reflectance drops.
 
     Args:
         winner: ``[H, W]``, the point seen at each pixel, or -1.
-        depth: ``[M]`` of the points, metres.
-        rank: ``[M]`` of their reflectance, 0..1.
+        depth: ``[M]``, depth of the points, metres.
+        rank: ``[M]``, rank of their reflectance, 0..1.
     """
     hit = winner >= 0
     near = np.append(depth, np.float32(0))[winner]
@@ -244,10 +245,10 @@ def scan_edges(
 
 
 def thinned(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """At most `MOST_POINTS` of them, evenly from all over the picture."""
+    """At most `MOST_POINTS` of the rows, evenly from all over the image."""
     return rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.int64)]
 
 
 def ranks(values: NDArray[np.float32]) -> Floats:
-    """The share of values that are smaller than each: every sensor has another scale of reflectance."""
+    """For each value the share of values that are smaller, as every sensor scales reflectance differently."""
     return np.searchsorted(np.sort(values), values) / max(len(values), 1)

@@ -1,4 +1,4 @@
-"""Points that a map pulls at: what a rigid motion of them gains, and its gradient as force and torque."""
+"""A map that attracts points: its values under a rigid motion of the points, and their gradient as force and torque."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from calibnet.geometry.se3 import transform_points
 from calibnet.geometry.types import Floats, Transform, Vector3, Vector6
 
 NEAREST = 0.1
-"""Metres that a point may come to the camera; also those behind it are taken to be there."""
+"""Smallest depth, metres; points nearer than this or behind the camera are taken to be there."""
 NEIGHBOURS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]], np.float32)
-"""Pixels from a point at which the map is read: there for the value, around for its slopes."""
+"""Offsets, in pixels, at which the map is read: at the point for the value, around it for the slopes."""
 
 
 class Sampled(NamedTuple):
-    """A map ``[H, W]`` under moved points.
+    """The values of a map ``[H, W]`` at moved points.
 
     Attributes:
         values: ``[N]``.
@@ -43,14 +43,14 @@ class Sampled(NamedTuple):
 
 
 class Map:
-    """An image to read between its pixels, with its slopes."""
+    """An image that can be read between its pixels, with its slopes."""
 
     def __init__(self, image: NDArray[np.float32], camera: PinholeCamera) -> None:
-        """``image [H, W]`` as seen by ``camera``; beyond its border it goes on as it is there."""
+        """``image [H, W]`` as seen by ``camera``; beyond the border, the values at the border go on."""
         self.image, self.camera = image, camera
 
     def under(self, points: NDArray[np.float32], correction: Transform) -> Sampled:
-        """Read it where ``points [N, 3]`` of the camera frame are seen after ``correction``, 4x4."""
+        """Read the image where ``points [N, 3]`` of the camera frame are seen after ``correction``, 4x4."""
         (focal_u, skew, centre_u), (_, focal_v, centre_v), _ = self.camera.matrix
         moved = transform_points(correction, points).astype(np.float32, copy=False)
         x, y, z = moved.T

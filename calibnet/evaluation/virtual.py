@@ -33,7 +33,7 @@ class VirtualRig:
     """Another camera and scanner in the place of the real ones.
 
     Attributes:
-        zoom: times the focal length, by cutting.
+        zoom: times the focal length, by cropping.
         beside: shares of the picture (right, down) by which the cut lies beside the middle.
         turn_deg: pitch, yaw and roll of the camera against the real one.
         resized: pixels, relative to those that are left.

@@ -4,7 +4,7 @@ A volume is ``[B, Dy, Dx, h, w, C]``: for every displacement of the window and e
 
 A window of radius ``r`` means ``r`` cells at every scale, so the window of a coarse scale is twice as wide in pixels as
 that of the next finer one. On the way down every second displacement of the fine window lands in the centre of the
-coarse one, on the way up that centre is interpolated back: scales are fused where they speak of the same displacement.
+coarse one, on the way up that centre is interpolated back: so scales are fused at the same displacement.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class WindowConv(nn.Module):
 class VolumeBlock(nn.Module):
     """A convolution along x, one along y, and a skip.
 
-    There is no normalisation: cosines are well scaled, and its backward pass costs as much as the convolutions.
+    There is no normalisation: cosines are well scaled, and its backward pass would cost as much as the convolutions.
     """
 
     def __init__(self, channels: int) -> None:
@@ -57,14 +57,14 @@ class VolumeBlock(nn.Module):
 
 
 def volume_blocks(channels: int, number: int) -> nn.Sequential:
-    """So many blocks, one after the other."""
+    """``number`` blocks in sequence."""
     return nn.Sequential(*(VolumeBlock(channels) for _ in range(number)))
 
 
 class Down(nn.Conv3d):
-    """A 1x3x3 convolution of stride 2 over the displacements of a fine scale that the coarse one has too.
+    """A 1x3x3 convolution of stride 2, at those displacements of a fine scale that the coarse scale has too.
 
-    It has the weights of a 3-D convolution, and runs as the 2-D one of every displacement that it is.
+    Its weights are those of a 3-D convolution; it runs as one 2-D convolution for all displacements.
     """
 
     def __init__(self, fine: int, coarse: int) -> None:
@@ -87,7 +87,7 @@ class Hourglass(nn.Module):
         channels, fuse = config.channels_at_scales, config.hierarchical_fusion
         self.convolve_finest = config.convolve_finest
         steps = list(itertools.pairwise(channels)) if fuse else []
-        # the finest scale holds nearly all the work: it is convolved on the way up at most
+        # the finest scale is nearly all of the work: it is convolved on the way up only, if at all
         self.down_blocks = nn.ModuleList(
             volume_blocks(width, blocks if fuse and scale else 0) for scale, width in enumerate(channels)
         )
@@ -120,7 +120,7 @@ class Activations(NamedTuple):
 
 
 class Aggregated(NamedTuple):
-    """What comes out of the hourglasses.
+    """The output of the hourglasses.
 
     Attributes:
         logits: ``[B, D, h_s, w_s]`` over the window, per scale, fine to coarse.
@@ -134,13 +134,13 @@ class Aggregated(NamedTuple):
 class Aggregation(nn.Module):
     """Volumes of all scales through the hourglasses to logits.
 
-    A logit is the volume's cosine, which is trained to match by itself, and what the hourglasses add to it.
+    A logit is the volume's cosine, which is trained to match by itself, plus what the hourglasses add to it.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         inputs, channels = config.groups + 2 * config.concat_channels, config.channels_at_scales
-        # each a sequence of one: so its weights are named in the files
+        # sequences of one, since the files of weights name parameters so
         self.enter = nn.ModuleList(nn.Sequential(Pointwise(inputs, width, "relu")) for width in channels)
         self.hourglasses = nn.ModuleList(Hourglass(config, blocks) for blocks in config.blocks_of_hourglasses)
         self.score = nn.ModuleList(Pointwise(width, 1) for width in channels)

@@ -1,7 +1,7 @@
 """From frames under extrinsics to a batch of network inputs: the one place, for training and inference.
 
-Scanners look down more than cameras do: often a quarter of the picture and more holds no point. Those rows are cut off
-the LiDAR's side of a batch, and put back where results are shown; nothing outside this module counts them.
+LiDARs rarely see as far up as cameras: often the top quarter of the image or more holds no point. `Cut` crops those
+rows from the LiDAR's part of a batch, and puts them back where results are shown; no other module has to count them.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class NetworkInputs(NamedTuple):
             rows of the image, see `Cut`.
         intrinsics: ``[B, 3, 3]`` float32.
         cells: per scale of `NetworkConfig.scales`, fine to coarse, ``[B, 3, H'/s, W/s]`` float32: the nearest LiDAR
-            point of each cell in the camera frame, zeros where there is none. Also of scales without a volume: rows
-            are cut by the coarsest, which the encoder reaches.
+            point of each cell in the camera frame, zeros where there is none. Scales without a cost volume are
+            included, since rows are cropped at the coarsest scale that the encoder reaches.
     """
 
     image: Tensor
@@ -65,11 +65,11 @@ class NetworkInputs(NamedTuple):
 
 
 class Cut(NamedTuple):
-    """Rows at the top of the picture that hold no point in any scan of a batch, and are left out of its LiDAR's side.
+    """Rows at the top of the image without a point in any scan of a batch, cropped from the LiDAR's part of it.
 
     Attributes:
-        rows: how many, of the coarsest scale; at least one of its rows stays.
-        height: rows of the coarsest scale in all.
+        rows: number of rows cropped, at the coarsest scale; at least one row stays.
+        height: number of rows before cropping, at the coarsest scale.
     """
 
     rows: int
@@ -77,16 +77,16 @@ class Cut(NamedTuple):
 
     @classmethod
     def of(cls, scans: Sequence[LidarInput]) -> Cut:
-        """The cut that loses nothing of any of the scans."""
+        """The largest cut that loses no point of any scan."""
         occupied = np.any([(scan.cells[-1][2] > 0).any(axis=1) for scan in scans], axis=0)
         return cls(int(occupied.argmax()) if occupied.any() else len(occupied) - 1, len(occupied))
 
     def apply(self, array: NDArray[Scalar]) -> NDArray[Scalar]:
-        """``[..., H, W]`` of any scale without these rows."""
+        """Crop the rows: ``[..., H, W]`` of any scale to ``[..., H', W]``."""
         return array[..., self.rows * (array.shape[-2] // self.height) :, :]
 
     def undo(self, tensor: Tensor) -> Tensor:
-        """``[..., H', W]`` of any scale with these rows, which are zero: ``[..., H, W]``."""
+        """Put the rows back as zeros: ``[..., H', W]`` of any scale to ``[..., H, W]``."""
         missing = tensor.shape[-2] * self.rows // (self.height - self.rows)
         return F.pad(tensor, (0, 0, missing, 0))
 
@@ -114,10 +114,10 @@ def make_batch(
     """Stack frames of one input size.
 
     Args:
-        image: ``[B, 3, H, W]``; the batch lies on its device.
-        scans: of each frame, under its extrinsic.
+        image: ``[B, 3, H, W]``; the batch is put on its device.
+        scans: the scan of each frame under its extrinsic.
         intrinsics: ``[3, 3]`` of each frame's input camera.
-        cut: what to leave out of the scans; by default all rows above them.
+        cut: rows to crop from the scans; by default all above their points.
     """
     cut = cut or Cut.of(scans)
 

@@ -9,24 +9,24 @@ from torch import Tensor
 IMAGE_CHANNELS = 3
 LIDAR_CHANNELS = 6
 INVERSE_DEPTH_SCALE_M = 4.0
-"""Inverse depths are times this: 1 at so many metres."""
+"""Factor on inverse depths, which are 1 at this depth, metres."""
 NEAREST_M = 1.0
-"""Depths below it count as it, before they are inverted."""
+"""Smaller depths are raised to this, metres, before they are inverted."""
 PIXEL_SCALE = 32.0
 """Displacements in input pixels are divided by this where they are channels."""
 
 
 def compute_dtype(inputs: Tensor) -> torch.dtype:
-    """The precision that convolutions of ``inputs`` compute in: what goes into them need not be finer."""
+    """The precision in which convolutions of ``inputs`` compute; their input needs no finer one."""
     kind = inputs.device.type
-    mixed = kind != "meta" and torch.is_autocast_enabled(kind)  # what is only counted has no autocast
+    mixed = kind != "meta" and torch.is_autocast_enabled(kind)  # meta, used to count parameters, has none
     return torch.get_autocast_dtype(kind) if mixed else torch.float32
 
 
 def image_channels(image: Tensor) -> Tensor:
     """RGB 0..255 ``[B, 3, H, W]`` (any dtype) to about zero mean and unit variance.
 
-    In bf16 a grey value and its difference are exact, so that this is what rounding the result would give.
+    In bf16 grey values and their differences from 110 are exact, so this equals the rounded result.
     """
     return (image.to(compute_dtype(image)) - 110.0) / 65.0
 
@@ -42,7 +42,7 @@ def lidar_channels(lidar: Tensor) -> Tensor:
     The two dilated copies of the inverse depth (nearest wins) make 16 beams look more like 64, so that one network
     serves both.
     """
-    precision = compute_dtype(lidar)  # of two rounded numbers the same is the larger
+    precision = compute_dtype(lidar)  # rounding keeps the order, so maxima stay the same
     depth, intensity = lidar[:, :1].float(), lidar[:, 1:].float()
     occupied = (depth > 0).float()
     inverse = inverse_depth(depth).to(precision)

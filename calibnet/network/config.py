@@ -1,4 +1,4 @@
-"""What a network is made of, read from the presets' TOML files."""
+"""The configuration of a network, read from the TOML file of a preset."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ ImageEncoder = Literal["own", "efficientnet-lite0"]
 class NetworkConfig:
     """Sizes and switches of one network; every field is a key of a preset's TOML.
 
-    The five booleans at the end are the rows of the paper's ablation (its last table). Bounds are far from what anybody
-    would train, and keep a file from asking for a network that no memory holds.
+    The five booleans at the end are the rows of the paper's ablation (its last table). The bounds are far beyond
+    what anybody would train, and keep a file from asking for a network that fits into no memory.
     """
 
     __pydantic_config__: ClassVar[dict[str, str]] = {"extra": "forbid"}
@@ -101,7 +101,7 @@ class NetworkConfig:
 
     @property
     def trains_features(self) -> bool:
-        """Whether some batches train the features alone: not where the pose's losses are all there is."""
+        """Whether some batches train the features alone; without the hybrid loss there are only losses of the pose."""
         return self.hybrid_loss
 
     @property
@@ -116,7 +116,7 @@ class NetworkConfig:
 
     @property
     def blocks_of_hourglasses(self) -> tuple[int, ...]:
-        """Blocks of each hourglass; the paper's row without aggregation goes without the last one."""
+        """Blocks of each hourglass; without `aggregation`, a row of the paper's ablation, the last one is left out."""
         return _each(self.hourglass_blocks, self.hourglasses)[: self.hourglasses - (not self.aggregation)]
 
     @property
@@ -141,7 +141,7 @@ def preset_names() -> list[str]:
 
 
 def load_preset(name: str) -> NetworkConfig:
-    """Read a shipped preset; ``ConfigError`` lists the ones there are."""
+    """Read a shipped preset; ``ConfigError`` lists those that exist."""
     if name not in preset_names():
         raise ConfigError(f"{name!r} is not a preset; choose from {', '.join(preset_names())}.")
     text = (resources.files("calibnet.network") / "presets" / f"{name}.toml").read_text(encoding="utf-8")

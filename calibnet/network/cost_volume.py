@@ -21,13 +21,13 @@ LOGIT_SCALE = 14.0
 """Cosines of unit-norm features become logits times this."""
 
 RUN = 16
-"""Cells of a row that are compared at once, all with the image cells around any of them."""
+"""Length of the runs, in cells, into which `correlate` divides a row."""
 
 
 def search_region(image: Tensor, height: int, radius: int) -> Tensor:
-    """What the windows of the lowest ``height`` rows see of an image: ``[B, C, height + 2r, w + 2r]``.
+    """The part of an image that the windows of its lowest ``height`` rows cover: ``[B, C, height + 2r, w + 2r]``.
 
-    Zeros beside it; above, the rows that are there.
+    It is zero outside the image; above those rows it has the image's own rows, where there are any.
     """
     return F.pad(image, [radius] * 4)[:, :, image.shape[2] - height :]
 
@@ -35,12 +35,12 @@ def search_region(image: Tensor, height: int, radius: int) -> Tensor:
 def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     """Group-wise correlation of every LiDAR cell with the window of image cells around it.
 
-    One batched matrix product of short runs of LiDAR cells with the image cells around them, of which the
-    band around the diagonal is read; a loop of shifted products takes several times as long on a
-    CPU, and the product of all pairs of cells many times the memory.
+    Short runs of LiDAR cells are multiplied by the image cells around them in one batched matrix product, and the band
+    around its diagonal is the result. A loop over shifts takes several times as long on a CPU, and the product of all
+    pairs of cells many times the memory.
 
     Args:
-        lidar: ``[B, C, h, w]``, of all of the image or of its lowest rows, where the scan is.
+        lidar: ``[B, C, h, w]``, features of the whole image's height or of its lowest rows (`batch.Cut`).
         image: ``[B, C, H, w]``, ``H >= h``.
         radius: of the window, in cells.
         groups: number of channel groups, each summed on its own.
@@ -59,13 +59,13 @@ def correlate(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
     cells = grouped(lidar).unflatten(3, (runs, RUN))
     products = cells @ rows.flatten(4, 5).transpose(-1, -2)  # [B, G, h, runs, R, Dy * (R + 2r)]
     b, g, y, run, x, _ = products.stride()
-    # the window of a run's next cell begins one image cell farther on
+    # the window of the next cell of a run begins one image cell farther to the right
     band = products.as_strided((batch, groups, window, window, height, runs, RUN), (b, g, around, 1, y, run, x + 1))
     return band.flatten(5)[..., :width].movedim(1, -1)
 
 
 def concatenation_volume(lidar: Tensor, image: Tensor, radius: int) -> tuple[Tensor, Tensor]:
-    """Every LiDAR cell and the cells of its window, both ``[B, C, Dy, Dx, h, w]``, of features ``[B, C, h, w]``."""
+    """Features ``[B, C, h, w]`` of each LiDAR cell and of its window in the image, ``[B, C, Dy, Dx, h, w]`` each."""
     window = 2 * radius + 1
     moved = search_region(image, lidar.shape[2], radius).contiguous().unfold(2, window, 1).unfold(3, window, 1)
     moved = moved.permute(0, 1, 4, 5, 2, 3)
@@ -73,12 +73,12 @@ def concatenation_volume(lidar: Tensor, image: Tensor, radius: int) -> tuple[Ten
 
 
 def group_cosines(lidar: Tensor, image: Tensor, radius: int, groups: int) -> Tensor:
-    """The shares ``[B, Dy, Dx, h, w, groups]`` of the channel groups in the cosine of features ``[B, C, h, w]``."""
+    """Share of each channel group in the cosine of features ``[B, C, h, w]``: ``[B, Dy, Dx, h, w, groups]``."""
     return correlate(F.normalize(lidar, dim=1), F.normalize(image, dim=1), radius, groups)
 
 
 def total(shares: Tensor) -> Tensor:
-    """The cosine ``[B, D, h, w]`` from the shares of the groups: the whole vector has unit norm."""
+    """The cosine ``[B, D, h, w]``, which is the sum of the groups' shares, as the whole vectors have unit norm."""
     return (shares.sum(-1) if shares.shape[-1] > 1 else shares[..., 0]).flatten(1, 2)
 
 
@@ -114,13 +114,13 @@ class CostVolume(nn.Module):
         fixed, moved = concatenation_volume(self.reduce_lidar(lidar), self.reduce_image(image), self.radius)
         # a group's share of the cosine is about 1/G: scaled so that all channels start alike
         scaled = shares * self.groups if self.groups > 1 else shares
-        # a channel after the other, then channels last: four times as fast as a few channels at a time
+        # joined with channels first, then moved last: four times as fast as interleaving a few channels at a time
         parts = [scaled.movedim(-1, 1), fixed.to(shares.dtype), moved.to(shares.dtype)]
         return Volume(torch.cat(parts, dim=1).movedim(1, -1).contiguous(), total(shares))
 
 
 class CostVolumes(nn.ModuleList):
-    """Makes those of all scales."""
+    """Makes the cost volumes of all scales."""
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__(CostVolume(config) for _ in config.volume_scales)

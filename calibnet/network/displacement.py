@@ -30,16 +30,16 @@ class DisplacementField(NamedTuple):
 
 
 def expected_error(field: DisplacementField, cells: Tensor) -> Tensor:
-    """What error, in input pixels, the network expects of a frame's matches: geometric mean over cells and axes.
+    """The match error, in input pixels, that the network expects of each frame: geometric mean over cells and axes.
 
-    It tells pictures that belong to the scan from others: nothing there is found with confidence.
+    It is large if image and scan do not belong together, since then nothing is matched with confidence.
 
     Args:
-        field: of a batch.
+        field: displacement field of a batch.
         cells: ``[B, 3, h, w]`` nearest LiDAR point of each cell, zeros where there is none.
 
     Returns:
-        ``[B]``; not a number where no cell holds a point.
+        ``[B]``; NaN if no cell holds a point.
     """
     occupied = (cells[:, 2] > 0).float()
     logarithms = field.log_scale.float().mean(1) * occupied
@@ -47,14 +47,14 @@ def expected_error(field: DisplacementField, cells: Tensor) -> Tensor:
 
 
 def window_offsets(radius: int, stride: int, device: torch.device) -> Tensor:
-    """Displacements ``[D, 2]``, on a device, as ``(dx, dy)`` in pixels of the flattened window."""
+    """The displacements of the flattened window, ``[D, 2]`` on a device: ``(dx, dy)`` in input pixels."""
     axis = torch.arange(-radius, radius + 1, dtype=torch.float32, device=device) * stride
     dy, dx = torch.meshgrid(axis, axis, indexing="ij")
     return torch.stack([dx, dy], dim=-1).reshape(-1, 2)
 
 
 class DisplacementDecoder(nn.Module):
-    """Soft-argmax of every scale, blended cell by cell, plus a convolutional residual."""
+    """Soft-argmax at every scale, blended cell by cell, plus a convolutional residual."""
 
     LOG_SCALE_BOUNDS = (-2.5, 4.5)  # 0.08 to 90 px
 

@@ -1,9 +1,9 @@
-"""The convolutional part of EfficientNet-Lite0, the image encoder that starts from ImageNet (not of the paper).
+"""The convolutional part of EfficientNet-Lite0: the image encoder that starts from ImageNet (not in the paper).
 
-Real frames with a calibrated LiDAR are few, pictures are many: features that were learned on a million pictures see
-edges and objects at once and on any camera, where features learned from the calibration data alone need an hour to
-see anything. EfficientNet-Lite (Tan and Le, 2019, its form for phones) has neither squeeze-and-excitation nor swish,
-so its batch norms fold into its convolutions, and what is left is cheap on a CPU.
+Frames with a calibrated LiDAR are few, images are many: features learned on a million images recognise edges and
+objects from the start and with any camera, whereas features learned from calibration data alone take an hour to
+recognise anything. EfficientNet-Lite (Tan and Le, 2019, in its form for phones) has neither squeeze-and-excitation nor
+swish, so its batch norms fold into its convolutions, which are cheap on a CPU.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ LEVELS = (
     ((2, 40, 5, 2, 6),),  # 1/8
     ((3, 80, 3, 2, 6), (3, 112, 5, 1, 6)),  # 1/16
 )
-"""Blocks of each level: how many, channels, kernel, stride of the first, expansion."""
+"""Groups of blocks at each level: number of blocks, channels, kernel size, stride of the first, expansion."""
 
 WIDTHS = tuple(level[-1][1] for level in LEVELS)
 """Channels at 1/2, 1/4, 1/8 and 1/16. The blocks at 1/32, three quarters of its parameters, are left out."""
 
 WEIGHTS = Path(__file__).parents[1] / "weights" / "efficientnet-lite0.safetensors"
-"""ImageNet weights, Apache-2.0; how the file was made stands in docs/weights.md, "The image encoder's conversion"."""
+"""ImageNet weights, Apache-2.0; docs/weights.md says how they were made, under "The image encoder's conversion"."""
 
 
 class SameConv(Conv2d):
-    """Convolution of an even size with TensorFlow's padding, which is one wider at the far side where the stride is 2.
+    """Convolution of an even size with TensorFlow's padding, which at stride 2 is one wider on the far side.
 
-    Padded alike at both sides by one more, it computes that too, behind a margin of one row and one column which is
-    dropped: cheaper than padding a wide input first.
+    Padding a wide input first would be slow. So the convolution pads both sides alike, one wider than needed on the
+    near side, and the first row and column of its result, the margin, are dropped.
     """
 
     def __init__(
@@ -50,22 +50,22 @@ class SameConv(Conv2d):
         return self.without_margin(self.with_margin(x))
 
     def with_margin(self, x: Tensor) -> Tensor:
-        """``[B, C, H, W] -> [B, C', H/stride + 1, W/stride + 1]`` where there is one."""
+        """The result with its margin, which it has at stride 2: ``[B, C', H/stride + 1, W/stride + 1]``."""
         if self.training and self.groups > 1 and x.device.type == "cpu":
             with torch.autocast("cpu", enabled=False):  # oneDNN's gradients of these take three times as long in bf16
                 return super().forward(x.float())
         return super().forward(x)
 
     def without_margin(self, y: Tensor) -> Tensor:
-        """What `with_margin` makes, or anything that treats its cells one by one, without the margin."""
+        """Drop the margin from the result of `with_margin`, or from what was computed from it cell by cell."""
         return y[:, :, 1:, 1:] if self.stride[0] > 1 else y
 
 
 class Stem(SameConv):
     """The first convolution, of stride 2.
 
-    What comes out is large and treated whole by the next. So the packed form has no margin: a first row and column of
-    zeros in the weights shifts them by what the margin does.
+    Its result is large, and the next layer reads all of it. So the packed form makes no margin: a first row and column
+    of zeros in its weights shift the result instead.
     """
 
     def pack(self, precision: torch.dtype) -> None:
@@ -102,7 +102,7 @@ class InvertedResidual(nn.Module):
 
 
 def efficientnet_levels() -> list[nn.Sequential]:
-    """The encoder's levels from the image to 1/16, to be run one after the other; random until weights are loaded."""
+    """The encoder's levels from the image to 1/16, to be run in sequence; random until weights are loaded."""
     levels, channels = [], 32
     for position, groups in enumerate(LEVELS):
         modules: list[nn.Module] = [] if position else [Stem(3, channels, 3, 2, activation="relu6"), nn.Identity()]
@@ -115,5 +115,5 @@ def efficientnet_levels() -> list[nn.Sequential]:
 
 
 def load_weights() -> dict[str, Tensor]:
-    """The ImageNet weights of `efficientnet_levels`, as an ``nn.ModuleList`` of them names its parameters."""
+    """The ImageNet weights of `efficientnet_levels`, named as in an ``nn.ModuleList`` of them."""
     return {name: tensor.float() for name, tensor in load_file(WEIGHTS).items()}

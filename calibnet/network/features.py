@@ -20,7 +20,7 @@ from calibnet.network.layers import ConvBlock, ResidualBlock
 class Features(NamedTuple):
     """Features of both branches, ``[B, C, H/s, W/s]`` per scale of the cost volumes, fine to coarse.
 
-    Those of the LiDAR are of the lowest rows of the image alone, see `calibnet.network.batch.Cut`.
+    Those of the LiDAR cover only the lowest rows of the image, see `calibnet.network.batch.Cut`.
     """
 
     lidar: list[Tensor]
@@ -30,7 +30,7 @@ class Features(NamedTuple):
 class FeatureExtractor(nn.Module):
     """A stem and a pyramid for each of the two inputs; both may share the pyramid.
 
-    The image's may start from a network trained on ImageNet, which has a stem of its own.
+    The image's pyramid may start from a network trained on ImageNet, which has a stem of its own.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
@@ -68,7 +68,7 @@ class FeatureExtractor(nn.Module):
         return self.image_trunk.encoder[: self._pretrained]
 
     def load_pretrained(self) -> None:
-        """Give those levels their weights."""
+        """Load the ImageNet weights into those levels."""
         if levels := self.pretrained_levels():
             state = efficientnet.load_weights()
             levels.load_state_dict({name: state[name] for name in levels.state_dict()})
@@ -79,9 +79,9 @@ class Encoder(nn.ModuleList):
 
     @classmethod
     def down_to(cls, scale: int, config: NetworkConfig, pretrained: Sequence[nn.Module]) -> Encoder:
-        """The levels down to 1/scale; the first are ``pretrained`` ones, if there are any.
+        """The levels down to 1/scale, of which the first are the ``pretrained`` ones, if there are any.
 
-        Ours start behind a stem, pretrained ones at the image.
+        Our own levels start behind a stem, pretrained ones at the image.
         """
         widths, norm = encoder_widths(config, pretrained), config.normalization
         own = (
@@ -94,7 +94,7 @@ class Encoder(nn.ModuleList):
         return cls([*pretrained, *own][: level_at(scale) + 1])
 
     def forward(self, x: Tensor) -> list[Tensor]:
-        """What each level makes of the one before."""
+        """The outputs of all levels, each computed from the one before."""
         encoded = []
         for level in self:
             x = level(x)
@@ -138,10 +138,10 @@ class FeaturePyramid(nn.Module):
 
 
 class SingleScaleFeatures(nn.Module):
-    """The same without multi-scale features, a row of the paper's ablation.
+    """Features without the pyramid: the row of the paper's ablation without multi-scale features.
 
-    The encoder is whole, and its last level alone is read, resampled to each scale (docs/decisions.md, "The paper's
-    ablation").
+    The encoder is the same, but only its last level is read, and resampled to each scale (docs/decisions.md, "The
+    paper's ablation").
     """
 
     def __init__(self, config: NetworkConfig, pretrained: Sequence[nn.Module] = ()) -> None:

@@ -1,7 +1,7 @@
-"""How a coarse cost volume adds to the next finer one, and a sum of two that is made only where it has to be.
+"""Adds a coarse cost volume to the next finer one, and avoids computing their sum where it can.
 
-The window of a coarse scale is twice as wide in pixels as that of the next finer one. So its centre is interpolated to
-the displacements of the fine window, and its cells are repeated.
+The window of a coarse scale is twice as wide in pixels as that of the next finer one. So the centre of the coarse
+window is interpolated to the displacements of the fine one, and coarse cells are repeated.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from calibnet.network.convolution import Pointwise
 @lru_cache(maxsize=8)
 def refinement(window: int, device: torch.device) -> Tensor:
     """The linear map ``[D, D]``, on a device, that samples a flattened window's centre at half-cell steps."""
-    with torch.inference_mode(False):  # kept for later: a tensor born in inference could not be trained with
+    with torch.inference_mode(False):  # cached: training could not use a tensor made in inference mode
         radius = window // 2
         position = torch.arange(-radius, radius + 1) / 2 + radius
         along = (1 - (position[:, None] - torch.arange(window)).abs()).clamp(min=0)
@@ -37,11 +37,11 @@ def upsample_nearest(volume: Tensor) -> Tensor:
 
 
 class Fusion(NamedTuple):
-    """A volume on the way up as the two parts that make it up.
+    """A volume on the way up, kept as two terms that are not added yet.
 
     Attributes:
-        own: ``[B, Dy, Dx, h, w, C]``, of the scale itself.
-        coarser: ``[B, Dy, Dx, h/2, w/2, C]``, what the next coarser scale adds, if anything; not interpolated yet.
+        own: ``[B, Dy, Dx, h, w, C]``, the volume of the scale itself.
+        coarser: ``[B, Dy, Dx, h/2, w/2, C]``, the term of the next coarser scale, not interpolated yet; or None.
     """
 
     own: Tensor
@@ -52,11 +52,11 @@ class Fusion(NamedTuple):
         return self.own if self.coarser is None else self.own + upsample_nearest(refine_window(self.coarser))
 
     def read(self, head: Pointwise) -> Tensor:
-        """What a 1x1x1 convolution makes of the sum: ``[B, Dy, Dx, h, w, C']``.
+        """The 1x1x1 convolution ``head`` of the sum: ``[B, Dy, Dx, h, w, C']``.
 
-        It is linear and so is the interpolation. So each part is read before it is interpolated, and the sum, which at
-        the finest scale is by far the largest volume, is never made.
+        Convolution and interpolation are linear. So each term is convolved before it is interpolated, and the sum,
+        which at the finest scale is by far the largest volume, is never computed.
         """
         assert head.bias is not None
-        coarser = None if self.coarser is None else head(self.coarser) - head.bias  # which is to be added once
+        coarser = None if self.coarser is None else head(self.coarser) - head.bias  # the bias comes once, with `own`
         return Fusion(head(self.own), coarser).volume()

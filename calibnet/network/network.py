@@ -19,7 +19,7 @@ from calibnet.network.pose import Pose
 
 
 class NetworkOutput(NamedTuple):
-    """What one stage says of a batch.
+    """The output of one stage for a batch.
 
     Attributes:
         pose: the correction.
@@ -74,9 +74,9 @@ class CalibrationNetwork(nn.Module):
 
     @property
     def boxes(self) -> dict[str, nn.Module]:
-        """The boxes of the figure in the order they run, by the names that times have."""
+        """The boxes of the figure in the order in which they run, by the names under which times are recorded."""
         return {
-            "lidar_features": self.features,  # the image's come before, once for all looks
+            "lidar_features": self.features,  # the image's features are computed before, once for all looks
             "cost_volumes": self.cost_volumes,
             "hourglass": self.aggregation,
             "displacement": self.displacement,

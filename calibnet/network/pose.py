@@ -1,8 +1,8 @@
 """Pose estimation (paper section 3.4): two heads with one interface.
 
 `RegressionHead` is the paper's: translation and unit quaternion from the volume. `GeometricHead`
-solves a weighted perspective-n-point problem with the displacement field, so that the camera's
-intrinsics and the scan's depths enter as what they are instead of being learned for one rig.
+solves a weighted perspective-n-point problem with the displacement field, so that intrinsics and
+depths are inputs of the solution instead of being learned for one rig.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from calibnet.network.displacement import DisplacementField
 from calibnet.network.layers import ConvBlock
 
 DEPTH_FLOOR = 0.1
-"""Metres that depths are clamped to before they divide: a point may pass the camera while the pose is solved."""
+"""Smallest depth, metres, that is divided by: a point may pass the camera while the pose is solved."""
 
 
 class Pose(NamedTuple):
@@ -30,7 +30,7 @@ class Pose(NamedTuple):
     Attributes:
         correction: ``[B, 4, 4]`` float32, in the camera frame.
         information: ``[B, 6, 6]`` float32, inverse covariance of ``(translation m, rotation rad)``
-            as the head believes it; None for heads that do not say.
+            as the head estimates it; None if a head does not.
     """
 
     correction: Tensor
@@ -131,8 +131,8 @@ class GeometricHead(nn.Module):
         """Solve for the correction from the field and the cells' points ``[B, 3, h, w]``."""
         with torch.autocast(cells.device.type, enabled=False):
             flat = cells.flatten(2)
-            occupied: Tensor | slice = slice(None)  # those in no frame of the batch weigh nothing
-            if cells.device.type == "cpu":  # a GPU would have to wait until the host knows how many they are
+            occupied: Tensor | slice = slice(None)  # cells that are empty in all frames have no weight
+            if cells.device.type == "cpu":  # on a GPU, the host would have to wait for their number
                 occupied = (flat[:, 2] > 0).any(0)
 
             def picked(grid: Tensor) -> Tensor:
@@ -168,7 +168,7 @@ class GeometricHead(nn.Module):
             gradient = (weighted @ residual.flatten(1)[..., None])[..., 0]
             gradient = gradient - self.prior * torch.cat([translation, rotation_vector(rotation)], dim=-1)
             information = normal + prior
-            # the prior keeps it regular; asking whether it was makes a GPU wait for the host
+            # the prior keeps the matrix regular; checking that would make the host wait for a GPU
             step = torch.linalg.solve_ex(information, gradient).result
             turn = rotation_from_vector(step[:, 3:])
             rotation = turn @ rotation
@@ -179,7 +179,7 @@ class GeometricHead(nn.Module):
 def rotation_vector(rotation: Tensor) -> Tensor:
     """Rotation vector ``[B, 3]`` of small rotations ``[B, 3, 3]``: its length is the sine of their angle.
 
-    It is short by the third power of the angle / 6, 2 % of 20 degrees: enough for a prior.
+    It is too short by a sixth of the angle's cube, 2 % at 20 degrees: exact enough for a prior.
     """
     difference = rotation - rotation.transpose(1, 2)
     return 0.5 * torch.stack([difference[:, 2, 1], difference[:, 0, 2], difference[:, 1, 0]], dim=-1)

@@ -1,4 +1,4 @@
-"""The truth of a batch, and how far from it a pose is: what networks are trained to, ours and those of other papers."""
+"""The ground truth of a batch, and the errors of a pose: for training our networks and those of other papers."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from calibnet.network.pose import project_points
 
 
 class Target(NamedTuple):
-    """The truth of a batch.
+    """The ground truth of a batch.
 
     Attributes:
         correction: ``[B, 4, 4]`` that undoes the miscalibration.
-        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced besides; zero but where features
-            train alone.
+        shift: ``[B, 2]`` pixels ``(x, y)`` by which the LiDAR image is displaced in addition; zero unless the batch
+            trains features alone.
         visible: per scale ``[B, h, w]`` bool: the cell's point is seen by the camera (not occluded,
             inside the image).
-        of_features: whether the batch trains features alone: its LiDAR images are displaced, which no pose explains.
-            The host decides by it, and would wait for the device to look at ``shift``.
+        of_features: whether the batch trains features alone, from LiDAR images displaced as no pose explains. The host
+            needs to know; reading ``shift`` would make it wait for the device.
     """
 
     correction: Tensor

@@ -175,7 +175,7 @@ def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]
 
 
 def open_frames(sources: list[Source], recipe: Recipe, stage: TrainedStage, options: TrainingOptions) -> TrainingFrames:
-    """Frames at the size of the stage's image, or cuttings of it where that is larger than the preset's input."""
+    """Whole images at the stage's input size, or crops as large as the preset's input where that is smaller."""
     config, size = stage.network.config, stage.settings.image_size
     seen = size if options.whole_images else min(size, 1.0)
     area = config.input_height * config.input_width * seen**2

@@ -35,7 +35,7 @@ class TrainingFrames:
             area: of the frames' images, pixels.
             batch: consecutive samples that have one size.
             seed: of the sizes.
-            magnification: a stage whose image has this many times the width and height is trained on cuttings of it.
+            magnification: a stage whose image has this many times the width and height is trained on crops of it.
         """
         self.sources, self.recipe = list(sources), recipe
         self.batch, self.seed, self.magnification = batch, seed, magnification

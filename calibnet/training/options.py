@@ -50,8 +50,8 @@ class TrainingOptions:
     """Whether an initialised stage trains the image branch; frozen, all stages share it, and it is computed once a
     frame."""
     whole_images: bool = False
-    """Whether a stage whose image is larger than the preset's input sees whole images instead of cuttings of that size.
-    A sample then costs as many times more as its image is larger, and the stage sees what it sees when it is used."""
+    """Whether a stage whose image is larger than the preset's input is trained on whole images instead of crops of that
+    size. A sample costs as many times more as the image has more pixels, and shows what the stage sees in use."""
     after: str | None = None
     """Folder of the stages before, whose errors are then many of the miscalibrations."""
     scene_cache: str | None = None

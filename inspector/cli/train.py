@@ -127,8 +127,8 @@ if TYPE_CHECKING:
 @click.option(
     "--whole-images",
     is_flag=True,
-    help="Train a stage whose image is larger than the preset's input on whole images instead of cuttings: slower, and "
-    "better.",
+    help="Train a stage whose image is larger than the preset's input on whole images instead of crops: slower, but "
+    "more accurate.",
 )
 @click.option(
     "--after",

@@ -54,12 +54,12 @@ def test_a_stage_is_used_as_the_manifest_in_its_folder_says(tiny_world: Scenes, 
     assert max(height * width for height, width in frames.sizes) < 0.5 * TINY.input_height * TINY.input_width
 
 
-def test_a_stage_with_a_larger_image_trains_on_cuttings_or_on_whole_images(tiny_world: Scenes, tmp_path: Path) -> None:
+def test_a_stage_with_a_larger_image_trains_on_crops_or_on_whole_images(tiny_world: Scenes, tmp_path: Path) -> None:
     settings_of_middle_stage(tmp_path, StageSettings(2.0))
-    cuttings = build(options(tmp_path)).samples.frames
+    crops = build(options(tmp_path)).samples.frames
     whole = build(options(tmp_path, whole_images=True)).samples.frames
-    assert (cuttings.magnification, whole.magnification) == (2.0, 1.0)
-    for (height, width), (larger, wider) in zip(cuttings.sizes, whole.sizes, strict=True):
+    assert (crops.magnification, whole.magnification) == (2.0, 1.0)
+    for (height, width), (larger, wider) in zip(crops.sizes, whole.sizes, strict=True):
         assert larger * wider > 2 * height * width  # four times, but sides are multiples of 32
 
 

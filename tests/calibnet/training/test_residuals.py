@@ -93,5 +93,5 @@ def test_stages_before_see_the_whole_frame_at_their_own_size() -> None:
     wide = [frames.draw(n, np.random.default_rng(n), whole=True) for n in range(20)]
     near = [frames.draw(n, np.random.default_rng(n)) for n in range(20)]
     lens = [[float(f.camera.matrix[0, 0] / f.camera.width) for f in drawn] for drawn in (wide, near)]
-    assert np.median(lens[1]) > 1.5 * np.median(lens[0]), "magnified cuttings show a narrower view"
-    assert max(focal) < np.median(lens[1]), "the stages before are not given cuttings"
+    assert np.median(lens[1]) > 1.5 * np.median(lens[0]), "magnified crops show a narrower view"
+    assert max(focal) < np.median(lens[1]), "the stages before are not given crops"
