@@ -1,1 +1,1 @@
-"""Training: `build` opens data and network as the recipe says, `Trainer` is the loop."""
+"""Training: `build` opens the data and the network that the options name; `Trainer` is the training loop."""

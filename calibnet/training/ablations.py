@@ -36,5 +36,5 @@ def ablated(config: NetworkConfig, name: str) -> NetworkConfig:
 
 
 def ablation_folder(folder: Path, name: str) -> Path:
-    """Where the weights of a row lie within the folder of all of them; their files have the same names in each."""
+    """Folder of the weights of a row, within ``folder`` of all rows; files have the same names in each."""
     return folder / (name if name == FULL else f"without-{name}")

@@ -1,7 +1,7 @@
 """Augmentations that vary the rig and the weather, not only the view (docs/decisions.md, "Where the paper is silent").
 
 Real frames come from few rigs. A mirrored image, a camera turned about its centre, another lens and
-fewer beams are all exact: the same scene as another rig would have seen it. How often and how much is in the recipe.
+fewer beams are all exact: the same scene as another rig would have seen it. The recipe says how often and how strongly.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ def virtual_camera(
 ) -> Frame:
     """The frame as seen by a turned camera with another lens, at the network's input size.
 
-    One homography ``K' R K^-1``: turning a camera about its centre and changing its lens moves no
-    parallax, so the picture and the new extrinsic ``R @ camera_from_lidar`` are exact.
+    It is one homography ``K' R K^-1``: turning a camera about its centre and changing its lens cause no
+    parallax, so the image and the new extrinsic ``R @ camera_from_lidar`` are exact.
     """
     import cv2
 
     view = View.draw(frame.camera, height, width, generator, recipe, magnification)
-    # averaging down first: the warp only interpolates, and would alias
+    # the image is averaged down first, as the warp only interpolates and would alias
     image = resize_image(frame.image, view.near)
     homography = view.camera.matrix @ view.turn @ np.linalg.inv(view.near.matrix)
     warped = cv2.warpPerspective(image, homography, (width, height), flags=cv2.INTER_LINEAR)
@@ -57,7 +57,7 @@ def virtual_camera(
 
 
 def thin_scan(points: NDArray[np.float32], generator: Generator, recipe: ScanRecipe) -> NDArray[np.float32]:
-    """Fewer beams, which those of a scanner nearby have, fewer points, another reach, noise and another response."""
+    """The scan of another scanner nearby: fewer beams, fewer points, another reach, noise and another response."""
     scanner = Scanner.draw(generator, recipe)
     keep = np.linalg.norm(points[:, :3], axis=1) < scanner.reach_m
     if scanner.period > 1:
@@ -73,19 +73,19 @@ def thin_scan(points: NDArray[np.float32], generator: Generator, recipe: ScanRec
 
 
 def elevation_for_another(points: NDArray[np.float32], scanner: Scanner) -> NDArray[np.float32]:
-    """Elevation ``[N]``, radians, for a scanner nearby that is tilted: its rings cross those of the true one."""
+    """Elevation ``[N]``, radians, seen from a tilted scanner nearby, whose rings cross those of the true one."""
     x, y, z = scanner.turn.astype(np.float32) @ (points[:, :3] - scanner.place.astype(np.float32)).T
     elevation: NDArray[np.float32] = np.arctan2(z, np.hypot(x, y))
     return elevation
 
 
 def photometric(image: NDArray[np.uint8], generator: Generator, recipe: PictureRecipe) -> NDArray[np.uint8]:
-    """Exposure, gamma, colour, blur, noise; sometimes grey."""
+    """The image with another exposure, gamma, colours, blur and noise, all drawn at random; sometimes grey."""
     return exposed(image, Exposure.draw(generator, recipe), generator)
 
 
 def exposed(image: NDArray[np.uint8], exposure: Exposure, generator: Generator) -> NDArray[np.uint8]:
-    """The picture ``[H, W, 3]`` under an exposure; the generator makes the noise."""
+    """The image ``[H, W, 3]`` under an exposure; the generator makes the noise."""
     import cv2
 
     pixels = image.astype(np.float32) / 255.0
@@ -110,20 +110,20 @@ def augment(
     variety: float = 1.0,
     magnification: float = 1.0,
 ) -> Frame:
-    """All of the above, drawn at random, at the network's input size.
+    """The frame with all of these augmentations, drawn at random, at the network's input size.
 
-    The result is a pinhole's picture: it has neither the faces of a wide lens nor the picture as it was taken, for
-    these were not changed with it.
+    The result is a pinhole image, without the faces of a wide lens and without the image as it was taken, since these
+    are not augmented.
 
     Args:
         frame: as the dataset has it.
         height: of the result's image, pixels.
         width: of the result's image, pixels.
-        generator: of everything random.
-        recipe: how often and how much.
-        variety: probability of thinning, and of other colours; the camera always varies, since features that know
-            where a cell is on a known rig need not look at what is in it.
-        magnification: how much larger than to fill that size the picture is on average, and cut.
+        generator: source of all random numbers.
+        recipe: how often and how strongly.
+        variety: probability that the scan is thinned, and that colours change. The camera always varies: features that
+            can tell where a cell lies on a known rig need not look at what is in it.
+        magnification: factor by which the image is on average larger than this size, and then cropped to it.
     """
     frame = replace(frame, faces=(), original=None)
     if generator.random() < recipe.camera.mirrored:

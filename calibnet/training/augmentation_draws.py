@@ -27,7 +27,7 @@ class View(NamedTuple):
     """A virtual camera: rotated, with another lens.
 
     Attributes:
-        near: the frame's camera with its picture resized, which averages pixels before the picture is made smaller.
+        near: the frame's camera with its image resized; resizing averages pixels, which the warp does not.
         camera: the virtual camera, at the network's input size.
         turn: ``[3, 3]`` rotation of the virtual camera about its centre.
     """
@@ -46,10 +46,10 @@ class View(NamedTuple):
         recipe: CameraRecipe,
         magnification: float = 1.0,
     ) -> Self:
-        """How another camera of this input size sees what ``camera`` saw; see `augmentation.augment`."""
+        """Draw another camera of this input size that sees what ``camera`` saw; see `augmentation.augment`."""
         zoom = np.exp(generator.uniform(*np.log(recipe.zoom)))
         filling = max(width / camera.width, height / camera.height)
-        # a magnified part of a picture needs its pixels
+        # a magnified crop needs the pixels of the original image
         scale = filling * min(zoom * magnification, max(zoom, 1 / filling))
         near = camera.resized(round(camera.width * scale), round(camera.height * scale))
         slack_x, slack_y = width - near.width, height - near.height
@@ -69,7 +69,7 @@ class Scanner(NamedTuple):
     """A virtual scanner: which points it keeps, and how it measures them. The defaults change nothing.
 
     Attributes:
-        turn: ``[3, 3]`` rotation of the virtual scanner, whose bands of elevation divide the points.
+        turn: ``[3, 3]`` rotation of the virtual scanner, by whose bands of elevation points are chosen.
         place: position of the virtual scanner, metres.
         band_rad: width of a band.
         period: one of this many neighbouring bands is kept.
@@ -94,7 +94,7 @@ class Scanner(NamedTuple):
 
     @classmethod
     def draw(cls, generator: Generator, recipe: ScanRecipe) -> Self:
-        """A scanner as the recipe says."""
+        """Draw a scanner by the recipe."""
         scanner = cls(range_noise=recipe.range_noise)
         if generator.random() < recipe.banded:
             roll, pitch = np.radians(generator.normal(0.0, recipe.tilt_deg, 2))
@@ -120,7 +120,7 @@ class Scanner(NamedTuple):
 
 
 class Exposure(NamedTuple):
-    """Exposure, colours, blur and noise of a picture with values in 0..1. The defaults change nothing.
+    """Exposure, colours, blur and noise of an image with values in 0..1. The defaults change nothing.
 
     Attributes:
         grey: whether colours are removed.
@@ -142,7 +142,7 @@ class Exposure(NamedTuple):
 
     @classmethod
     def draw(cls, generator: Generator, recipe: PictureRecipe) -> Self:
-        """An exposure as the recipe says."""
+        """Draw an exposure by the recipe."""
         grey = bool(generator.random() < recipe.grey)
         tinted = not grey and generator.random() < recipe.tinted
         return cls(

@@ -1,4 +1,4 @@
-"""Endless batches for the loop: which samples, from which processes."""
+"""Endless batches for the training loop: which samples they have, and which processes prepare them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Batch = tuple[NetworkInputs, Target]
 
 
 class BatchNumbers(Sampler[list[int]]):
-    """Sample numbers batch by batch, from any batch on; every process of several takes its own."""
+    """Sample numbers batch by batch, from batch ``first`` on; each of several training processes takes its own."""
 
     def __init__(self, first: int, batch: int, rank: int, world: int) -> None:
         self.first, self.batch, self.rank, self.world = first, batch, rank, world
 
     @classmethod
     def of(cls, fabric: Fabric, first: int, batch: int) -> BatchNumbers:
-        """Those of this process."""
+        """The numbers of this process."""
         return cls(first, batch, fabric.global_rank, fabric.world_size)
 
     def __iter__(self) -> Iterator[list[int]]:
@@ -43,7 +43,7 @@ class BatchNumbers(Sampler[list[int]]):
 def open_batches(
     fabric: Fabric, samples: TrainingSamples | DeviceSamples, first: int, batch: int, workers: int
 ) -> Iterator[Batch]:
-    """All batches from number ``first`` on, on the fabric's device; so many other processes prepare, or draw, them."""
+    """All batches from number ``first`` on, on the fabric's device; ``workers`` processes prepare or draw them."""
     if isinstance(samples, DeviceSamples):
         drawn = samples.drawn
         return samples.made(_load(fabric, drawn, drawn.collate, BatchNumbers.of(fabric, first, batch), workers))
@@ -58,7 +58,7 @@ def _load(
     workers: int,
 ) -> Iterator[Whole]:
     """Collated samples, by their numbers, on the fabric's device."""
-    # workers that have OpenCV's threads for all cores each hinder one another; told after the fork, they wait for ever
+    # workers with OpenCV threads for all cores each hinder one another; set after the fork, they would wait for ever
     cv2.setNumThreads(1)
     loader = DataLoader(
         samples,
@@ -73,9 +73,9 @@ def _load(
 
 
 def next_batch(batches: Iterator[Batch]) -> Batch:
-    """The next batch; an error from a worker comes with its traceback as text: keep the sentence.
+    """The next batch. An error in a worker arrives with its traceback as text; only its sentence is kept.
 
-    The error's own traceback, which goes round in a circle, would keep the workers, and these the process, alive.
+    The error's own traceback is a reference cycle that would keep the workers alive, and these the process.
     """
     try:
         return next(batches)
@@ -88,6 +88,6 @@ def next_batch(batches: Iterator[Batch]) -> Batch:
 
 
 def leave_signals_to_main(worker: int) -> None:
-    """A signal may reach the whole process group; a worker ends when the main process has finished its step."""
+    """Ignore signals, which may reach the whole process group: a worker ends after the main process."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Opens what a run needs: its data, its network, and the stage that this is to become."""
+"""Opens what a training run needs: its data, its network, and the stage that the network will be."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ from calibnet.weights.manifest import load_manifest
 
 @dataclass(frozen=True)
 class Training:
-    """A run that can start.
+    """A training run that is ready to start.
 
     Attributes:
-        options: as they were given.
-        recipe: as it acts in this run, see `Recipe.of_run`.
-        fabric: the devices; all processes are there.
-        stage: to be trained; its network is on the CPU, and what is not trained of it needs no gradient.
+        options: the options as given.
+        recipe: the recipe as it acts in this run, see `Recipe.of_run`.
+        fabric: the devices, with all processes started.
+        stage: the stage to train; its network is on the CPU, and parameters that are not trained need no gradient.
         samples: what it is trained on.
-        validation: measures it on held-out frames, if there are any.
-        inherited_licence: what the weights that it starts from say of theirs; empty where it starts from nothing.
+        validation: measures its errors on held-out frames, if there are any.
+        inherited_licence: licence note of the weights that training starts from; empty without such weights.
     """
 
     options: TrainingOptions
@@ -66,9 +66,9 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
     """Open data and network.
 
     Raises:
-        ConfigError: the options do not fit each other, or what they name.
+        ConfigError: options contradict each other, or do not fit the data or weights that they name.
         DatasetError: data cannot be read.
-        WeightsError: nor can weights to start from.
+        WeightsError: the weights to start from cannot be read.
     """
     if not (options.minutes or options.samples):
         raise ConfigError("Training needs a budget: give --minutes or --samples.")
@@ -96,7 +96,7 @@ def build(options: TrainingOptions, recipe: Recipe = RECIPE) -> Training:
 
 
 def inherited_licence(options: TrainingOptions) -> str:
-    """What the weights that a run starts from say of their licence; read now, as they may be gone at its end."""
+    """Licence note of the weights that a run starts from; read at its start, as the file may be gone at its end."""
     if not options.initialize:
         return ""
     said = read_record(Path(options.initialize)).get("licence_note")
@@ -104,7 +104,7 @@ def inherited_licence(options: TrainingOptions) -> str:
 
 
 def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNetwork:
-    """The network of a method, or the preset's; what is pretrained of that is filled, and its first levels frozen."""
+    """The network of a method or preset; a preset's pretrained levels get their weights, and the first are frozen."""
     if options.preset in NETWORKS:
         return method_network(MethodConfig(options.preset), MiscalibrationRange.parse(options.range))
     config = load_preset(options.preset)
@@ -123,10 +123,10 @@ def open_network(options: TrainingOptions, recipe: OptimizerRecipe) -> TrainedNe
 
 
 def initialize(network: TrainedNetwork, options: TrainingOptions) -> TrainedNetwork | None:
-    """Give the network the weights of ``options.initialize``; a head of another kind starts anew.
+    """Load the weights of ``options.initialize`` into the network; a head of another kind keeps its random weights.
 
     Returns:
-        The network they are of; None if training starts from nothing.
+        The network that the weights belong to; None without ``options.initialize``.
     """
     if not options.initialize:
         return None
@@ -157,7 +157,7 @@ def initialize(network: TrainedNetwork, options: TrainingOptions) -> TrainedNetw
 
 
 def open_stage(network: TrainedNetwork, options: TrainingOptions) -> TrainedStage:
-    """The stage of the network, used as the manifest in the output folder says."""
+    """The network as a stage, with the settings of the manifest in the output folder."""
     number = RANGES.index(network.range) + 1 if network.range in RANGES else 0
     manifest = load_manifest(options.preset, Path(options.output))
     if isinstance(network, MethodNetwork):
@@ -166,7 +166,7 @@ def open_stage(network: TrainedNetwork, options: TrainingOptions) -> TrainedStag
 
 
 def open_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]]:
-    """What is trained on, packed or not, and what is validated on."""
+    """The training data, packed or not, and the validation data."""
     if not options.packed:
         return training_sources(options)
     if options.data:
@@ -185,10 +185,10 @@ def open_frames(sources: list[Source], recipe: Recipe, stage: TrainedStage, opti
 def open_draws(
     options: TrainingOptions, recipe: Recipe, frames: TrainingFrames, stage: TrainedStage, start: TrainedNetwork | None
 ) -> Draws:
-    """The miscalibrations: with ``options.after`` many are what the stages there leave, and what the first look does.
+    """The miscalibrations to train on; with ``options.after`` many are residuals of the stages in that folder.
 
-    The first look is that of the stage as it starts, if it starts from itself and looks more than once: a neighbour's
-    would leave what this stage never sees, and a stage that looks once needs no practice in looking again.
+    A stage that starts from its own weights and looks more than once is also given the residuals of its own first look.
+    Starting from a neighbour's weights, these would be errors that the stage never sees.
     """
     if options.uniform or isinstance(stage, MethodStage):
         return Draws(stage.range, recipe.draws)

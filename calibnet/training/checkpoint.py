@@ -1,4 +1,4 @@
-"""Checkpoints of a training run: one safetensors file, replaced atomically, resumed exactly."""
+"""Checkpoints of a training run: one safetensors file, replaced atomically, from which a run resumes exactly."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def save_checkpoint(
         path: replaced only when the new file is complete.
         model: the network being trained.
         average: its exponential moving average.
-        optimizer: AdamW; its moments are tensors and are stored as such.
-        state: numbers and texts, as JSON.
+        optimizer: AdamW; its moments are stored as tensors.
+        state: numbers and texts, stored as JSON.
     """
     tensors: dict[str, Tensor] = {}
     for prefix, module in (("model", model), ("average", average)):
@@ -47,7 +47,7 @@ def save_checkpoint(
 
 @dataclass(frozen=True)
 class State:
-    """How far a run has come, and what it was given."""
+    """How far a run has come, and its options."""
 
     steps: Annotated[int, Interval(ge=0, le=10**12)]
     seconds: Annotated[float, Interval(ge=0, le=1e12)]
@@ -79,10 +79,10 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Tensor], State]:
 
 
 def restore(tensors: dict[str, Tensor], model: nn.Module, average: nn.Module, optimizer: torch.optim.Optimizer) -> None:
-    """Put a checkpoint's tensors back into the three.
+    """Load the tensors of a checkpoint into network, average and optimizer.
 
     Raises:
-        WeightsError: they are of another network.
+        WeightsError: they belong to another network.
     """
 
     def part(prefix: str) -> dict[str, Tensor]:
@@ -96,7 +96,7 @@ def restore(tensors: dict[str, Tensor], model: nn.Module, average: nn.Module, op
             index, _, key = name.partition(".")
             moments.setdefault(int(index), {})[key] = tensor
         optimizer.load_state_dict({"state": moments, "param_groups": optimizer.state_dict()["param_groups"]})
-        for parameter, of in optimizer.state.items():  # a fused step needs moments to lie in memory as weights do
+        for parameter, of in optimizer.state.items():  # a fused step needs moments laid out as weights
             for key, moment in of.items():
                 if moment.shape == parameter.shape:
                     of[key] = torch.empty_like(parameter).copy_(moment)

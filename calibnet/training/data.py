@@ -1,4 +1,4 @@
-"""What to train on: data given as ``DATASET:ROOT[:SEQUENCE]``, the synthetic world, and their shares."""
+"""Training data: sequences named by ``DATASET:ROOT[:SEQUENCE]``, the synthetic world, and the share of each."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Source:
 
     Attributes:
         sequence: the frames.
-        weight: how often one of them is drawn, relative to the other sources.
-        synthetic: whether they are of the synthetic world, whose rigs differ most; its frames are on disk already, and
-            far too many to be kept in memory as real ones are.
+        weight: how often a frame of this source is drawn, relative to the other sources.
+        synthetic: whether the frames are synthetic. Their rigs vary most; they are read from disk each time, as they
+            are far too many to keep in memory like the real ones.
     """
 
     sequence: Sequence
@@ -33,10 +33,10 @@ class Source:
 
 
 def training_sources(options: TrainingOptions) -> tuple[list[Source], list[Sequence]]:
-    """Sources of training samples and the validation sequences, which training never draws from.
+    """The sources of training samples, and the validation sequences, which training never draws from.
 
-    A real sequence is drawn with the square root of its length: single frames of rare sensors count
-    more than the hundredth of one street. Together they have ``1 - options.synthetic``.
+    The weight of a real sequence is proportional to the square root of its length: a single frame of a rare sensor
+    counts more than the hundredth frame of one street. All real sequences together have ``1 - options.synthetic``.
 
     Raises:
         ConfigError: there is nothing to train on.
@@ -64,11 +64,11 @@ def validation_sequences(options: TrainingOptions) -> list[Sequence]:
 
 
 def open_data(spec: str) -> list[Sequence]:
-    """All sequences, of all cameras, that ``DATASET:ROOT[:SEQUENCE]`` stands for.
+    """All sequences, of all cameras, that a text ``DATASET:ROOT[:SEQUENCE]`` names.
 
     ``kitti-raw:DIR`` is every drive under DIR, ``kitti-raw:DIR:2011_09_26/0048`` one of them,
-    ``kitti-object:DIR:train`` a split, ``folder:DIR`` a plain folder or a folder of them; ``list:fleet.parquet`` the
-    accepted drives of a fleet, ``list:fleet.parquet:cannot tell`` others.
+    ``kitti-object:DIR:train`` a split, ``folder:DIR`` a folder of your own or a folder of such folders;
+    ``list:fleet.parquet`` the accepted drives of a fleet, ``list:fleet.parquet:cannot tell`` those of another verdict.
 
     Raises:
         ConfigError: the text is not of this form.

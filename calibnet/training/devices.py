@@ -14,7 +14,7 @@ from calibnet.runtime.precision import autocast
 
 def launch() -> Fabric:
     """One process for each GPU, or one on the CPU."""
-    # the warm-up leaves most of the network out, and later stages freeze the image branch
+    # the warm-up does not use most of the network, and later stages freeze the image branch
     strategy = "ddp_find_unused_parameters_true" if torch.cuda.device_count() > 1 else "auto"
     fabric = Fabric(accelerator="auto", devices="auto", strategy=strategy, plugins=[FloatInputs()])
     fabric.launch()
@@ -22,13 +22,13 @@ def launch() -> Fabric:
 
 
 class FloatInputs(MixedPrecision):
-    """bf16 autocast where it is faster; it leaves the inputs alone, as rounded points would be off by decimetres."""
+    """Autocast to bf16 where that is faster; inputs stay in float32, as rounded points would be off by decimetres."""
 
     def __init__(self) -> None:
         super().__init__("bf16-mixed", device="cuda" if torch.cuda.is_available() else "cpu")
 
     def forward_context(self) -> AbstractContextManager[Any]:
-        """Bf16 only where the hardware has it."""
+        """Autocast only where the hardware has bf16."""
         return autocast(torch.device(self.device))
 
     def convert_input(self, data: Any) -> Any:

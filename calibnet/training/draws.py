@@ -1,8 +1,8 @@
-"""Which miscalibrations a stage is trained on: what decides which errors it learns to see.
+"""Draws the miscalibrations that a stage is trained on, which decide what errors it learns to recognise.
 
-Errors that look alike compete for the same evidence: sideways with yaw, height with pitch. A stage trained on
-±1°/0.1 m finds the turn in both of them, and next to no shift; drawn much wider in translation than in rotation, it
-learns to tell them apart by the ground near the car, where a shift moves the picture most.
+Some errors look alike: a sideways shift and a yaw, a change of height and a pitch. A stage trained on ±1° / 0.1 m
+explains both by a rotation, and hardly ever finds a translation. If translations are drawn much larger in proportion,
+it learns to tell them apart by the ground near the car, where a translation displaces points most.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class Draws:
     """Draws the miscalibrations of one stage: uniform ones, and residuals.
 
     Attributes:
-        range: of the uniform ones.
-        recipe: how often and how much they are changed.
-        residuals: 4x4 each, what earlier looks left of a miscalibration (`calibnet.training.residuals`); may be none.
-        residual_share: share of the draws that are one of them.
+        range: range of the uniform draws.
+        recipe: how often and by how much draws are made smaller or larger.
+        residuals: 4x4 each, errors that earlier looks left (`calibnet.training.residuals`); may be empty.
+        residual_share: share of the draws that are residuals.
     """
 
     range: MiscalibrationRange
@@ -41,9 +41,9 @@ class Draws:
         return self.uniform(generator)
 
     def uniform(self, generator: np.random.Generator) -> Transform:
-        """A miscalibration anywhere in the range, sometimes a small one; 4x4."""
+        """A miscalibration drawn uniformly from the range, and sometimes made smaller; 4x4."""
         rotation = translation = 1.0
-        if generator.random() < self.recipe.eased_share:  # each on its own: small turns come with large shifts, too
+        if generator.random() < self.recipe.eased_share:  # each by its own factor: one may be small, the other large
             rotation, translation = generator.uniform(self.recipe.eased_least, 1.0, 2)
         eased = MiscalibrationRange(self.range.rotation_deg * rotation, self.range.translation_m * translation)
         return sample_miscalibration(eased, generator)

@@ -1,4 +1,4 @@
-"""Training frames: drawn from the sources, augmented, at the input size of the batch they are for."""
+"""Training frames: drawn from the sources, augmented, at the input size of their batch."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class TrainingFrames:
         Args:
             sources: where they come from.
             recipe: sizes and augmentations.
-            area: of the frames' images, pixels.
-            batch: consecutive samples that have one size.
-            seed: of the sizes.
+            area: area of the images, pixels.
+            batch: number of consecutive samples with one size.
+            seed: seed of the sizes.
             magnification: a stage whose image has this many times the width and height is trained on crops of it.
         """
         self.sources, self.recipe = list(sources), recipe
@@ -50,10 +50,10 @@ class TrainingFrames:
         """An augmented frame for sample ``number``.
 
         Args:
-            number: of the sample.
-            generator: of everything random but the size.
-            variety: probability that scan and picture are augmented, and that a draw of the synthetic world is kept.
-            whole: leave the magnification out.
+            number: number of the sample.
+            generator: source of all random numbers but the size.
+            variety: probability that scan and image are augmented, and that a draw of the synthetic world is kept.
+            whole: without the magnification, so that the whole image is seen.
         """
         source = self.draw_source(generator, variety)
         frame = self.read(source, int(generator.integers(len(self.sources[source].sequence))))
@@ -61,12 +61,12 @@ class TrainingFrames:
         return augment(frame, *self.size(number), generator, self.recipe, variety, magnification)
 
     def size(self, number: int) -> tuple[int, int]:
-        """Height and width of sample ``number``: its batch's."""
+        """Height and width of sample ``number``, the same for its whole batch."""
         generator = np.random.default_rng([self.seed, 1, number // self.batch])
         return self.sizes[generator.choice(len(self.sizes), p=self.recipe.sample.size_shares)]
 
     def read(self, source: int, position: int) -> Frame:
-        """One frame; the real ones, which are few, stay in memory."""
+        """Read one frame; real frames, which are few, are kept in memory."""
         sequence = self.sources[source].sequence
         if self.sources[source].synthetic:
             return sequence[position]
@@ -75,7 +75,7 @@ class TrainingFrames:
         return self.memory[source, position]
 
     def draw_source(self, generator: np.random.Generator, variety: float) -> int:
-        """A source by its weight; the synthetic world, whose rigs differ most, only comes in with the variety."""
+        """Draw a source by its weight; a draw of the synthetic world is kept with probability ``variety``."""
         while True:
             source = int(generator.choice(len(self.sources), p=self.probability))
             synthetic = self.sources[source].synthetic and len(self.sources) > 1

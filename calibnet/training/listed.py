@@ -1,4 +1,4 @@
-"""Training frames of a fleet: a table of drives, of which those with a good calibration are read."""
+"""Training frames of a fleet: the drives of a table whose calibration is good."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from calibnet.runtime.text import one_line
 from calibnet.verdict import ACCEPTED, with_its_car
 
 LIST = "list"
-"""What ``--data list:FILE`` begins with."""
+"""The dataset's name in ``--data list:FILE``."""
 COLUMNS = ("car", "drive", "dataset", "path", "sequence", "camera", "selection", "options", "verdict", "by_car")
 REMEDY = "give the fleet.parquet of `calib-inspect fleet`, or rows of it"
 
 
 @dataclass(frozen=True)
 class ListedDrive:
-    """A row of the table, as far as it says where the frames are."""
+    """The columns of a row that say where its frames are and how good its calibration is."""
 
     car: str
     drive: str
@@ -42,19 +42,19 @@ class ListedDrive:
 
     @property
     def word(self) -> str:
-        """What is known of its calibration, by itself and by the other drives of its car."""
+        """The verdict on its calibration, from this drive and from the other drives of its car."""
         return with_its_car(self.verdict, self.by_car)
 
 
 def open_list(file: Path, verdicts: str = "") -> Iterator[Sequence]:
-    """The drives of a list whose calibration is accepted, by themselves or by their car, or what else is asked for.
+    """The drives of a list with an accepted calibration, or with one of the given verdicts.
 
     Args:
-        file: a Parquet table with `COLUMNS`, more do not matter.
-        verdicts: words with commas between them.
+        file: a Parquet table with `COLUMNS`; it may have others.
+        verdicts: verdicts separated by commas; empty means accepted.
 
     Raises:
-        DatasetError: it cannot be read, is no such table, or a drive cannot be opened.
+        DatasetError: the file cannot be read, is no such table, or a drive cannot be opened.
     """
     wanted = {word.strip() for word in verdicts.split(",")} if verdicts else {ACCEPTED}
     for drive in read_list(file):
@@ -69,7 +69,7 @@ def read_list(file: Path) -> tuple[ListedDrive, ...]:
     """The rows of a list.
 
     Raises:
-        DatasetError: it cannot be read, or is no such table.
+        DatasetError: the file cannot be read, or is no such table.
     """
     rows = read_rows(file, "List", DatasetError, REMEDY, COLUMNS)
     return validated(tuple[ListedDrive, ...], rows, f"List {file}", DatasetError, REMEDY)

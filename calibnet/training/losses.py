@@ -29,23 +29,23 @@ class Losses(NamedTuple):
 
     @property
     def total(self) -> Tensor:
-        """What is minimised."""
+        """The loss that is minimised."""
         return self.matching + self.displacement + self.pose + self.quaternion + self.points
 
 
 def balanced(depth: Tensor, counted: Tensor, recipe: LossRecipe, strength: float = 1.0) -> Tensor:
-    """Weights under which all bands of depth count alike.
+    """Weights with which all bands of depth count alike.
 
     Args:
         depth: ``[...]`` metres.
         counted: ``[...]`` bool: the cells that are weighted.
-        recipe: which bands there are.
-        strength: 1 balances, 0 leaves all cells alike, between them a mixture.
+        recipe: the bands.
+        strength: 1 for balanced bands, 0 for equal cells; in between, a mixture.
 
     Returns:
         ``[...]`` weights: mean 1 over the cells that count, 0 for the others.
     """
-    # a handful of sums: what counts with masks or bins makes a GPU wait for the host
+    # sums only: counting with masks or bins would make the host wait for the GPU
     bands = [depth >= nearest for nearest in recipe.depth_bands_m]
     band = sum((farther.long() for farther in bands), torch.zeros_like(depth, dtype=torch.long))
     beyond = torch.stack([counted.sum(), *((counted & farther).sum() for farther in bands), counted.sum() * 0])
@@ -64,12 +64,12 @@ def matching_loss(
 
     Args:
         logits: ``[B, D, h, w]``.
-        displacement: ``[B, 2, h, w]`` true, in pixels.
-        visible: ``[B, h, w]``; cells whose truth lies outside the window do not count either.
-        depth: ``[B, h, w]`` of the cells' points, metres.
-        stride: pixels a cell.
-        radius: of the window, in cells.
-        recipe: which bands there are.
+        displacement: ``[B, 2, h, w]``, true displacement in pixels.
+        visible: ``[B, h, w]``, cells that count; those whose true displacement is outside the window do not either.
+        depth: ``[B, h, w]``, depth of the cells' points, metres.
+        stride: side of a cell, pixels.
+        radius: radius of the window, cells.
+        recipe: the bands of depth.
     """
     window = 2 * radius + 1
     position = displacement / stride + radius
@@ -90,7 +90,7 @@ def matching_loss(
 def scores_loss(
     logits: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
 ) -> Tensor:
-    """The matching loss of one set of logits ``[B, D, h_s, w_s]``, mean over the scales."""
+    """The matching loss of logits ``[B, D, h_s, w_s]``, averaged over the scales."""
     losses = [
         matching_loss(
             scale_logits,
@@ -118,7 +118,7 @@ def cosines_loss(
 def feature_losses(
     scores: list[Tensor], inputs: NetworkInputs, target: Target, config: NetworkConfig, recipe: LossRecipe
 ) -> Losses:
-    """The terms of a batch that trains features alone; it has no pose whose error could be told."""
+    """The terms of a batch that trains features alone; it has no pose, and so no pose errors."""
     matching = cosines_loss(scores, inputs, target, config, recipe)
     zero, unknown = torch.zeros_like(matching), torch.full_like(matching.detach(), torch.nan)
     return Losses(recipe.matching * matching, zero, zero, zero, zero, unknown, unknown)
@@ -142,10 +142,10 @@ def hybrid_loss(
     recipe: LossRecipe,
     pose_share: float = 1.0,
 ) -> Losses:
-    """All terms of one batch; only the pose's without ``config.hybrid_loss`` (the paper's ablation).
+    """All terms of one batch; only those of the pose without ``config.hybrid_loss`` (the paper's ablation).
 
-    ``pose_share`` scales the terms of the pose: until the features match anything, their gradient is
-    noise that keeps the features from learning to.
+    ``pose_share`` scales the terms of the pose: until the features match anything, the gradient of the
+    pose is noise that keeps them from learning to match.
     """
     estimate, truth = output.pose.correction, target.correction
     difference = estimate @ torch.linalg.inv_ex(truth).inverse
@@ -175,5 +175,5 @@ def hybrid_loss(
 
 
 def offset_cost(offset: Tensor, linear: float) -> Tensor:
-    """The offset itself up to ``linear`` metres, and its logarithm, smoothly, beyond."""
+    """The offset itself up to ``linear`` metres; beyond, it grows smoothly as the logarithm does."""
     return torch.where(offset < linear, offset, linear * (1 + (offset / linear).clamp(min=1).log()))

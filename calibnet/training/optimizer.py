@@ -1,4 +1,4 @@
-"""From losses to weights: what is trained how fast, the learning rate over a run, the averaged weights."""
+"""The optimizer, the schedule of its learning rate, and the moving average of the weights."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def make_optimizer(
     """AdamW for all that is not frozen.
 
     Args:
-        network: to be trained.
-        peak: the learning rate at its highest.
-        recipe: the rest.
-        fused: a step is one operation for all weights, where the device they will be on has it.
+        network: the network to train.
+        peak: the peak of the learning rate.
+        recipe: the other settings.
+        fused: whether a step is one operation for all weights; None lets PyTorch choose.
     """
     pretrained: set[nn.Parameter] = set()
     if isinstance(network, CalibrationNetwork):
@@ -37,7 +37,7 @@ def make_optimizer(
 
 
 def set_learning_rate(optimizer: torch.optim.Optimizer, peak: float, share: float, recipe: OptimizerRecipe) -> None:
-    """The rate when ``share`` (0..1) of the budget is used: up in a straight line, down along a cosine."""
+    """Set the rate for when ``share`` (0..1) of the budget is used: a linear rise, then a cosine decay."""
     rate = peak * min(1.0, (share + recipe.rate_start) / recipe.rate_ramp)
     cosine = 0.5 * (1 + math.cos(math.pi * share))
     for group in optimizer.param_groups:
@@ -48,15 +48,15 @@ def set_learning_rate(optimizer: torch.optim.Optimizer, peak: float, share: floa
 def update_average(average: AveragedModel, network: TrainedNetwork, steps: int, recipe: OptimizerRecipe) -> None:
     """Move an exponential moving average towards the network's weights.
 
-    The average is over the last tenth of the steps at most: in a run of some hundred steps it would otherwise be
-    mostly of what the network was before it had learned anything. `AveragedModel` itself reads a counter on the device
-    for this, and waits for it.
+    It averages over at most about the last tenth of the steps: in a run of some hundred steps it would otherwise be
+    mostly of weights from before the network had learned anything. `AveragedModel`'s own update reads a counter on the
+    device for this, which makes the host wait.
 
     Args:
-        average: of the network.
-        network: whose weights a step has just changed.
-        steps: before this one; after the first step the average is a copy.
-        recipe: how much of the average a step keeps.
+        average: the moving average.
+        network: the network after a step.
+        steps: number of steps before this one; after the first step the average is a copy.
+        recipe: how much of the average each step keeps.
     """
     kept = min(recipe.average_decay, (1 + steps) / (10 + steps)) if steps else 0.0
     means, ours = list[Tensor](average.module.parameters()), list[Tensor](network.parameters())

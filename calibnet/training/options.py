@@ -1,4 +1,4 @@
-"""What one training run is given: what is trained, on what, for how long."""
+"""The options of one training run: what is trained, on which data, for how long."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from calibnet.network.config import Head
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """The options of a run, as they stand in its checkpoints and in the weights' record; paths and ranges are texts.
+    """The options of a run, as checkpoints and the weights' record contain them; paths and ranges are texts.
 
-    How a stage is trained, the same in all runs, is in `calibnet.training.recipe`.
+    How a stage is trained is the same in all runs, and in `calibnet.training.recipe`.
     """
 
     preset: str
@@ -25,9 +25,10 @@ class TrainingOptions:
     packed: str | None = None
     """Folder of frames packed beforehand (`calibnet.training.packed`), instead of ``data`` and ``synthetic``."""
     on_device: bool = False
-    """Whether samples are made on the device that trains (`calibnet.training.on_device`), where all frames then are."""
+    """Whether samples are made on the device that trains (`calibnet.training.on_device`), which then keeps all
+    frames."""
     validate: list[str] = field(default_factory=list)
-    """Held-out frames of that form, never trained on."""
+    """Held-out frames, in the same form as ``data``; never trained on."""
     synthetic: float = 0.4
     """Share of the samples that come from the synthetic world, 0..1."""
     scenes: int = 4000
@@ -37,23 +38,23 @@ class TrainingOptions:
     samples: int | None = None
     """Budget of samples; a run with it is exactly repeatable."""
     batch: int = 8
-    """Samples a step, in each process."""
+    """Samples per step, in each process."""
     learning_rate: float = 1e-3
     """Peak of the learning rate."""
     seed: int = 0
-    """Seed of everything random."""
+    """Seed of all random numbers."""
     workers: int = 1
-    """Other processes that prepare samples."""
+    """Number of processes that prepare samples."""
     initialize: str | None = None
     """Weights file of a stage to start from."""
     train_image_branch: bool = False
-    """Whether an initialised stage trains the image branch; frozen, all stages share it, and it is computed once a
-    frame."""
+    """Whether an initialised stage also trains the image branch. If it is frozen, all stages share it, and it is
+    computed once per frame."""
     whole_images: bool = False
     """Whether a stage whose image is larger than the preset's input is trained on whole images instead of crops of that
     size. A sample costs as many times more as the image has more pixels, and shows what the stage sees in use."""
     after: str | None = None
-    """Folder of the stages before, whose errors are then many of the miscalibrations."""
+    """Folder of the weights of the stages before, whose residuals are then many of the miscalibrations."""
     scene_cache: str | None = None
     """Folder of the rendered scenes; by default one in the temporary folder."""
     head: Head | None = None
@@ -61,9 +62,10 @@ class TrainingOptions:
     ablation: str | None = None
     """Row of the paper's ablation, see `calibnet.training.ablations`: the preset without one of its modules."""
     image_encoder: str | None = None
-    """Image encoder instead of the preset's: ``own`` starts from nothing, as other papers' networks do here."""
+    """Image encoder instead of the preset's; ``own`` starts from random weights, as other papers' networks do here."""
     uniform: bool = False
-    """Whether miscalibrations are drawn from the range alone: no residuals, also if some travel with packed frames,
-    and no wider draws. For comparisons, in which all networks are to see the same."""
+    """Whether miscalibrations are drawn from the range alone, without residuals (also those packed with the frames) and
+    without wider draws: for comparisons, in which all networks should see the same."""
     warm_up: int | None = None
-    """Samples that first train the features alone; by default the recipe's, and none for an initialised stage."""
+    """Number of samples that first train the features alone; by default as in the recipe, and 0 for an initialised
+    stage."""

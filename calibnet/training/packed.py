@@ -1,10 +1,10 @@
-"""Training frames packed into a few files, to be trained on where neither datasets nor the synthetic world are.
+"""Reads training frames packed into a few files, for machines that have neither datasets nor the synthetic world.
 
-A GPU is often lent for minutes, without a network and with little installed. Parts of bounded size travel there one by
-one, and each is of use without the others: frames are spread over them at random. Pictures are JPEGs no larger than
-training needs; scans keep what a miscalibrated camera might see, rounded to millimetres, as differences from point to
-point, which compress to a third. With them travel the residuals that the stages before leave (`Draws`), since measuring
-them takes longer than a short training has.
+A GPU is often lent for minutes, without a network and with little installed. Packed frames are copied there in parts of
+bounded size. Frames are spread over the parts at random, so each is useful without the others. Images are JPEGs no
+larger than training needs. Scans keep the points that a miscalibrated camera might see, rounded to 4 mm and stored as
+differences from point to point, which compress to a third. The residuals of the stages before (`Draws`) are packed too,
+since measuring them would take longer than a short training.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from calibnet.runtime.text import one_line
 from calibnet.training.data import Source
 
 KEY = "calib-inspect-frames"
-"""Key of the metadata that says what a part's sources are."""
+"""Key of the metadata that describes the sources of a part."""
 PATTERN = "frames-{:03d}.safetensors"
 STEPS_PER_METRE = 256
 """Resolution of packed points; 16 bits reach 128 m, farther points are left out."""
@@ -40,15 +40,15 @@ FARTHEST_M = 2**15 / STEPS_PER_METRE
 LARGEST_BYTES = 4 << 30
 """Largest size of a part."""
 LARGEST_SCAN = 1 << 28
-"""Bytes of a scan, unpacked: some forty million points."""
+"""Largest unpacked size of a scan in bytes: some forty million points."""
 REMEDY = "pack them again"
 
 
 def unpack_scan(data: bytes) -> NDArray[np.float32]:
-    """What `calibnet.training.packing.pack_scan` made: ``[N, 4]``, rounded.
+    """Undo `calibnet.training.packing.pack_scan`: points ``[N, 4]``, rounded.
 
     Raises:
-        ValueError: it is cut short, or unpacks to more than `LARGEST_SCAN`.
+        ValueError: the data is cut short, or unpacks to more than `LARGEST_SCAN`.
     """
     unpacker = zlib.decompressobj()
     flat = np.frombuffer(unpacker.decompress(data, LARGEST_SCAN), np.uint8)
@@ -63,7 +63,7 @@ def unpack_scan(data: bytes) -> NDArray[np.float32]:
 
 
 class PackedSequence:
-    """The packed frames of one source, in all parts that are there."""
+    """The packed frames of one source, from all parts that were read."""
 
     def __init__(self, name: str, rig: str) -> None:
         self.name, self.rig = name, rig
@@ -87,7 +87,7 @@ class PackedSequence:
 
 @dataclass(frozen=True)
 class SourceOfPart:
-    """What a part says of one of its sources, see `Source`; the rig is empty in parts of versions that left it out."""
+    """A part's description of one of its sources, see `Source`; ``rig`` is empty in parts of older versions."""
 
     name: str
     weight: Annotated[float, Interval(ge=0, le=1)]
@@ -100,9 +100,9 @@ class Part:
     """One file of packed frames.
 
     Attributes:
-        path: of the file.
-        sources: of all parts.
-        tensors: as `calibnet.training.packing.Packer` names them.
+        path: path of the file.
+        sources: the sources of all parts.
+        tensors: tensors by the names that `calibnet.training.packing.Packer` gives them.
     """
 
     path: Path
@@ -114,7 +114,7 @@ class Part:
         """Read a part.
 
         Raises:
-            DatasetError: it is cut short, or no packed frames at all.
+            DatasetError: the file is cut short, or not of packed frames.
         """
         tensors, about = _read_tensors(path)
         part = cls(path, validated(list[SourceOfPart], about, _origin(path), DatasetError, REMEDY), tensors)
@@ -138,7 +138,7 @@ class Part:
         """Unpack one frame; ``source`` names it.
 
         Raises:
-            DatasetError: its picture or scan is damaged.
+            DatasetError: the image or the scan is damaged.
         """
         matrix, extrinsic = (self.tensors[name][number].numpy() for name in ("matrices", "extrinsics"))
         try:
@@ -156,10 +156,10 @@ class Part:
 
 
 def read_packed(folder: Path) -> list[Source]:
-    """What the parts in a folder hold, as sources of training frames.
+    """The sources of training frames in the parts of a folder.
 
     Raises:
-        DatasetError: there are none, or one cannot be read.
+        DatasetError: the folder has no parts, or one cannot be read.
     """
     parts = [Part.read(path) for path in _parts(folder)]
     sequences = [PackedSequence(source.name, source.rig or source.name) for source in parts[0].sources]
@@ -178,10 +178,10 @@ def read_packed(folder: Path) -> list[Source]:
 
 
 def packed_residuals(folder: Path, stage: MiscalibrationRange) -> list[Transform]:
-    """The residuals that travelled with the frames, 4x4 each; none if none did.
+    """The residuals packed with the frames for a stage, 4x4 each; empty if there are none.
 
     Raises:
-        DatasetError: there are no parts, or one cannot be read.
+        DatasetError: the folder has no parts, or one cannot be read.
     """
     name = f"residuals.{stage}"
     return [delta for path in _parts(folder) for delta in _read_tensors(path, name)[0].get(name, ())]
@@ -192,7 +192,7 @@ def _origin(path: Path) -> str:
 
 
 def _read_tensors(path: Path, *names: str) -> tuple[dict[str, Tensor], Any]:
-    """The tensors of these names that a part has, or all of them, and what it says of its sources."""
+    """The tensors of these names in a part, or all of them, and the description of its sources."""
     require_file(path, _origin(path), LARGEST_BYTES, DatasetError, REMEDY)
     try:
         with safe_open(path, framework="pt") as file:

@@ -1,4 +1,4 @@
-"""Makes the packed frames that `calibnet.training.packed` reads: all sources' frames, and the stages' residuals."""
+"""Packs the frames of all sources, and the residuals of the stages, for `calibnet.training.packed` to read."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from calibnet.training.recipe import RECIPE, Recipe
 from calibnet.weights.manifest import load_manifest
 
 LARGEST_WIDTH = 1280
-"""Pixels; no augmentation keeps more of a wide picture (`CameraRecipe.zoom`)."""
+"""Largest width of a packed image, pixels; no augmentation needs more (`CameraRecipe.zoom`)."""
 JPEG_QUALITY = 84
 MARGIN_DEG = 20.0
-"""Angle beside the picture within which points are kept: a miscalibration may turn them into it."""
+"""Angle outside the image within which points are kept: a miscalibration may rotate them into it."""
 Tracked = Callable[[Iterable[tuple[int, int]]], Iterable[tuple[int, int]]]
-"""Passes the frames to be packed on, one by one, and may show how many are done."""
+"""Passes on the frames to be packed one by one, and may show the progress."""
 
 
 def pack_picture(image: NDArray[np.uint8]) -> bytes:
-    """RGB ``[H, W, 3]`` as JPEG."""
+    """Encode RGB ``[H, W, 3]`` as JPEG."""
     encoded, data = cv2.imencode(
         ".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     )
@@ -48,16 +48,16 @@ def pack_picture(image: NDArray[np.uint8]) -> bytes:
 
 
 def pack_scan(points: NDArray[np.float32]) -> bytes:
-    """Points ``[N, 4]`` within `FARTHEST_M` of each axis, compressed."""
+    """Compress points ``[N, 4]`` whose coordinates are below `FARTHEST_M`."""
     steps = np.round(points[:, :3] * STEPS_PER_METRE).astype(np.int16)
     difference = np.diff(steps, axis=0, prepend=np.zeros((1, 3), np.int16))
-    octets = difference.T.copy().view(np.uint8).reshape(3, -1, 2)  # low and high ones apart: these hardly change
+    octets = difference.T.copy().view(np.uint8).reshape(3, -1, 2)  # low bytes apart from high ones, which hardly change
     intensity = np.round(points[:, 3].clip(0, 1) * 255).astype(np.uint8)
     return zlib.compress(octets.transpose(0, 2, 1).tobytes() + intensity.tobytes(), 9)
 
 
 def smaller(frame: Frame) -> Frame:
-    """The frame with no more pixels and points than training needs."""
+    """The frame reduced to the pixels and points that training needs."""
     camera = frame.camera
     if camera.width > LARGEST_WIDTH:
         camera = camera.resized(LARGEST_WIDTH, round(camera.height * LARGEST_WIDTH / camera.width))
@@ -92,7 +92,7 @@ class Packed:
 
     @property
     def size(self) -> int:
-        """Bytes, about."""
+        """Approximate size in bytes."""
         return len(self.picture) + len(self.scan) + 300
 
 
@@ -102,13 +102,13 @@ class Packer:
     def __init__(
         self, folder: Path, sources: list[Source], largest: int, residuals: Mapping[str, list[Transform]]
     ) -> None:
-        """Start with the first part, which holds the residuals, by the range of the stage they are for, too.
+        """Start the first part, which also has the residuals.
 
         Args:
-            folder: of the parts; there may be none in it yet.
-            sources: what the frames are of.
-            largest: bytes of a part.
-            residuals: 4x4 each, by the text of a stage's range.
+            folder: folder for the parts, without parts so far.
+            sources: sources of the frames.
+            largest: largest size of a part in bytes.
+            residuals: residuals, 4x4 each, by the range of the stage that is trained on them, as text.
 
         Raises:
             ConfigError: the folder holds parts already.
@@ -124,14 +124,14 @@ class Packer:
         self.frames: list[Packed] = []
 
     def add(self, frame: Packed) -> None:
-        """Take a frame in; writes a part when that is full."""
+        """Add a frame; if the part would become too large, write it first."""
         if self.frames and self.size + frame.size > self.largest:
             self.close()
         self.frames.append(frame)
         self.size += frame.size
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the frames of the last part."""
         if not self.frames:
             return
         tensors: dict[str, Tensor] = {}
@@ -159,9 +159,10 @@ def pack_training(
     """Pack all frames that a run with these options would draw from.
 
     Args:
-        options: of the run: data, validation, synthetic share and scenes, seed; with ``after``, residuals are measured.
-        folder: of the parts.
-        largest: bytes of a part.
+        options: options of the run: data, validation, synthetic share and scenes, seed. With ``after``, residuals are
+            measured and packed too.
+        folder: folder for the parts.
+        largest: largest size of a part in bytes.
         tracked: shows the progress.
         recipe: how residuals are drawn and measured.
 
@@ -176,7 +177,7 @@ def pack_training(
     residuals = stages_residuals(sources, options, recipe) if options.after else {}
     packer = Packer(folder, sources, largest, residuals)
     places = [(source, frame) for source, of in enumerate(sources) for frame in range(len(of.sequence))]
-    np.random.default_rng(options.seed).shuffle(places)  # so that each part is a fair choice
+    np.random.default_rng(options.seed).shuffle(places)  # so that each part is a fair sample of all frames
     for source, frame in tracked(places):
         packer.add(Packed.of(source, sources[source].sequence[frame]))
     packer.close()
@@ -184,7 +185,7 @@ def pack_training(
 
 
 def stages_residuals(sources: list[Source], options: TrainingOptions, recipe: Recipe) -> dict[str, list[Transform]]:
-    """What each of the five stages would be shown of the errors of those before it, and of its own first look."""
+    """The residuals that each of the five stages is trained on: of the stages before it, and of its own first look."""
     residuals = {}
     manifest = load_manifest(options.preset, Path(options.after or ""))
     for number, stage_range in enumerate(RANGES, start=1):

@@ -1,4 +1,4 @@
-"""What a training run tells whoever watches it."""
+"""The progress that a training run reports."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Means:
         self.names: tuple[str, ...] = ()
 
     def add(self, losses: Losses | MethodLosses) -> None:
-        """Take one step's losses in; they stay where they are, as reading them makes the host wait for the device."""
+        """Add the losses of one step; they stay on the device, as reading them would make the host wait."""
         self.names = losses._fields
         self.steps.append(torch.stack([value.detach().float() for value in losses]))
 
     def take(self) -> dict[str, float]:
-        """The means since the last call; what a step does not tell, as features alone have no pose, is left out.
+        """The means since the last call, over the steps that have a value; NaN if none has.
 
-        NaN where no step told.
+        A step on features alone has no pose errors.
         """
         if not self.steps:
             return dict.fromkeys(self.names, math.nan)
@@ -60,13 +60,13 @@ class Means:
 
 
 class Every:
-    """Something that is due each time so many seconds of training have passed."""
+    """Says when a task is due that is repeated after every ``seconds`` of training."""
 
     def __init__(self, seconds: float, now: float) -> None:
         self.seconds, self.last = seconds, now
 
     def due(self, now: float) -> float:
-        """Seconds since it was due last, if these are more than it has to wait; otherwise 0."""
+        """If the task is due, the seconds since it was last; otherwise 0."""
         elapsed = now - self.last
         if elapsed <= self.seconds:
             return 0.0

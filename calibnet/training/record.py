@@ -1,4 +1,4 @@
-"""What a set of weights says about where it comes from: the record in a file's header, and the manifest's entry."""
+"""Records how weights were made: in the header of their file, and in their entry of the manifest."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from calibnet.training.validation import ValidationFigures
 from calibnet.weights.manifest import Manifest, StageEntry, load_manifest, manifest_path
 
 ENCODER_LICENCE = "EfficientNet-Lite0 (Apache-2.0)"
-"""What a pretrained image encoder is, and its licence."""
+"""Name and licence of the pretrained image encoder."""
 
 
 def training_record(
     training: Training, samples: int, minutes: float, figures: ValidationFigures | None
 ) -> dict[str, Any]:
-    """Options, samples, minutes, commit, validation figures and changed knobs of a finished run, as JSON."""
+    """Options, samples, minutes, commit, validation figures and changed settings of a finished run, as JSON."""
     options = training.options
     rigs = sorted({source.sequence.rig for source in training.samples.frames.sources if not source.synthetic})
     described = asdict(options) | {
@@ -48,7 +48,7 @@ def training_record(
 
 
 def licence_note(rigs: list[str], training: Training) -> str:
-    """Whose licences the weights are under: those of the real frames, and of the weights that the run started from."""
+    """Which licences apply to the weights: those of the real frames, and of the weights that the run started from."""
     frames = (
         f"Trained on frames of {', '.join(rigs)}, whose licences apply." if rigs else "Trained on synthetic scenes."
     )
@@ -59,9 +59,9 @@ def licence_note(rigs: list[str], training: Training) -> str:
 
 
 def manifest_with(training: Training, weights: Path, samples: int, figures: ValidationFigures | None) -> Manifest:
-    """The manifest of the output folder with the stage just trained, as it is on disk by now.
+    """The manifest now in the output folder, with the entry of the stage just trained.
 
-    A folder that has none yet gets the settings that ship with the package, without the runs they are from.
+    In a folder without one, it starts from the settings that ship with the package, without their runs.
     """
     preset, folder = training.options.preset, weights.parent
     manifest = load_manifest(preset, folder)
@@ -81,7 +81,7 @@ def manifest_with(training: Training, weights: Path, samples: int, figures: Vali
 
 
 def recipe_sentence(training: Training, samples: int) -> str:
-    """From what a run started, on what and how long it trained; folders of this machine are left out."""
+    """A sentence on what a run started from, on what it trained and how long, without folders of this machine."""
     options, config, draws = training.options, training.stage.network.config, training.samples.draws
     if options.initialize:
         path, output = Path(options.initialize), Path(options.output)
@@ -103,13 +103,13 @@ def recipe_sentence(training: Training, samples: int) -> str:
 
 
 def _changes(training: Training) -> dict[str, Any]:
-    """The knobs in which the run's recipe differs from the usual one."""
+    """The settings in which the run's recipe differs from the usual one."""
     usual = RECIPE.of_run(training.options, training.stage.network.config)
     return changed_knobs(training.recipe, usual)
 
 
 def _without_folders(specs: list[str]) -> list[str]:
-    """``DATASET:ROOT[:SEQUENCE]`` with only the last part of the root: the machine's folders are not named."""
+    """``DATASET:ROOT[:SEQUENCE]`` with only the last part of the root, to leave out folders of this machine."""
     parts = [spec.split(":", 2) for spec in specs]
     return [":".join([dataset, Path(root).name, *name]) for dataset, root, *name in parts]
 

@@ -1,4 +1,4 @@
-"""What earlier looks leave behind: the errors, tails included, that the next look is trained to correct."""
+"""Residuals: the errors, outliers included, that earlier looks leave, and that the next look is trained to correct."""
 
 from __future__ import annotations
 
@@ -34,11 +34,12 @@ def residual_errors(
     """Errors ``correction @ delta`` that the stages leave on some augmented training frames.
 
     Args:
-        stages: run one after the other, each from where the one before arrived.
-        frames: of the training.
-        range_: of the stage to be trained.
-        recipe: how many frames, and which errors are lost frames, left out of the result.
-        start: the stage itself as it was, if it looks more than once: what its first look leaves is added.
+        stages: stages to run in sequence, each from the result of the one before.
+        frames: the training frames.
+        range_: range of the stage to train.
+        recipe: how many frames to use, and which errors are of lost frames and left out.
+        start: the stage to train with its initial weights, if it looks more than once; the errors that its first look
+            leaves are added.
     """
     generator = np.random.default_rng([frames.seed, 4])
     residuals = []
@@ -60,7 +61,7 @@ def residual_errors(
 
 
 def within(delta: Transform, range_: MiscalibrationRange, recipe: DrawRecipe) -> bool:
-    """Whether an error is near enough to be corrected by a stage of this range."""
+    """Whether an error is small enough for a stage of this range to correct."""
     error = range_of(delta)
     return (
         error.rotation_deg < recipe.lost_rotation * range_.rotation_deg

@@ -1,4 +1,4 @@
-"""Training samples: a frame, a drawn miscalibration, the network's input and the truth."""
+"""Training samples: the network's input for a frame under a random miscalibration, and the ground truth."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def visible_cells(
     correction: Transform,
     recipe: SampleRecipe,
 ) -> list[NDArray[np.bool_]]:
-    """Per scale ``[h, w]``: does the camera, truly placed, see the cell's point?
+    """Per scale ``[h, w]``: whether the camera sees the cell's point under the true extrinsic.
 
-    A point is taken as hidden when another one in the same few pixels is clearly nearer: the scanner looks over
-    what the camera has in front of it.
+    A point counts as hidden if another one within the same few pixels is clearly nearer: a scanner mounted higher sees
+    over objects that block the camera's view.
     """
     truth = project(points, reference, camera)
     nearest = nearest_per_cell(truth, camera, recipe.hiding_px)
@@ -75,8 +75,8 @@ def make_sample(
 ) -> Sample:
     """The sample of a frame, already at input size, under ``delta @ camera_from_lidar``.
 
-    ``shift`` displaces the LiDAR image by so many pixels ``(x, y)``: only where features train alone,
-    since no pose explains it.
+    ``shift`` displaces the LiDAR image by ``(x, y)`` pixels. Only batches that train features alone use it, since no
+    pose explains it.
     """
     displaced = frame.camera.matrix.copy()
     displaced[:2, 2] += shift
@@ -115,27 +115,27 @@ def collate(samples: Many[Sample]) -> tuple[NetworkInputs, Target]:
 
 
 class SampleNumbers:
-    """What a sample's number says of it; all else of an endless stream of samples is random."""
+    """The properties of a sample that depend on its number; everything else about a sample is random."""
 
     def __init__(self, frames: TrainingFrames, draws: Draws, scales: tuple[int, ...]) -> None:
-        """Samples of frames under miscalibrations; ``scales`` are the strides of the network's volumes."""
+        """Samples of ``frames`` under miscalibrations of ``draws``; ``scales`` are the strides of the cells."""
         self.frames, self.draws, self.scales = frames, draws, scales
         self.recipe, self.features = frames.recipe.sample, frames.recipe.features
 
     def variety(self, number: int) -> float:
-        """How varied sample ``number`` may be, 0..1: ever more in the warm-up."""
+        """Variety of sample ``number``, 0..1, which grows during the warm-up; see `TrainingFrames.draw`."""
         warm_up = self.features.warm_up
         return max(self.features.warm_up_variety, min(1.0, number / warm_up)) if warm_up else 1.0
 
     def largest_shift(self, number: int) -> float:
-        """Pixels by which the LiDAR image of a sample is displaced at most: 0 but where features train alone."""
+        """Largest displacement of the LiDAR image of a sample, pixels; 0 unless its batch trains features alone."""
         if number < self.features.warm_up:
             return self.features.warm_up_shift_px
         every = self.features.every
         return self.features.shift_px if every and number // self.frames.batch % every == every - 1 else 0.0
 
     def too_few(self, source: str) -> DatasetError:
-        """What is wrong where no draw shows enough points; ``source`` names the last frame."""
+        """The error for when no draw shows enough points; ``source`` names the last frame."""
         return DatasetError(
             f"None of {self.recipe.attempts} draws gave {self.recipe.fewest_visible_cells} cells with a visible LiDAR "
             f"point, the last one from {source}; check that the training data's calibration fits its scans."
@@ -143,7 +143,7 @@ class SampleNumbers:
 
 
 class TrainingSamples(SampleNumbers, Dataset[Sample]):
-    """An endless, random and repeatable stream: sample ``n`` depends on the frames' seed and on ``n`` alone."""
+    """An endless, random and repeatable stream: sample ``n`` depends only on the frames' seed and on ``n``."""
 
     def __getitem__(self, number: int) -> Sample:
         """Draw sample ``number``."""

@@ -1,4 +1,4 @@
-"""All five stages from an empty folder: which is trained when, from what, and with how much of the budget."""
+"""Plans the training of all five stages from an empty folder: their order, initial weights and shares of the budget."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from calibnet.training.recipe import RECIPE, Recipe
 from calibnet.weights import weights_path
 
 FEATURES = "features"
-"""Folder, within the output's, of the first step's weights: a start for the others, none of the five stages."""
+"""Subfolder of the output folder for the weights of the first step, which only the other steps start from."""
 
 
 def all_stages(options: TrainingOptions, recipe: Recipe = RECIPE) -> list[TrainingOptions]:
-    """What to train, in order; steps that have their weights in the output folder already are left out.
+    """The runs to train, in order; steps whose weights are in the output folder already are left out.
 
-    Each step but the first keeps the first one's image branch, so that it is computed once a frame and size, and
-    most of its miscalibrations are what the stages before it leave behind.
+    All steps after the first keep its image branch, which is then computed once per frame and size, and draw most of
+    their miscalibrations from the residuals of the stages before.
 
     Args:
-        options: of the whole: its budget is shared out, its range is not looked at.
-        recipe: its schedule says which stage is trained when, from which, and with how much of the budget.
+        options: options of the whole, whose budget is divided among the steps; their range is not used.
+        recipe: its schedule has the order, the initial weights and the shares of the budget.
     """
     schedule = recipe.schedule
     whole = Path(options.output)
@@ -30,7 +30,7 @@ def all_stages(options: TrainingOptions, recipe: Recipe = RECIPE) -> list[Traini
     paths = [weights_path(options.preset, step.range, folder) for step, folder in zip(schedule, folders, strict=True)]
 
     def latest(range_: MiscalibrationRange, position: int) -> Path:
-        """Weights of a stage as they are before the step at this position."""
+        """The newest weights of a stage before the step at this position."""
         return next(paths[earlier] for earlier in reversed(range(position)) if schedule[earlier].range == range_)
 
     return [

@@ -1,7 +1,7 @@
 """The synthetic world as training data: scenes rendered once and kept on disk.
 
-Files are named after the sources of `calibnet.datasets.synthetic` as well: where the world has changed, its scenes are
-rendered anew.
+The file names contain a hash of the source code of `calibnet.datasets.synthetic`, so that scenes are rendered again
+when that code changes.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from calibnet.runtime.reading import MEGABYTE, read_file
 from calibnet.runtime.writing import write_whole
 
 LARGEST = 64 * MEGABYTE
-"""Largest file of a scene, packed or not; usual ones have 3 to 5 MB."""
+"""Largest size of a scene in bytes, packed or not; usual scenes have 3 to 5 MB."""
 ROBOT_EVERY = 4
-"""One of so many scenes is a robot's, mostly in a hall, instead of a car's."""
+"""One scene of this many is a robot's, mostly in a hall; the others are a car's."""
 
 
 class SyntheticPool:
-    """A ``Sequence`` of unrelated synthetic scenes, cars' and robots', each rendered once and then read from disk."""
+    """A `Sequence` of unrelated synthetic scenes of cars and robots, each rendered once and then read from disk."""
 
     def __init__(self, size: int, seed: int, folder: Path | None = None) -> None:
         self.size, self.seed = size, seed
@@ -46,7 +46,7 @@ class SyntheticPool:
         return (self[position] for position in range(self.size))
 
     def __getitem__(self, position: int) -> Frame:
-        """Scene ``position``; rendered if no earlier run left it in the folder."""
+        """Scene ``position``, from the folder if it is there, otherwise rendered."""
         robot = position % ROBOT_EVERY == ROBOT_EVERY - 1
         kind = "robot" if robot else "car"
         path = self.folder / f"{world_version()}-{self.seed}-{position:06d}-{kind}.npz"
@@ -59,7 +59,7 @@ class SyntheticPool:
                 KeyError,
                 EOFError,
                 BadZipFile,
-            ):  # cut short, or not of ours: draw it again
+            ):  # cut short, or another file: render it again
                 path.unlink(missing_ok=True)
         from calibnet.datasets.synthetic import sample_frame, sample_robot_frame
 
@@ -70,14 +70,14 @@ class SyntheticPool:
 
 @cache
 def world_version() -> str:
-    """Eight digits that change with the code that renders scenes."""
+    """Eight hexadecimal digits that change with the code that renders scenes."""
     folder = resources.files("calibnet.datasets.synthetic")
     sources = (entry for entry in folder.iterdir() if entry.name.endswith(".py"))
     return version_of({source.name: source.read_text(encoding="utf-8") for source in sources})
 
 
 def version_of(sources: Mapping[str, str]) -> str:
-    """Eight digits of Python sources by the names of their files; comments and docstrings do not count."""
+    """Hash, eight hexadecimal digits, of Python sources by file name; comments and docstrings do not count."""
     digest = hashlib.sha256()
     for name in sorted(sources):
         tree = ast.parse(sources[name])
@@ -111,6 +111,6 @@ def _unpack(path: Path) -> Frame:
     with np.load(data, allow_pickle=False) as file:
         image, points = file["image"], file["points"]
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or points.ndim != 2:
-            raise ValueError("no picture and no points")
+            raise ValueError("it has no image or no points")
         camera = PinholeCamera(image.shape[1], image.shape[0], file["matrix"])
         return Frame(0, 0.0, image, points, camera, file["camera_from_lidar"], str(path))

@@ -1,4 +1,4 @@
-"""What can be trained: a stage of ours, or one of another paper's method; both are used alike."""
+"""The types that can be trained: a stage of the cascade, or another paper's network as a stage."""
 
 from __future__ import annotations
 

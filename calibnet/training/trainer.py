@@ -1,4 +1,4 @@
-"""The training loop of one stage: a time or sample budget, checkpoints, exact resume, weights at the end."""
+"""The training loop of one stage: a budget in time or samples, checkpoints, exact resuming, weights at the end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from calibnet.weights import save_network, weights_path
 from calibnet.weights.manifest import manifest_path
 
 MANIFEST_PATIENCE_S = 60.0
-"""How long a run waits for others, which write their stages into the same manifest in milliseconds."""
+"""How long a run waits for others that write into the same manifest, which takes them milliseconds."""
 STOPPING = "Stopping after this step; once more stops at once."
 
 
@@ -42,10 +42,10 @@ class Trainer:
     """Trains one stage within its budget; `run` ends with the weights on disk."""
 
     def __init__(self, training: Training, observer: Observer, resume: bool = False) -> None:
-        """Put network and optimizer on their devices; with ``resume``, as the output folder's checkpoint has them.
+        """Put network and optimizer on the devices; with ``resume``, in the state of the checkpoint.
 
         Raises:
-            ConfigError: there is a checkpoint and no ``resume``, or it is of another stage.
+            ConfigError: there is a checkpoint but no ``resume``, or it is of another stage.
             WeightsError: the checkpoint cannot be read.
         """
         self.training, self.observer = training, observer
@@ -73,7 +73,7 @@ class Trainer:
 
     @property
     def checkpoint(self) -> Path:
-        """The file a run is resumed from."""
+        """The file that a run is resumed from."""
         return weights_path(self.options.preset, self.range, self.folder).with_suffix(".checkpoint")
 
     @property
@@ -89,16 +89,16 @@ class Trainer:
         return min(1.0, self.seconds / (60 * (self.options.minutes or math.inf)))
 
     def run(self) -> Path:
-        """Train until the budget is used; returns the weights' path.
+        """Train until the budget is used; returns the path of the weights.
 
         Raises:
             KeyboardInterrupt: a signal ended the run; its checkpoint is written.
             BusyError: another process trains this stage into this folder.
-            ConfigError: the budget ended within the warm-up, so that there is no pose to write.
-            CalibrationError: the loss is no number any more.
+            ConfigError: the budget ended within the warm-up, before any pose was trained.
+            CalibrationError: the loss is not finite.
         """
         with locked(self.checkpoint) if self.fabric.is_global_zero else nullcontext():
-            if self.fabric.is_global_zero:  # and has the lock, so nobody is writing them
+            if self.fabric.is_global_zero:  # with the lock held, nobody else writes them
                 remove_partials(self.checkpoint)
             return self._run()
 
@@ -112,7 +112,7 @@ class Trainer:
             except RuntimeError:
                 if not stop.requested:
                     raise
-                raise KeyboardInterrupt from None  # the signal ended a worker too: the last checkpoint has to do
+                raise KeyboardInterrupt from None  # the signal ended a worker too; keep the last checkpoint
         self._save_checkpoint()
         if not finished:
             raise KeyboardInterrupt
@@ -160,7 +160,7 @@ class Trainer:
         return losses
 
     def _require_finite(self) -> None:
-        """Stop a run whose loss is no number any more; looked at now and then, as it makes the host wait."""
+        """Stop a run whose loss is not finite; called now and then only, as it makes the host wait."""
         if not torch.isfinite(self.total):
             raise CalibrationError(
                 f"The loss became {self.total.item()} within {self.samples} samples; resume from {self.checkpoint} "
@@ -211,6 +211,6 @@ class Trainer:
             record = training_record(self.training, self.samples, self.seconds / 60, figures)
             save_network(path, self.network, self.average.module.state_dict(), record)
             manifest = manifest_path(self.options.preset, self.folder)
-            with locked(manifest, MANIFEST_PATIENCE_S):  # of another stage's run that ends at the same time
+            with locked(manifest, MANIFEST_PATIENCE_S):  # another stage's run may end at the same time
                 manifest_with(self.training, path, self.samples, figures).write(manifest)
         return path

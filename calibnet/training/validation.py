@@ -1,4 +1,4 @@
-"""Errors that one look of a stage leaves on held-out frames, under miscalibrations that never change."""
+"""Measures the errors that one look of a stage leaves on held-out frames, under fixed miscalibrations."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from calibnet.training.trained import TrainedNetwork, TrainedStage
 
 
 class ValidationFigures(NamedTuple):
-    """Errors before and after one look, its gain included: medians, and the rotation's 95th percentile."""
+    """Errors before and after one look with its gain: medians, and the 95th percentile of the rotation."""
 
     initial_rotation_deg: float
     initial_translation_cm: float
@@ -37,21 +37,21 @@ class Validation:
         self.cases: list[tuple[Frame, Extrinsic]] = []
         for sequence in sequences:
             for frame in sequence:
-                camera = stage.camera(frame)  # kept at the size the stage wants, which is smaller
+                camera = stage.camera(frame)  # kept at the stage's input size, which is smaller
                 small = replace(frame, image=resize_image(frame.image, camera), camera=camera, faces=())
                 deltas = [sample_miscalibration(stage.range, generator) for _ in range(repeats)]
                 self.cases += [(small, delta @ frame.camera_from_lidar) for delta in deltas]
 
     def __call__(self, network: TrainedNetwork) -> ValidationFigures:
-        """Look once at every frame with the stage's network as it is now, as the cascade does."""
-        changes: dict[str, Any] = {"network": network}  # of the stage's own kind
+        """Run one look at every frame with ``network``, as the cascade does."""
+        changes: dict[str, Any] = {"network": network}  # of the same kind as the stage's own
         stage = replace(self.stage, **changes)
         before, after = [], []
         training = network.training
         network.eval()
         for frame, initial in self.cases:
             corrected = initial
-            with contextlib.suppress(CalibrationError):  # counts with its initial error
+            with contextlib.suppress(CalibrationError):  # a frame without a result counts with its initial error
                 corrected = stage.look(frame, stage.view(frame), initial).after
             before.append(pose_error(initial, frame.camera_from_lidar))
             after.append(pose_error(corrected, frame.camera_from_lidar))

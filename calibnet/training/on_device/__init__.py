@@ -1,6 +1,6 @@
-"""Training samples made as tensors on the device that trains, from frames that all lie there.
+"""Makes training samples as tensors on the device that trains, from frames that are all kept there.
 
-The rest of `calibnet.training` makes a sample at a time with NumPy and OpenCV, on any number of processes of the CPU;
-beside a GPU these cannot keep up. Both draw the same numbers for a sample (`draws`), and its projection, z-buffer and
-labels are the same up to rounding, as tests show; pictures differ by how they are averaged when made smaller.
+The rest of `calibnet.training` makes one sample at a time with NumPy and OpenCV, in any number of processes on the CPU,
+which cannot keep up with a GPU. Both draw the same random numbers for a sample (`draws`). Projection, z-buffer and
+labels are the same up to rounding, as tests show; images differ in how pixels are averaged when they are made smaller.
 """

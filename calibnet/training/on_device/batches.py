@@ -1,4 +1,4 @@
-"""Batches from draws: the samples that `calibnet.training.samples` would make, all of a batch at once."""
+"""Makes batches from draws: the samples that `calibnet.training.samples` would make, a whole batch at once."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from calibnet.training.samples import SampleNumbers
 
 Batch = tuple[NetworkInputs, Target]
 AT_ONCE = 16
-"""Pictures that are warped together: as they are stored and in single precision, they are large."""
+"""Number of images warped together; in single precision and at their stored size they are large."""
 
 
 class Whole(NamedTuple):
-    """A batch whose empty rows are not cut yet, and what the host has to know for that, on its way there.
+    """A batch before its empty rows are cropped, with the numbers that the host needs for that still on their way.
 
     Attributes:
         image: ``[B, 3, H, W]`` uint8.
-        seen: of the scans.
-        drawn: what the rest is in.
-        row: the topmost row of the coarsest scale with a point, and how many samples are good; on the host.
-        arrived: the event after which ``row`` is there; None where host and device are one.
+        seen: the scans as the camera sees them.
+        drawn: the draws of the batch, which have the rest.
+        row: ``[2]`` on the host: topmost row of the coarsest scale with a point, and number of good samples.
+        arrived: event after which ``row`` can be read; None if host and device are the same.
     """
 
     image: Tensor
@@ -40,20 +40,20 @@ class Whole(NamedTuple):
 
 
 class DeviceSamples(SampleNumbers):
-    """An endless, random and repeatable stream of batches, made on the device of a store."""
+    """An endless, random and repeatable stream of batches, made on the device of a `FrameStore`."""
 
     def __init__(self, samples: SampleNumbers, store: FrameStore) -> None:
-        """The samples whose numbers and draws are those of ``samples``, from frames of its sources in a store."""
+        """Use the numbers and draws of ``samples``, and the frames of its sources in ``store``."""
         super().__init__(samples.frames, samples.draws, samples.scales)
         self.store = store
         self.drawn = DrawnSamples(samples, store.cameras, store.extrinsics, store.points.tolist(), store.first)
         self.generator = torch.Generator(store.device)
 
     def made(self, drawn: Iterator[DrawnBatch]) -> Iterator[Batch]:
-        """Batches of draws, which lie on the store's device.
+        """Make the batches of ``drawn``, which are on the store's device.
 
-        One is always made ahead: when the host waits for what it has to know of a batch, the device has long passed
-        it and works on the training step before.
+        One batch is always made ahead: when the host reads the numbers it needs of a batch, the device has long
+        computed them, and is at work on the training step before.
 
         Raises:
             DatasetError: no sample of a batch shows enough points.
@@ -64,7 +64,7 @@ class DeviceSamples(SampleNumbers):
             yield self.finished(whole)
 
     def make(self, drawn: DrawnBatch) -> Whole:
-        """All that the device can do without the host."""
+        """Make a batch as far as the device can without the host."""
         store, generator = self.store, self.generator.manual_seed(drawn.seed)
         points = store.scans[drawn.frames, :, : drawn.most_points]
         there = torch.arange(drawn.most_points, device=store.device) < store.points[drawn.frames, None]
@@ -87,7 +87,7 @@ class DeviceSamples(SampleNumbers):
         return Whole(image[chosen], seen, drawn, row, arrived)
 
     def finished(self, whole: Whole) -> Batch:
-        """The batch without the rows that hold no point."""
+        """Crop the rows that hold no point."""
         if whole.arrived is not None:
             whole.arrived.synchronize()
         rows, good = whole.row.tolist()
@@ -105,14 +105,14 @@ class DeviceSamples(SampleNumbers):
 
 
 def good_ones(good: Tensor) -> Tensor:
-    """Samples ``[B]`` to take, of ``[B]`` bool: the good ones, and instead of each other one one of these."""
+    """Indices ``[B]`` of the samples to use: every good one, and a good one in place of each that is not."""
     first = torch.argsort(~good, stable=True)
     number = torch.arange(len(good), device=good.device)
     return torch.where(good, number, first[number % good.sum().clamp(min=1)])
 
 
 def to_host(tensor: Tensor) -> tuple[Tensor, torch.cuda.Event | None]:
-    """A copy on the host, and the event after which it is there; nobody waits for it here."""
+    """A copy on the host, and the event after which it can be read; this does not wait for it."""
     if tensor.device.type != "cuda":
         return tensor, None
     copy = torch.empty_like(tensor, device="cpu", pin_memory=True).copy_(tensor, non_blocking=True)

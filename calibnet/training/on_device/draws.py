@@ -1,7 +1,7 @@
-"""What is drawn for a batch, on the host: all that is random but the noise of single points and pixels.
+"""Draws the random numbers of a batch on the host: all but the noise of single points and pixels.
 
-It is drawn sample by sample with the generators and functions of `calibnet.training.samples`; hundreds of numbers a
-sample, which other processes can draw while the device works.
+They are drawn sample by sample with the generators and functions of `calibnet.training.samples`: hundreds of numbers
+per sample, which other processes can draw while the device computes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from calibnet.training.augmentation_draws import Exposure, Scanner, View, mirror
 from calibnet.training.samples import SampleNumbers
 
 MIRROR_CAMERA, MIRROR_LIDAR = np.diag([-1.0, 1, 1, 1]), np.diag([1.0, -1, 1])
-"""What the mirror makes of the camera's frame, and of the scanner's axes."""
+"""The reflections of the camera's frame, 4x4, and of the scanner's axes, 3x3."""
 
 
 class Scanners(NamedTuple):
@@ -40,7 +40,7 @@ class Scanners(NamedTuple):
 
     @classmethod
     def of(cls, scanners: Sequence[Scanner]) -> Self:
-        """Stack them."""
+        """Stack the scanners of a batch."""
         return cls(*(single(column) for column in zip(*scanners, strict=True)))
 
 
@@ -48,8 +48,8 @@ class Exposures(NamedTuple):
     """`calibnet.training.augmentation_draws.Exposure` of a batch: ``[B]``, the tint ``[B, 3]``.
 
     Attributes:
-        blurred: which of the pictures are blurred.
-        blur_px: by how much, of these alone.
+        blurred: indices of the images that are blurred.
+        blur_px: standard deviation of their blur, for these images alone.
     """
 
     grey: Tensor
@@ -63,7 +63,7 @@ class Exposures(NamedTuple):
 
     @classmethod
     def of(cls, exposures: Sequence[Exposure]) -> Self:
-        """Stack them."""
+        """Stack the exposures of a batch."""
         all_of = Exposure(*(np.stack(column) for column in zip(*exposures, strict=True)))  # type: ignore[arg-type]
         blurred = np.flatnonzero(all_of.blur_px)
         return cls(
@@ -85,19 +85,19 @@ def single(values: object) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One sample before it is made.
+    """The random numbers of one sample.
 
     Attributes:
-        number: of the sample.
-        frame: its number in the store.
-        size: of the frame's picture, width and height.
-        reflected: whether it is seen in a mirror.
+        number: number of the sample.
+        frame: number of its frame in the store.
+        size: width and height of the frame's image.
+        reflected: whether the frame is mirrored.
         view: the virtual camera.
-        reference: 4x4, the virtual camera's from the points as they are stored, mirror included.
+        reference: 4x4, true extrinsic of the virtual camera for the points as stored, the mirror included.
         scanner: the virtual scanner.
-        exposure: of the picture.
+        exposure: exposure of the image.
         delta: the miscalibration, 4x4.
-        shift: ``[2]`` pixels by which the LiDAR image is displaced besides.
+        shift: ``[2]`` pixels by which the LiDAR image is displaced in addition.
     """
 
     number: int
@@ -121,7 +121,7 @@ class Draw:
         number: int,
         generator: np.random.Generator,
     ) -> Self:
-        """Draw how a frame is seen in sample ``number``, as `calibnet.training.augmentation.augment` does."""
+        """Draw the numbers of sample ``number`` of a frame, as `calibnet.training.augmentation.augment` does."""
         recipe, variety, size = samples.frames.recipe, samples.variety(number), (camera.width, camera.height)
         reflected = bool(generator.random() < recipe.camera.mirrored)
         scanner, exposure = Scanner(), Exposure()
@@ -143,7 +143,7 @@ class Draw:
 
     @property
     def to_picture(self) -> Floats:
-        """``[3, 3]`` homography from the input's pixels to those of the picture as it is stored."""
+        """``[3, 3]`` homography from pixels of the input to pixels of the stored image."""
         near, camera, turn = self.view
         width, height = self.size
         sx, sy = width / near.width, height / near.height
@@ -155,24 +155,24 @@ class Draw:
 
 
 class DrawnBatch(NamedTuple):
-    """A batch before it is made; tensors are float32 where nothing else is said.
+    """The random numbers of a batch; tensors are float32 unless another type is given.
 
     Attributes:
         size: height and width of the input.
-        most_points: of any of its scans.
-        most_shrunk: pixels of a picture for one of the input, of any of its pictures.
-        of_features: whether it trains features alone.
-        seed: of the noise of its points and pixels.
-        frames: ``[B]`` int64 numbers in the store.
-        to_picture: ``[B, 3, 3]`` homographies from the input's pixels to the pictures'.
-        shrinking: ``[B]`` pixels of the picture for one of the input.
+        most_points: number of points of the largest scan.
+        most_shrunk: the largest of ``shrinking``.
+        of_features: whether the batch trains features alone.
+        seed: seed of the noise of points and pixels.
+        frames: ``[B]`` int64, numbers of the frames in the store.
+        to_picture: ``[B, 3, 3]`` homographies from pixels of the input to pixels of the stored images.
+        shrinking: ``[B]`` pixels of the stored image per pixel of the input.
         reference: ``[B, 4, 4]`` true camera_from_lidar.
-        initial: ``[B, 4, 4]`` miscalibrated one.
-        correction: ``[B, 4, 4]`` from this to that.
+        initial: ``[B, 4, 4]`` miscalibrated camera_from_lidar.
+        correction: ``[B, 4, 4]``, ``reference = correction @ initial``.
         intrinsics: ``[B, 3, 3]``.
-        shift: ``[B, 2]`` pixels by which the LiDAR image is displaced besides.
-        scanners: of the scans.
-        exposures: of the pictures.
+        shift: ``[B, 2]`` pixels by which the LiDAR image is displaced in addition.
+        scanners: the virtual scanners.
+        exposures: the exposures of the images.
     """
 
     size: tuple[int, int]
@@ -193,7 +193,7 @@ class DrawnBatch(NamedTuple):
 
 
 class DrawnSamples(Dataset[Draw]):
-    """The draws of an endless stream of samples: each depends on the seed and on its number alone."""
+    """The random numbers of an endless stream of samples; each depends only on the seed and the sample's number."""
 
     def __init__(
         self,
@@ -203,7 +203,7 @@ class DrawnSamples(Dataset[Draw]):
         points: Sequence[int],
         first: Sequence[int],
     ) -> None:
-        """Draw for these frames, given by camera, extrinsic and number of points; ``first`` is each source's first."""
+        """Draw for frames with these cameras, extrinsics and numbers of points; ``first`` of each source."""
         self.samples, self.cameras, self.extrinsics = samples, list(cameras), list(extrinsics)
         self.points, self.first = list(points), list(first)
 
@@ -216,7 +216,7 @@ class DrawnSamples(Dataset[Draw]):
         return Draw.of(frame, self.cameras[frame], self.extrinsics[frame], self.samples, number, generator)
 
     def collate(self, draws: Sequence[Draw]) -> DrawnBatch:
-        """A batch of draws of one input size."""
+        """Collate draws of one input size."""
         frames = np.array([draw.frame for draw in draws])
         reference = np.stack([draw.reference for draw in draws])
         delta = np.stack([draw.delta for draw in draws])

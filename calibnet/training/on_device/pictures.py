@@ -1,4 +1,4 @@
-"""The virtual camera and the exposure of a batch of pictures as tensor code."""
+"""The virtual camera and the exposure of a batch of images as tensor code."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from torch import Tensor
 from calibnet.training.on_device.draws import Exposures
 
 GREY = (0.299, 0.587, 0.114)
-"""Shares of red, green and blue, as OpenCV has them."""
+"""Weights of red, green and blue in grey, as in OpenCV."""
 INTERPOLATION = 1 / 6
-"""Variance, in square pixels, of what interpolating between two of them spreads, on average over all places."""
+"""Variance, in square pixels, of the blur that linear interpolation between two pixels causes, on average."""
 AVERAGING = 1 / 12
-"""The same of the average over one pixel."""
+"""Variance, in square pixels, of the average over one pixel."""
 
 
 def sampled_at(shrinking: Tensor, count: int) -> Tensor:
-    """At how many places ``[B, count]`` of a pixel of the result a picture is sampled, from the pixel's middle.
+    """Offsets ``[B, count]``, in pixels of the result from a pixel's middle, at which an image is sampled for it.
 
-    OpenCV resizes a picture, by averaging over a pixel of the result where it gets smaller, then interpolates between
-    these. Here one step interpolates between those of the picture; sampled as far apart as this, and averaged, the
-    result is as sharp.
+    The CPU's samples are made in two steps: OpenCV resizes the image, averaging pixels where it gets smaller, and the
+    warp interpolates between the averages. Here one step interpolates in the original image. Averaged over samples this
+    far apart, the result is as sharp.
 
     Args:
-        shrinking: ``[B]`` pixels of the picture for one of the result.
-        count: 2, or more where pictures are made much smaller.
+        shrinking: ``[B]`` pixels of the image per pixel of the result.
+        count: 2, or more if images are made much smaller.
     """
     smaller = AVERAGING + INTERPOLATION * (1 - shrinking.clamp(min=1) ** -2)
     variance = torch.where(shrinking > 1, smaller, INTERPOLATION * (shrinking < 1))
@@ -34,17 +34,17 @@ def sampled_at(shrinking: Tensor, count: int) -> Tensor:
 
 
 def warped(pictures: Tensor, to_picture: Tensor, shrinking: Tensor, size: tuple[int, int], count: int = 2) -> Tensor:
-    """Pictures as other cameras see them.
+    """Images as other cameras see them.
 
     Args:
         pictures: ``[B, H, W, 3]`` uint8.
-        to_picture: ``[B, 3, 3]`` homography from the result's pixels to the picture's.
-        shrinking: ``[B]`` pixels of the picture for one of the result.
+        to_picture: ``[B, 3, 3]`` homography from pixels of the result to pixels of the image.
+        shrinking: ``[B]`` pixels of the image per pixel of the result.
         size: height and width of the result.
-        count: samples of the picture for a pixel of the result, along either axis.
+        count: samples of the image for each pixel of the result, along either axis.
 
     Returns:
-        ``[B, 3, h, w]`` float32, whole numbers 0..255; black where there is no picture.
+        ``[B, 3, h, w]`` float32, whole numbers 0..255; black outside the image.
     """
     (height, width), device = size, pictures.device
     within = sampled_at(shrinking, count)
@@ -67,7 +67,7 @@ def warped(pictures: Tensor, to_picture: Tensor, shrinking: Tensor, size: tuple[
 
 
 def exposed(pictures: Tensor, exposures: Exposures, generator: torch.Generator) -> Tensor:
-    """`calibnet.training.augmentation.exposed` of a batch ``[B, 3, h, w]``, 0..255: uint8."""
+    """`calibnet.training.augmentation.exposed` for a batch ``[B, 3, h, w]`` of values 0..255; returns uint8."""
 
     def of(values: Tensor) -> Tensor:
         return values.view(len(pictures), -1, 1, 1)
@@ -81,11 +81,11 @@ def exposed(pictures: Tensor, exposures: Exposures, generator: torch.Generator) 
         pixels = pixels.index_copy(0, exposures.blurred, blurred(pixels[exposures.blurred], exposures.blur_px))
     noise = torch.randn(pixels.shape, generator=generator, device=pixels.device)
     pixels = pixels + of(exposures.noise) * noise
-    return (pixels.clamp(0, 1) * 255 + 1e-3).to(torch.uint8)  # rounding must not make a grey value the one below
+    return (pixels.clamp(0, 1) * 255 + 1e-3).to(torch.uint8)  # rounding must not lower a grey value by one
 
 
 def blurred(pixels: Tensor, sigma: Tensor) -> Tensor:
-    """Gaussian blur of ``[B, 3, h, w]`` by ``[B]`` pixels."""
+    """Gaussian blur of ``[B, 3, h, w]`` with standard deviations ``[B]``, pixels."""
     radius = 5
     kernel = torch.exp(-0.5 * (torch.arange(-radius, radius + 1, device=pixels.device) / sigma[:, None]).square())
     kernel = (kernel / kernel.sum(1, keepdim=True)).repeat_interleave(3, dim=0, output_size=3 * len(pixels))

@@ -1,7 +1,7 @@
 """Projection, z-buffer and labels of a batch of scans: `calibnet.geometry.projection` and `lidar_input` as tensor code.
 
-A batch of scans is ``[B, N]`` for every coordinate, points that are none of a frame's marked as not there. What is the
-nearest of a cell is one minimum over all points at the pixels, and from there over the pixels of the coarser cells.
+A batch of scans is ``[B, N]`` for every coordinate; scans with fewer points are padded, and a mask says which points
+exist. The nearest point of each pixel is one minimum over all points; that of a coarser cell, one over its pixels.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Scans(NamedTuple):
     Attributes:
         x, y, z: ``[B, N]`` float32.
         intensity: ``[B, N]``, 0..1.
-        there: ``[B, N]`` bool: whether it is a point at all.
+        there: ``[B, N]`` bool: whether the point exists.
     """
 
     x: Tensor
@@ -37,13 +37,13 @@ class Scans(NamedTuple):
     there: Tensor
 
     def moved(self, transform: Tensor) -> Scans:
-        """Mapped by ``[B, 4, 4]``."""
+        """The scans mapped by ``[B, 4, 4]``."""
         x, y, z = moved(transform, self.x, self.y, self.z)
         return self._replace(x=x, y=y, z=z)
 
 
 class Cells(NamedTuple):
-    """What the z-buffer sees, as `LidarInput` and `visible_cells` say, for a batch.
+    """The result of the z-buffer for a batch: what `LidarInput` and `visible_cells` are for one sample.
 
     Attributes:
         image: ``[B, 2, H, W]`` sparse depth and intensity.
@@ -57,13 +57,13 @@ class Cells(NamedTuple):
 
 
 def moved(transform: Tensor, x: Tensor, y: Tensor, z: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """``[B, 4, 4]`` of points ``[B, N]``: not a matrix product, which a GPU may round to ten bits."""
+    """Map points ``[B, N]`` by ``[B, 4, 4]``; not by a matrix product, which a GPU may round to ten bits."""
     rows = transform[:, :3, :, None].unbind(1)
     return tuple(x * row[:, 0] + y * row[:, 1] + z * row[:, 2] + row[:, 3] for row in rows)  # type: ignore[return-value]
 
 
 def pixels(x: Tensor, y: Tensor, depth: Tensor, intrinsics: Tensor) -> tuple[Tensor, Tensor]:
-    """Where points ``[B, N]`` of the camera's frame are seen under ``[B, 3, 3]``: u and v, each ``[B, N]``."""
+    """Project points ``[B, N]`` of the camera's frame with ``[B, 3, 3]`` to pixels u and v, each ``[B, N]``."""
     fx, skew, cx, fy, cy = (
         intrinsics[:, row, column, None] for row, column in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
     )
@@ -71,7 +71,7 @@ def pixels(x: Tensor, y: Tensor, depth: Tensor, intrinsics: Tensor) -> tuple[Ten
 
 
 def rescanned(scans: Scans, scanners: Scanners, generator: torch.Generator) -> Scans:
-    """`calibnet.training.augmentation.thin_scan` of a batch."""
+    """`calibnet.training.augmentation.thin_scan` for a batch."""
 
     def of(values: Tensor) -> Tensor:
         return values[:, None]
@@ -90,10 +90,10 @@ def rescanned(scans: Scans, scanners: Scanners, generator: torch.Generator) -> S
 
 
 def nearest(points: Scans, intrinsics: Tensor, height: int, width: int) -> Tensor:
-    """The z-buffer of points of the camera's frame: a key ``[B, H, W]`` int64 a pixel, or `EMPTY`.
+    """The z-buffer of points of the camera's frame: a key for every pixel, ``[B, H, W]`` int64, or `EMPTY`.
 
-    Keys sort by depth. The bits of positive numbers sort as they do; behind them is the point's column, counted from
-    the last one, which wins where depths are equal.
+    Keys sort by depth: the upper half has the bits of the depth, which sort as positive numbers do. The lower half has
+    the point's index counted from the end, so that at equal depths the last point wins, as on the CPU.
     """
     u, v = pixels(points.x, points.y, points.z, intrinsics)
     inside = points.there & (points.z > MINIMUM_DEPTH)
@@ -101,7 +101,7 @@ def nearest(points: Scans, intrinsics: Tensor, height: int, width: int) -> Tenso
     count = u.shape[1]
     behind = count - 1 - torch.arange(count, device=u.device)
     key = torch.where(inside, points.z.contiguous().view(torch.int32).long() << 32 | behind, EMPTY)
-    # those outside change nothing, wherever they are put; all in one place, they would wait for each other
+    # points outside change nothing wherever they are written; all at one pixel, their writes would be serialised
     column, row = (torch.where(inside, (of + 0.5).floor(), 0).long() for of in (u, v))
     pixel = row.clamp(max=height - 1) * width + column.clamp(max=width - 1)
     pixel = torch.where(inside, pixel, behind % (height * width))
@@ -110,19 +110,19 @@ def nearest(points: Scans, intrinsics: Tensor, height: int, width: int) -> Tenso
 
 
 def coarser(keys: Tensor, stride: int) -> Tensor:
-    """Keys ``[B, H, W]`` of cells so many times as large: ``[B, H/s, W/s]``."""
+    """Keys of cells of ``stride`` pixels a side: ``[B, H, W]`` to ``[B, H/s, W/s]``."""
     return keys if stride == 1 else keys.unflatten(2, (-1, stride)).unflatten(1, (-1, stride)).amin((2, 4))
 
 
 def picked(keys: Tensor, *values: Tensor) -> Tensor:
-    """Values ``[B, N]`` of the points that keys ``[B, h, w]`` name, 0 in empty cells: ``[B, len(values), h, w]``."""
+    """Values ``[B, N]`` at the points of keys ``[B, h, w]``, 0 in empty cells: ``[B, len(values), h, w]``."""
     occupied = keys != EMPTY
     column = torch.where(occupied, values[0].shape[1] - 1 - (keys & LOW), 0).flatten(1)
     return torch.stack([of.gather(1, column).view(keys.shape) * occupied for of in values], dim=1)
 
 
 def depth_of(keys: Tensor) -> Tensor:
-    """Depth of the nearest point, metres; infinite in empty cells."""
+    """Depth that keys contain, metres; infinite in empty cells."""
     return torch.where(keys == EMPTY, torch.inf, (keys >> 32).int().view(torch.float32))
 
 
@@ -137,17 +137,17 @@ def see(
     scales: tuple[int, ...],
     recipe: SampleRecipe,
 ) -> Cells:
-    """A batch of scans under extrinsics, and what the camera, truly placed, sees of them.
+    """Project a batch of scans under their initial extrinsics, and find which cells the true camera sees.
 
     Args:
-        scans: in their own frames.
+        scans: scans in the LiDARs' frames.
         initial: ``[B, 4, 4]`` miscalibrated camera_from_lidar.
-        reference: ``[B, 4, 4]`` the true one.
-        correction: ``[B, 4, 4]`` from the one to the other.
+        reference: ``[B, 4, 4]`` true camera_from_lidar.
+        correction: ``[B, 4, 4]``, ``reference = correction @ initial``.
         intrinsics: ``[B, 3, 3]``.
-        shift: ``[B, 2]`` pixels by which the LiDAR image is displaced besides.
+        shift: ``[B, 2]`` pixels by which the LiDAR image is displaced in addition.
         size: height and width of the input, multiples of the coarsest scale.
-        scales: pixels a cell, fine to coarse.
+        scales: sides of the cells in pixels, fine to coarse.
         recipe: when a point counts as hidden.
     """
     displaced = intrinsics.clone()
@@ -163,9 +163,9 @@ def see(
 def visible(
     cells: Tensor, correction: Tensor, intrinsics: Tensor, front: Tensor, size: tuple[int, int], recipe: SampleRecipe
 ) -> Tensor:
-    """`calibnet.training.samples.visible_cells` of one scale: ``[B, h, w]`` of ``[B, 3, h, w]``.
+    """`calibnet.training.samples.visible_cells` for one scale of a batch: ``[B, 3, h, w]`` to ``[B, h, w]`` bool.
 
-    ``front`` is the nearest depth ``[B, H/hiding_px, W/hiding_px]`` that the camera, truly placed, sees.
+    ``front`` is the smallest depth ``[B, H/hiding_px, W/hiding_px]`` that the camera sees under the true extrinsic.
     """
     height, width = size
     flat = cells.flatten(2)

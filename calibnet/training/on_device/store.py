@@ -1,4 +1,4 @@
-"""All frames of a run as tensors on one device."""
+"""Keeps all frames of a training run as tensors on one device."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ LARGEST_BYTES = 16 << 30
 
 @dataclass(frozen=True)
 class FrameStore:
-    """Pictures and scans on the device, what little else a frame has on the host.
+    """Images and scans of F frames on the device; the rest of each frame, which is small, on the host.
 
     Attributes:
-        pictures: ``[F, H, W, 3]`` uint8 RGB, H and W those of the largest, black where others end.
-        scans: ``[F, 4, N]`` float32, N the points of the largest: x, y, z in metres and intensity.
-        points: ``[F]`` how many of the columns of a scan are points.
-        cameras: of each frame.
-        extrinsics: ``[F, 4, 4]`` float64 camera_from_lidar.
+        pictures: ``[F, H, W, 3]`` uint8 RGB at the size of the largest image; smaller ones are padded with black.
+        scans: ``[F, 4, N]`` float32 (x, y, z in metres, intensity), padded to the size of the largest scan.
+        points: ``[F]`` number of points of each scan.
+        cameras: camera of each frame.
+        extrinsics: F times 4x4 float64 camera_from_lidar.
         first: number of the first frame of each source.
     """
 
@@ -43,7 +43,7 @@ class FrameStore:
 
     @property
     def device(self) -> torch.device:
-        """Where pictures and scans are."""
+        """The device of images and scans."""
         return self.pictures.device
 
     @classmethod
@@ -51,8 +51,8 @@ class FrameStore:
         """Read all frames of the sources, with as many threads as there are cores.
 
         Raises:
-            ConfigError: they are too many.
-            DatasetError: one cannot be read.
+            ConfigError: the frames would take too much memory.
+            DatasetError: a frame cannot be read.
         """
         places = [(source.sequence, position) for source in sources for position in range(len(source.sequence))]
         lengths = [len(source.sequence) for source in sources]
@@ -81,10 +81,10 @@ class FrameStore:
 
 
 def require_room(frames: int, height: int, width: int, points: int) -> None:
-    """Check that so many frames fit onto the device, each with the picture and scan of the largest.
+    """Check that this number of frames fits onto the device, padded to the largest image and scan.
 
     Raises:
-        ConfigError: they do not.
+        ConfigError: the frames would take too much memory.
     """
     size = frames * (3 * height * width + 16 * points)
     if size > LARGEST_BYTES:
