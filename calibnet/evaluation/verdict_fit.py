@@ -24,9 +24,12 @@ Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
 """The ranges of the last stage and of the first one, which is searched around the guess."""
 RIDGE = 6.0
 """Penalty of `calibnet.evaluation.logistic.regression`: 3 times the squared coefficients of the odds of being wrong."""
-FALSE_ACCEPTS, FALSE_ACCEPTS_OF_DRIVES = 0.005, 0.01
+FALSE_ACCEPTS, FALSE_ACCEPTS_OF_DRIVES = 0.005, 0.02
 """Largest share of the runs that may be accepted and wrong, on sequences left out. One frame in a hundred is what the
-verdict promises; with half of that among some 600 runs it is kept with 95 % confidence. Drives are too few for this."""
+verdict promises; with half of that among some 600 runs it is kept with 95 % confidence. Drives are too few for this,
+and most of them end near a limit."""
+CLEAR_FALSE_ACCEPTS = 0.01
+"""The same for drives that do not end near a limit (`NEAR`), as a share of these."""
 CERTAIN = 0.5
 """How much of these shares may be certain to be within the coarser tolerance though it is not: half of the runs have
 no fault, and what is certain shall hold where all have one."""
@@ -105,9 +108,9 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
         CalibrationError: too few runs end right, or wrong.
     """
     finest, coarser = DRIVE_TOLERANCES
-    share, fewest = FALSE_ACCEPTS_OF_DRIVES, FEWEST_DRIVES
-    classifier, figures, _ = fit_classifier(runs, finest, share, fewest, near_counts=False)
-    coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, CERTAIN * share, fewest)
+    clear, fewest = CLEAR_FALSE_ACCEPTS, FEWEST_DRIVES
+    classifier, figures, _ = fit_classifier(runs, finest, FALSE_ACCEPTS_OF_DRIVES, fewest, clear)
+    coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, CERTAIN * clear, fewest)
     # only runs that are vouched for count: a few gross errors would inflate the covariance of all
     accepted = [run for run in kept if error_probability(run, coarse) < coarse.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
@@ -133,7 +136,7 @@ def fit_classifier(
     limits: tuple[float, float],
     false_accepts: float,
     fewest: int = FEWEST,
-    near_counts: bool = True,
+    clear_false_accepts: float = 1.0,
 ) -> tuple[Classifier, FitFigures, list[VerdictRun]]:
     """Fit a classifier to runs, and measure it on sequences left out.
 
@@ -142,7 +145,7 @@ def fit_classifier(
         limits: largest error, in degrees and centimetres, of a good result.
         false_accepts: largest share of the runs that may be accepted and wrong.
         fewest: number of good, and of wrong, results that is required.
-        near_counts: whether runs that end near a limit (`NEAR`) count where a result may be accepted.
+        clear_false_accepts: the same for the runs that do not end near a limit (`NEAR`), as a share of these.
 
     Returns:
         The classifier, its figures, and the plain runs that it does not reject.
@@ -162,8 +165,12 @@ def fit_classifier(
     wrong_or_right = (~good).astype(np.intp)
     odds = left_out(values, wrong_or_right, 2, RIDGE, [run.sequence for run in asked])[:, 0]
     plain = np.array([run.plain for run in asked], bool)
-    counts = np.array([near_counts or not is_near(run, limits) for run in asked], bool)
-    accepted_below = threshold(odds[counts], ~good[counts], false_accepts * counted(runs, limits, near_counts))
+    clear = np.array([not is_near(run, limits) for run in asked], bool)
+    clear_runs = sum(not is_near(run, limits) for run in runs)
+    accepted_below = min(
+        threshold(odds, ~good, false_accepts * len(runs)),
+        threshold(odds[clear], ~good[clear], clear_false_accepts * clear_runs),
+    )
     rejected_above = max(float(np.quantile(odds[good], 1 - GOOD_REJECTED)), accepted_below)
     (intercept,), (weights,) = regression(values, wrong_or_right, 2, RIDGE)
     classifier = Classifier(
@@ -210,11 +217,6 @@ def _curve(
         }
         for share in CURVE
     ]
-
-
-def counted(runs: Sequence[VerdictRun], limits: tuple[float, float], near_counts: bool) -> int:
-    """How many runs there are, with or without those that end near a limit."""
-    return sum(near_counts or not is_near(run, limits) for run in runs)
 
 
 def is_near(run: VerdictRun, limits: tuple[float, float]) -> bool:
