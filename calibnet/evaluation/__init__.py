@@ -1,1 +1,1 @@
-"""How good a calibration is: `measure` gives the figures that documents quote, `benchmark` the milliseconds."""
+"""Measures calibrators: `measure` gives the errors that documents quote, `benchmark` the milliseconds."""

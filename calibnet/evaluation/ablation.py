@@ -1,4 +1,4 @@
-"""Table 3 of the paper, measured: what each module of the network costs, and what it is worth (`measure_ablation`)."""
+"""Table 3 of the paper, measured: the cost of each module of the network, and its effect (`measure_ablation`)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from calibnet.training.ablations import ABLATIONS, ablated, ablation_folder
 from calibnet.weights.files import read_record, weights_path
 
 Observer = Callable[[str, int, int], None]
-"""Told the row, and the runs of it done and to be done."""
+"""Called with a row, the number of its runs that are done, and their total."""
 
 
 def measure_ablation(
@@ -46,16 +46,16 @@ def measure_ablation(
 
     Args:
         presets: names of presets.
-        range_: one of the five; of the miscalibrations, and of the weights.
-        weights: folder in which ``calib-inspect train --ablation NAME`` left them; None for none.
-        sequences: frames to measure errors on, by rig; the first frame is the one that latency is measured on.
-        repeats: miscalibrations a frame.
-        seed: of the miscalibrations.
-        timed: looks whose median time is the latency; 0 for none.
-        observer: told how far it is.
+        range_: range of the miscalibrations and of the weights, one of the five.
+        weights: folder of weights from ``calib-inspect train --ablation NAME``; None without weights.
+        sequences: frames to measure errors on, by rig; latency is measured on the first frame.
+        repeats: miscalibrations per frame.
+        seed: seed of the miscalibrations.
+        timed: number of looks whose median time is the latency; 0 for no latency.
+        observer: called with the progress.
 
     Yields:
-        A row for each ablation and rig, as soon as it is there; without weights, one row with a
+        A row for each ablation and rig, as soon as it is measured; without weights, one row with a
         sentence ``why``.
 
     Raises:
@@ -84,10 +84,10 @@ def measure_ablation(
 def _trained(
     preset: str, name: str, range_: MiscalibrationRange, weights: Path | None
 ) -> tuple[Stage | None, MethodCard, str]:
-    """The stage of a row and what it was trained on, or why there is none.
+    """The stage of a row and its card, or the reason why there is none.
 
     Raises:
-        WeightsError: a file is there and cannot be used, or holds another row's network.
+        WeightsError: a file of weights cannot be used, or has the network of another row.
     """
     train = f"`calib-inspect train --preset {preset} --ablation {name} --range {range_} --output"
     if weights is None:
@@ -112,7 +112,7 @@ def _untrained(network: CalibrationNetwork, range_: MiscalibrationRange) -> Stag
 
 
 def latency(stage: Stage, frame: Frame, timed: int) -> float:
-    """Median milliseconds of one look at a frame, picture and scan included, after one that is not timed."""
+    """Median milliseconds of one look at a frame, image features included, after one look that is not timed."""
     times = []
     for _ in range(1 + timed):
         began = time.perf_counter()

@@ -1,7 +1,7 @@
-"""Does it look at the image? The same frames with the image swapped or grey, and with fewer LiDAR rings.
+"""Tests whether a calibrator uses the image: the same frames with another image, a grey one, or fewer LiDAR rings.
 
-A regressor can memorise a rig from the LiDAR's ring pattern alone and score well on it. Such a
-calibrator is as good with a grey image; an honest one is lost without the true one.
+A regressor can memorise a rig from the LiDAR's ring pattern alone and have small errors on it. Such a calibrator is as
+good with a grey image; one that matches the image to the scan fails without the true image.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def thinned(frame: Frame) -> Frame:
 
 
 def swapped_with(donors: Sequence) -> Alteration:
-    """Put images of another drive into frames, in turn, fitted to their size."""
+    """Replace images by those of another drive in turn, resized to fit."""
 
     def swap(frame: Frame) -> Frame:
         return replace(frame, image=resize_image(donors[frame.index % len(donors)].image, frame.camera))
@@ -61,20 +61,20 @@ def swapped_with(donors: Sequence) -> Alteration:
 
 
 def alterations(donors: Sequence) -> dict[str, Alteration]:
-    """The three by the names that tables and JSON use."""
+    """The alterations by the names that tables and JSON use."""
     return {"swapped": swapped_with(donors), "grey": grey, "thinned": thinned}
 
 
 def other_drive(sequence: Sequence, opened: list[Sequence], beside: Callable[[], Iterable[Sequence]]) -> Sequence:
-    """A drive whose images are not those of ``sequence``.
+    """Another drive, for its images.
 
     Args:
-        sequence: whose images are to be replaced.
-        opened: what is evaluated besides.
-        beside: opens what else lies in the dataset's folder, one after the other.
+        sequence: the sequence whose images will be replaced.
+        opened: sequences that are open already.
+        beside: opens further sequences of the dataset's folder, one after the other.
 
     Returns:
-        Another one of these, or a drive through the synthetic world where there is none.
+        The first of these that is another drive, otherwise a drive through the synthetic world.
     """
     for candidate in chain(opened, beside()):
         if Path(candidate.name).name != Path(sequence.name).name:

@@ -1,4 +1,4 @@
-"""Does it know when it is wrong? Faults are put into frames, and verdicts held against the truth."""
+"""Measures whether verdicts are right: faults are put into frames, and verdicts compared with the true error."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from calibnet.trace import CascadeTrace
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, DRIVE_TOLERANCES, FRAME_TOLERANCES, REJECTED, Tolerance, Verdict
 
 PLAIN = Corruption("none", "", None, unaltered, middle=False)
-"""Input as it should be."""
+"""A frame without a fault."""
 ONE_MOUNT = Corruption("one-mount", "", None, unaltered, middle=False)
-"""A drive as it should be."""
+"""A drive without a fault."""
 DRIVE_FRAMES = 12
-"""Most frames of a drive that is put on two mounts."""
+"""Largest number of frames of a drive that is put on two mounts."""
 
 Judge = Callable[[Frame, Extrinsic, CascadeTrace | None, Search | None], Verdict]
-"""Gives the verdict on a frame, the guess it was calibrated from, the trace, which is None where it could not be run,
-and the lags that its scan may have."""
+"""Gives the verdict from a frame, the guess it was calibrated from, the trace (None if the frame could not be
+calibrated) and the lags to try."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class BatteryRun:
     """One verdict on one frame with one fault.
 
     Attributes:
-        corruption: the fault; `PLAIN` where there is none.
-        error: of the extrinsic that was judged.
-        word: of the verdict.
-        causes: names of the causes that it gives.
-        tolerances: that the extrinsic is right within, and a coarser one.
-        within: which of them the verdict is certain of; None without.
+        corruption: the fault; `PLAIN` without one.
+        error: error of the extrinsic that was judged.
+        word: accepted, rejected or cannot tell.
+        causes: names of the causes in the verdict.
+        tolerances: the tolerance within which an extrinsic is right, and a coarser one.
+        within: the tolerance that the verdict is certain of; None if it is certain of none.
     """
 
     corruption: Corruption
@@ -62,26 +62,26 @@ class BatteryRun:
 
     @property
     def is_right(self) -> bool:
-        """Whether the extrinsic is within the limits."""
+        """Whether the extrinsic is within the finer tolerance."""
         return self.tolerances[0].holds(self.error)
 
     @property
     def is_overclaimed(self) -> bool:
-        """Whether the verdict is certain of a tolerance though the extrinsic is not even within the coarser one."""
+        """Whether the verdict is certain of a tolerance, but the extrinsic is not even within the coarser one."""
         return self.within is not None and not self.tolerances[-1].holds(self.error)
 
 
 @dataclass(frozen=True)
 class BatteryRow:
-    """The runs with one fault at one strength, counted by what was said of them.
+    """Counts of the runs with one fault at one strength, by verdict.
 
     Attributes:
-        corruption, strength: which fault.
-        runs: how many.
-        accepted_right: accepted, and within limits.
-        accepted_wrong: accepted, though not within limits.
-        rejected, cannot_tell: the others.
-        cause_right: not accepted, and the fault's cause is among those given.
+        corruption, strength: the fault.
+        runs: number of runs.
+        accepted_right: number accepted that are right.
+        accepted_wrong: number accepted that are wrong.
+        rejected, cannot_tell: numbers with these verdicts.
+        cause_right: number not accepted whose verdict names the cause of the fault.
     """
 
     corruption: str
@@ -99,7 +99,7 @@ class Battery:
     """All runs of a battery.
 
     Attributes:
-        runs: every single one.
+        runs: the single runs.
     """
 
     runs: tuple[BatteryRun, ...]
@@ -130,23 +130,23 @@ class Battery:
 
     @property
     def false_accept_rate(self) -> float:
-        """Share of all runs that are accepted and wrong; not a number without runs."""
+        """Share of all runs that are accepted and wrong; NaN without runs."""
         wrong = [run.word == ACCEPTED and not run.is_right for run in self.runs]
         return float(np.mean(wrong)) if wrong else float("nan")
 
     @property
     def false_claim_rate(self) -> float:
-        """Share of all runs that are certain to be within the coarser tolerance and are not."""
+        """Share of all runs that are certain of the coarser tolerance and not within it; NaN without runs."""
         return float(np.mean([run.is_overclaimed for run in self.runs])) if self.runs else float("nan")
 
     @property
     def acceptance_of_good(self) -> float:
-        """Share that is accepted of the runs without fault that end right; not a number without such runs."""
+        """Share of accepted runs among those without a fault whose result is right; NaN without such runs."""
         good = [run for run in self.runs if run.corruption.name == PLAIN.name and run.is_right]
         return float(np.mean([run.word == ACCEPTED for run in good])) if good else float("nan")
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that JSON files hold; a rate of nothing is null."""
+        """The content of JSON files; a rate without runs is null."""
         names = ("false_accept_rate", "false_claim_rate", "acceptance_of_good")
         rates = {name: getattr(self, name) for name in names}
         return {
@@ -172,13 +172,13 @@ def run_battery(
     """Calibrate and judge every frame with every fault, and without.
 
     Args:
-        cascade: what calibrates.
-        judge: what is measured.
-        sequences: where the frames come from; their own extrinsics are the truth.
-        faults: what to put into them.
-        range_: range of the miscalibrations, the same one for every fault of a frame and repeat.
-        repeats: miscalibrations a frame.
-        seed: of the miscalibrations.
+        cascade: the calibrator.
+        judge: gives the verdicts to measure.
+        sequences: sequences with the frames, whose extrinsics are the truth.
+        faults: the faults to put into them.
+        range_: range of the miscalibrations; each is the same for all faults of a frame.
+        repeats: miscalibrations per frame.
+        seed: seed of the miscalibrations.
         observer: called after every run.
     """
     runs = []
@@ -202,7 +202,7 @@ def run_battery(
 
 
 def judged(cascade: Calibrator, judge: Judge, frame: Frame, guess: Extrinsic, late: Search | None = None) -> Verdict:
-    """Calibrate one frame from a guess, and judge that."""
+    """Calibrate one frame from a guess, and judge the result."""
     try:
         trace: CascadeTrace | None = cascade.calibrate(frame, guess)
     except CalibrationError:
@@ -219,15 +219,15 @@ def measure_battery(
     beside: Callable[[], Iterable[FrameSequence]] = lambda: (),
     observer: Callable[[BatteryRun], None] | None = None,
 ) -> Battery:
-    """Put every fault into every frame, and two mounts into every drive; see whether the cascade knows, and says why.
+    """Run the battery: every fault in every frame, and every drive on two mounts, with verdicts and causes.
 
     Args:
-        cascade: what calibrates and judges; causes are looked for where it does not accept.
-        sequences: where the frames come from; their own extrinsics are the truth.
+        cascade: calibrates and judges; it searches for causes of what it does not accept.
+        sequences: sequences with the frames, whose extrinsics are the truth.
         range_: range of the miscalibrations.
-        repeats: miscalibrations a frame and fault.
-        seed: of the miscalibrations.
-        beside: opens what else pictures of other places may be taken from; the synthetic world by default.
+        repeats: miscalibrations per frame and fault.
+        seed: seed of the miscalibrations.
+        beside: opens further sequences for images of other places; the synthetic world by default.
         observer: called after every run.
     """
     donors = {id(one): [other_drive(one, list(sequences), beside)[0]] for one in sequences}
@@ -251,9 +251,9 @@ def two_mount_runs(
     seed: int = 0,
     observer: Callable[[BatteryRun], None] | None = None,
 ) -> list[BatteryRun]:
-    """Solve every drive as it is, and with the LiDAR moved in its second half: then no one extrinsic is right.
+    """Solve every drive as it is, and with the LiDAR moved in its second half, when no single extrinsic is right.
 
-    The arguments are those of `measure_battery`. The error is that against the mount that is farther off.
+    The arguments are those of `measure_battery`. The error is relative to the mount that is farther away.
     """
     runs = []
     for sequence in sequences:

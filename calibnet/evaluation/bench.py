@@ -28,11 +28,11 @@ FRAMES, DRIVES = "frames", "drives"
 AUDITED = ("grey", "swapped")
 """The alterations of `calibnet.evaluation.audit` that every method is measured on."""
 TIMED = 3
-"""Frames whose median time is a method's latency, after one that is not timed."""
+"""Number of frames whose median time is the latency of a method, after one that is not timed."""
 
 
 class BenchMethod(NamedTuple):
-    """A method of the table, by its name and by what opens it for a range."""
+    """A method of the table: its name, and a function that opens it for a range."""
 
     name: str
     open: Callable[[MiscalibrationRange], Calibrator]
@@ -40,17 +40,17 @@ class BenchMethod(NamedTuple):
 
 @dataclass(frozen=True)
 class Bench:
-    """What all methods are measured on.
+    """The frames and miscalibrations that all methods are measured on.
 
     Attributes:
-        sequences: where the frames come from; their own extrinsics are the reference.
-        ranges: of the miscalibrations; the audit is done within the first.
-        repeats: miscalibrations a frame and a drive.
-        seed: of the miscalibrations.
-        most: frames of a sequence that are measured, spread over it, and frames of a drive, one after the other.
-        limit_s: seconds after which a row ends with what it has.
-        audit: whether altered frames are measured.
-        beside: opens what else the audit may take pictures from.
+        sequences: sequences with the frames, whose extrinsics are the reference.
+        ranges: ranges of the miscalibrations; the audit uses the first.
+        repeats: miscalibrations per frame and per drive.
+        seed: seed of the miscalibrations.
+        most: largest number of frames per sequence, evenly spaced, and of successive frames per drive.
+        limit_s: seconds after which a row ends with the runs done so far.
+        audit: whether altered frames are measured too.
+        beside: opens further sequences that the audit may take images from.
     """
 
     sequences: list[FrameSequence]
@@ -69,7 +69,7 @@ class Bench:
 
 
 class Step(NamedTuple):
-    """How far a measurement is: the row, and runs of it done and to be done at most."""
+    """The progress of a measurement: the row, the number of its runs that are done, and the largest number of them."""
 
     row: str
     done: int
@@ -85,8 +85,8 @@ def measure_bench(
     """Measure methods one after the other.
 
     Yields:
-        The name of each and its entry in the table, as soon as it has one; a method or a row that cannot be measured
-        has a sentence ``why`` instead of figures.
+        The name of each method and its entry in the table, as soon as it is measured. A method or row that cannot be
+        measured has a sentence ``why`` instead of figures.
 
     Raises:
         DatasetError: a frame cannot be read.
@@ -96,7 +96,7 @@ def measure_bench(
 
 
 def initial_rows(bench: Bench) -> Iterator[dict[str, Any]]:
-    """The errors that single frames begin with, which a method has to be better than.
+    """The initial errors of single frames, which a method has to improve on.
 
     Raises:
         DatasetError: a frame cannot be read.
@@ -144,14 +144,14 @@ def _entry(bench: Bench, bench_method: BenchMethod, observer: Observer) -> dict[
 
 
 def kinds(method: Calibrator) -> tuple[str, ...]:
-    """What a method can be measured on."""
+    """Whether a method can be measured on frames, on drives or on both."""
     if drives_only(method):
         return (DRIVES,)
     return (FRAMES, DRIVES) if isinstance(method, DriveCalibrator) else (FRAMES,)
 
 
 class _Try(NamedTuple):
-    """A run: where it starts, what it is held against, and what makes it."""
+    """A run: its initial extrinsic, the reference, and the function that makes it."""
 
     initial: Extrinsic
     reference: Extrinsic
@@ -166,11 +166,11 @@ def measure_row(
     of: str,
     told: Callable[[int, int], None],
 ) -> dict[str, Any]:
-    """Errors of a method on single frames or drives of some sequences; refused runs count with their initial error.
+    """Errors of a method on single frames or on drives; refused runs count with their initial error.
 
     Returns:
-        The figures, how many runs there are and how many were refused: not calibrated, or rejected by the method. With
-        no run at all, or with all refused, a sentence ``why``.
+        The figures, the number of runs, and the number refused: not calibrated, or rejected by the method. Without any
+        run, or with all refused, a sentence ``why``.
     """
     tries = list(_frames(bench, range_, sequences) if of == FRAMES else _drives(bench, range_, sequences))
     errors: list[PoseError] = []
@@ -181,7 +181,7 @@ def measure_row(
         try:
             result, rejected = one.run(method, one.initial)
             refused += rejected
-        except (CalibrationError, ConfigError) as error:  # of this frame, or of what the method was told of it
+        except (CalibrationError, ConfigError) as error:  # the frame, or an option, does not suit the method
             refused, why = refused + 1, str(error)
         errors.append(pose_error(result, one.reference))
         told(done, len(tries))
@@ -229,7 +229,7 @@ def _on_drive(drive: FrameSequence, method: Calibrator, initial: Extrinsic) -> t
 
 
 def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> float | None:
-    """Median milliseconds of a method on a frame; None of one that solves drives alone, or that solves no frame."""
+    """Median milliseconds of a method per frame; None if it only solves drives, or fails on all frames."""
     sequence = bench.sequences[0]
     if drives_only(method):
         return None
@@ -249,7 +249,7 @@ def latency(bench: Bench, method: Calibrator, range_: MiscalibrationRange) -> fl
 
 
 def _altered(bench: Bench) -> dict[str, list[FrameSequence]]:
-    """The sequences, altered in each of the ways."""
+    """The sequences with each of the alterations."""
     donors = [other_drive(sequence, bench.sequences, bench.beside) for sequence in bench.sequences]
     return {
         name: [

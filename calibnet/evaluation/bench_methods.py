@@ -1,4 +1,4 @@
-"""The methods that stand in the table of `calibnet.evaluation.bench`: the cascade, with any weights, and the others."""
+"""The methods in the table of `calibnet.evaluation.bench`: the cascade, with any weights, and other methods."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def bench_methods(
     """The rows of the table, by name.
 
     Args:
-        names: of methods; ``all`` for every one.
-        ours: further rows of the cascade, by name, with the folders of their weights.
-        told: options of other methods, of which each is told those that it has.
-        preset: network of the cascade.
+        names: names of methods; ``all`` for every method.
+        ours: further rows of the cascade: names, and folders of weights.
+        told: options of other methods; each is given those that it accepts.
+        preset: preset of the cascade.
 
     Raises:
         ConfigError: there is no such method.
@@ -47,13 +47,13 @@ def _open(name: str, told: dict[str, Any], range_: MiscalibrationRange) -> Calib
 
 
 class MeasuredCascade(Cascade):
-    """The cascade, saying what it costs."""
+    """The cascade with a card, which has its cost."""
 
     card: MethodCard
 
     @classmethod
     def within(cls, preset: str, folder: Path | None, range_: MiscalibrationRange) -> MeasuredCascade:
-        """The stages that ``evaluate`` runs for a range, with weights of a folder or of the package."""
+        """The stages that ``evaluate`` runs for a range, with the weights of a folder or those of the package."""
         cascade = cls.load(preset, stages_within(range_), folder, wider=True)
         assert isinstance(cascade, cls)
         cascade.card = cascade_card(cascade, preset, folder)
@@ -61,16 +61,16 @@ class MeasuredCascade(Cascade):
 
 
 def cascade_card(cascade: Cascade, preset: str, folder: Path | None) -> MethodCard:
-    """What the stages cost together for one frame, and what their records say they were trained on.
+    """The cost of all stages for one frame, and the data that their records say they were trained on.
 
-    Stages count at the size of their image and with the looks that they take at most. An image branch that stages
-    share counts once: its parameters altogether, its work at each size of image.
+    Every stage counts with its image size and its largest number of looks. The parameters of an image branch that
+    stages share count once, and its multiply-adds once for each image size.
     """
     parameters = multiply_adds = 0
     branches, views = set[int](), set[tuple[int, float]]()
     for stage, branch in zip(cascade.stages, cascade.image_branches, strict=False):
         config, size = stage.network.config, stage.settings.image_size
-        plain = CalibrationNetwork(config, stage.range).eval()  # what runs is packed, and its products are not seen
+        plain = CalibrationNetwork(config, stage.range).eval()  # packed layers are not counted
         input_ = PinholeCamera(config.input_width, config.input_height, np.eye(3))
         input_ = input_.fitted(size * config.input_height, size * config.input_width, config.scales[-1])
         image, *others = count(plain, input_.height, input_.width)

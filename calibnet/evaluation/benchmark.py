@@ -1,4 +1,4 @@
-"""How long a cascade takes: by part, by stage and by frame, the median of many."""
+"""Measures the time that a cascade takes, by part, by stage and by frame, as medians of many runs."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from calibnet.runtime.precision import autocast, has_fast_bf16
 from calibnet.runtime.threads import cores
 
 BATCHES = (1, 4)
-"""Frames at once of the networks' throughput."""
+"""Batch sizes at which the throughput of the networks is measured."""
 WARM_UP = 3
-"""Runs that do not count: memory is got and kernels are chosen in them."""
+"""Number of runs that do not count, in which memory is allocated and kernels are chosen."""
 
 
 @dataclass(frozen=True)
 class StageTime:
-    """One stage.
+    """The times of one stage.
 
     Attributes:
-        number: 1 to 5.
-        range: for instance ``"5/0.5"``.
-        milliseconds: median of a frame.
+        number: number of the stage, 1 to 5.
+        range: its range as text, for instance ``"5/0.5"``.
+        milliseconds: median per frame.
         parts: medians by part: projection, lidar_features, cost_volumes, hourglass, displacement, pose.
-        batches: milliseconds a frame of the network alone, image features included, by frames at once.
+        batches: milliseconds per frame of the network alone, image features included, by batch size.
     """
 
     number: int
@@ -50,14 +50,14 @@ class StageTime:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What was measured, on what.
+    """The measured times, and the machine they were measured on.
 
     Attributes:
-        cascade: milliseconds from frame to extrinsic, all stages, median.
-        shared: medians of what is done once a frame: preparation, resizing and, where stages share it, image features.
-        stages: one by one.
-        reference: milliseconds of one network of `calibnet.evaluation.reference`, timed in turn with ours, median.
-        frames: number of runs that the medians are over.
+        cascade: median milliseconds from frame to extrinsic through all stages.
+        shared: medians of what is done once per frame: preparation, resizing and image features that stages share.
+        stages: the times of each stage.
+        reference: median milliseconds of one network of `calibnet.evaluation.reference`, timed in turn with ours.
+        frames: number of runs in the medians.
         machine: CPU or GPU, threads and precision.
     """
 
@@ -70,7 +70,7 @@ class Benchmark:
 
     @property
     def parts(self) -> dict[str, float]:
-        """Medians by part, summed over the stages, with what is done once."""
+        """Medians by part, summed over the stages, with the shared parts."""
         total = dict(self.shared)
         for stage in self.stages:
             for part, milliseconds in stage.parts.items():
@@ -79,7 +79,7 @@ class Benchmark:
 
     @property
     def ratio(self) -> float:
-        """The whole cascade, projection and verdict included, by the five networks alone of the reference."""
+        """Time of the whole cascade, projection and verdict included, relative to the five reference networks."""
         return self.cascade / (reference.STAGES * self.reference)
 
     def as_dict(self) -> dict[str, Any]:
@@ -111,9 +111,9 @@ def benchmark(
     """Run every frame ``repeats`` times from miscalibrations of the first stage's range, then the networks in batches.
 
     Args:
-        cascade: what to time.
-        frames: in memory, so that no disk is timed; of one camera.
-        repeats: runs a frame that count.
+        cascade: the cascade to time.
+        frames: frames of one camera, in memory, so that no reading is timed.
+        repeats: number of runs per frame.
         observer: called after every run.
     """
     range_ = cascade.stages[0].range
@@ -146,7 +146,7 @@ def benchmark(
 
 
 def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -> float:
-    """Milliseconds a frame of one stage's network on ``size`` frames at once."""
+    """Median milliseconds per frame of a stage's network on batches of ``size`` frames."""
     chosen = [frames[number % len(frames)] for number in range(size)]
     cameras = [stage.camera(frame) for frame in chosen]
     scans = [
@@ -168,7 +168,7 @@ def batch_time(cascade: Cascade, stage: Stage, frames: list[Frame], size: int) -
 
 
 def describe_machine(device: torch.device) -> dict[str, Any]:
-    """What the figures depend on besides the code."""
+    """Properties of the machine and the installation that times depend on."""
     return {
         "device": torch.cuda.get_device_name(device) if device.type == "cuda" else processor(),
         "instructions": torch.backends.cpu.get_cpu_capability(),

@@ -1,7 +1,7 @@
-"""The battery: faults that input can have and still be read, in several strengths, each with its true cause.
+"""The faults of the battery: readable but wrong input, in several strengths, each with its true cause.
 
-A fault leaves the frame's ``camera_from_lidar`` the truth: where it turns the camera, the truth turns too. What a user
-would start from, the guess, does not know of the fault.
+The ``camera_from_lidar`` of a frame with a fault is still the truth: a fault that turns the camera turns it too. The
+guess from which a frame is calibrated does not depend on the fault.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ class Corruption:
     """One fault at one strength.
 
     Attributes:
-        name: of the fault; the same for all its strengths.
-        strength: how much of it, for tables; empty where there is no more or less of it.
-        cause: name of the cause that a verdict should give, or None where there is none to give.
-        alter: puts it into a frame.
+        name: name of the fault, the same at all strengths.
+        strength: strength for tables; empty for a fault that has only one.
+        cause: name of the cause that a verdict should give; None if there is no such cause.
+        alter: puts the fault into a frame.
         middle: whether causes are counted at this strength.
-        farther: by what the range of the start is multiplied.
+        farther: factor on the range of the guess.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Corruption:
     farther: float = 1.0
 
     def put(self, frame: Frame) -> Frame:
-        """A frame with the fault; of a wide lens the middle alone, as faults are of one picture."""
+        """A frame with the fault, without the faces of a wide lens, as a fault is one of a single image."""
         return self.alter(replace(frame, faces=()))
 
 
@@ -47,10 +47,10 @@ def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame])
     """All faults that can be put into the frame at a position of a sequence.
 
     Args:
-        sequence: neighbours come from there; without them there is no late scan, and without known motion, which the
-            synthetic world has, no scan put together of several.
-        position: of the frame.
-        donors: frames of other places, for their pictures.
+        sequence: the sequence of the frame. Late scans need neighbouring frames, and accumulated scans the car's true
+            motion, which only the synthetic world has.
+        position: position of the frame.
+        donors: frames of other places, for their images.
     """
     yield from picture_faults(donors)
     yield from camera_faults()
@@ -71,7 +71,7 @@ def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame])
 
 
 def picture_faults(donors: Sequence[Frame]) -> Iterator[Corruption]:
-    """Faults of what the picture shows."""
+    """Faults of the image."""
     for number, donor in enumerate(donors):
         yield Corruption("other-picture", f"{number + 1}", "other-picture", faults.picture_of(donor), number == 0)
     yield Corruption("grey", "", None, faults.grey)
@@ -90,7 +90,7 @@ def picture_faults(donors: Sequence[Frame]) -> Iterator[Corruption]:
 
 
 def camera_faults() -> Iterator[Corruption]:
-    """Faults of what is said of the camera."""
+    """Faults of the camera's intrinsics."""
     for percent in (2, -2, 5, -5, 10, -10):
         yield Corruption(
             "focal-length", f"{percent:+d} %", "focal-length", faults.focal(1 + percent / 100), abs(percent) == 5
@@ -108,7 +108,7 @@ def camera_faults() -> Iterator[Corruption]:
 
 
 def scan_faults() -> Iterator[Corruption]:
-    """Faults of the scan itself."""
+    """Faults of the scan."""
     for share in (2, 4, 8):
         yield Corruption("thinned", f"1 of {share}", None, faults.thinned(share), share == 4)
     yield Corruption("half-missing", "", None, faults.half_missing)
@@ -129,7 +129,7 @@ def two_mounts(second: bool) -> Iterator[Corruption]:
     """A drive on two mounts: the LiDAR is turned and moved in its second half.
 
     Args:
-        second: whether a frame is of that half; the others are as they were.
+        second: whether the frame is in the second half; frames of the first half are unaltered.
     """
     for degrees, metres in ((0.5, 0.0), (1.0, 0.1), (3.0, 0.3)):
         alter = faults.remounted(degrees, metres) if second else faults.unaltered

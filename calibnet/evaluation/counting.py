@@ -1,4 +1,4 @@
-"""What a network costs: parameters and multiply-adds per box of the paper's figure."""
+"""Counts parameters and multiply-adds of a network, per box of the paper's figure."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from calibnet.network.network import CalibrationNetwork
 from calibnet.runtime.clock import after_each
 
 HEIGHT, WIDTH = 256, 512
-"""Input at which multiply-adds are counted: the paper's."""
+"""Input size at which multiply-adds are counted, as in the paper."""
 
 
 class ModuleCost(NamedTuple):
-    """One box of the figure.
+    """The cost of one box of the figure.
 
     Attributes:
-        name: ``"image features"`` to ``"pose"``, in the order they run.
-        parameters: its own; what two boxes share is counted in the first.
-        multiply_adds: of its convolutions and matrix products, for one sample.
+        name: ``"image features"`` to ``"pose"``.
+        parameters: number of its parameters; those that two boxes share count in the first.
+        multiply_adds: multiply-adds of its convolutions and matrix products, for one sample.
     """
 
     name: str
@@ -33,8 +33,8 @@ class ModuleCost(NamedTuple):
 def count(network: CalibrationNetwork, height: int = HEIGHT, width: int = WIDTH) -> list[ModuleCost]:
     """Count a forward pass of one image and scan of ``height`` x ``width`` pixels, by running it.
 
-    Not counted is what the figures of this field leave out too: normalisation, activations,
-    interpolation and the pose solver's 6x6 systems.
+    As usual in this field, normalisation, activations, interpolation and the pose solver's 6x6 systems are not
+    counted.
     """
     features, boxes = network.features, network.boxes
     modules: dict[str, list[nn.Module]] = {
@@ -58,7 +58,7 @@ def count(network: CalibrationNetwork, height: int = HEIGHT, width: int = WIDTH)
 
 
 def total(network: CalibrationNetwork) -> tuple[int, int]:
-    """Parameters and multiply-adds of all its boxes, at the paper's input."""
+    """Parameters and multiply-adds of the whole network, at the paper's input size."""
     costs = count(network)
     return sum(cost.parameters for cost in costs), sum(cost.multiply_adds for cost in costs)
 
@@ -75,7 +75,7 @@ def own_parameters(modules: dict[str, list[nn.Module]]) -> dict[str, int]:
 
 
 def empty_inputs(network: CalibrationNetwork, height: int, width: int) -> NetworkInputs:
-    """Inputs of one sample without a single LiDAR point: the cost does not depend on them."""
+    """Inputs of one sample without LiDAR points, on which the cost does not depend."""
     device = next(network.parameters()).device
     return NetworkInputs(
         image=torch.zeros(1, 3, height, width, device=device),

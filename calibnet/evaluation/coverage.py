@@ -1,6 +1,6 @@
-"""Whether stated covariances are as large as the errors.
+"""Measures whether stated covariances are as large as the errors.
 
-Told by the normalised estimation error squared (NEES), and by the share of errors within the 95 % region.
+The measures are the normalised estimation error squared (NEES) and the share of errors within the 95 % region.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from calibnet.geometry.types import Extrinsic, Matrix6
 
 FREEDOM = 6
 WITHIN_95 = 12.592
-"""95 % quantile of chi-square with six degrees of freedom."""
+"""95 % quantile of the chi-square distribution with six degrees of freedom."""
 MEDIAN = 5.348
-"""Its median."""
+"""Median of the same distribution."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,12 @@ class Coverage:
     """How stated covariances compare with errors.
 
     Attributes:
-        runs: how many state one.
-        squared: mean squared error by the covariance (NEES) per degree of freedom: 1 where errors are as large as
-            stated, more where they are larger.
-        squared_error: standard error of that; not a number for a single run.
-        median: median of the same, relative to that of chi-square, which single gross errors do not move.
-        within: share within the 95 % region.
-        within_error: standard error of that.
+        runs: number of runs that state a covariance.
+        squared: NEES per degree of freedom: 1 if errors are as large as stated, more if they are larger.
+        squared_error: standard error of ``squared``; NaN for a single run.
+        median: median NEES relative to the median of chi-square, which single gross errors hardly affect.
+        within: share of errors within the 95 % region.
+        within_error: standard error of ``within``.
     """
 
     runs: int
@@ -43,7 +42,7 @@ class Coverage:
 
     @classmethod
     def of(cls, squares: Iterable[float]) -> Coverage | None:
-        """The coverage of runs by their `squared_error`; None where no run states a covariance."""
+        """The coverage of runs from their `squared_error`; None if no run states a covariance."""
         known = np.array([square for square in squares if np.isfinite(square)])
         if not len(known):
             return None
@@ -67,12 +66,12 @@ class Coverage:
         )
 
     def as_dict(self) -> dict[str, float | None]:
-        """The form that JSON files hold; what one run alone does not tell is null."""
+        """The content of JSON files; figures that need more than one run are null."""
         return {name: value if np.isfinite(value) else None for name, value in asdict(self).items()}
 
 
 def squared_error(found: Extrinsic, truth: Extrinsic, covariance: Matrix6 | None) -> float:
-    """The squared error ``e^T C^-1 e`` of an extrinsic by its covariance ``[6, 6]``; not a number without one."""
+    """The squared error ``e^T C^-1 e`` of an extrinsic with covariance ``[6, 6]``; NaN without a covariance."""
     if covariance is None:
         return float("nan")
     offset = pose_vector(found @ invert(truth))

@@ -1,4 +1,4 @@
-"""Drives: solve the extrinsic of each from all its frames, from seeded miscalibrations, and summarise the errors."""
+"""Measures drives: solves each from all its frames, from seeded miscalibrations, and summarises the errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from calibnet.geometry import MiscalibrationRange, pose_error, sample_miscalibra
 from calibnet.verdict import DRIVE_TOLERANCES, REJECTED, Tolerance
 
 FEWEST_FRAMES = 2
-"""One frame is no drive."""
+"""Fewest frames of a drive."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,11 @@ class DriveMetrics:
     """Errors of drives.
 
     Attributes:
-        estimate: of the extrinsic solved from all frames, edges included where they were aligned.
-        networks: of what the networks alone made of them; None where no edges were aligned after them, so that both
-            would be the same.
-        coverage: how the stated covariances of those that are not rejected compare with their errors.
-        verdicts: how many have each verdict.
-        claims: how many are certain to be within the coarser tolerance.
+        estimate: errors of the extrinsics solved from all frames, after alignment of edges if there was any.
+        networks: errors of the networks alone; None if no edges were aligned, when they would be the same.
+        coverage: how the stated covariances of drives that are not rejected compare with their errors.
+        verdicts: number of drives with each verdict.
+        claims: how many are certain of the coarser tolerance, and how many wrongly.
     """
 
     estimate: Metrics
@@ -53,15 +52,15 @@ def evaluate_drives(
     """Errors of ``repeats`` estimates of every drive; those that fail keep their initial error.
 
     Args:
-        calibrator: what to measure.
-        sequences: the drives; what is not one drive on one mount (`shares_mount`) is left out.
-        range_: range of the miscalibrations, of which there is one a drive and repeat.
-        repeats: miscalibrations a drive.
-        seed: of the miscalibrations.
-        observer: called with the drive's name and the numbers of frames read and to be read.
+        calibrator: the calibrator to measure.
+        sequences: the drives; sequences without a common mount (`shares_mount`) are left out.
+        range_: range of the miscalibrations.
+        repeats: miscalibrations per drive.
+        seed: seed of the miscalibrations.
+        observer: called with the name of a drive, the number of its frames that are read, and their total.
 
     Returns:
-        None where no sequence is a drive.
+        The errors; None if no sequence is a drive.
     """
     errors, of_networks, squares, words, aligned = [], [], [], Counter[str](), False
     claimed = list[Tolerance | None]()
@@ -78,7 +77,7 @@ def evaluate_drives(
                 if observer is not None:
                     observer(name, read, total)
 
-            with contextlib.suppress(CalibrationError):  # counts with its initial error, as a single frame does
+            with contextlib.suppress(CalibrationError):  # counts with its initial error
                 solved = calibrator.calibrate_drive(sequence, estimate, told)
                 estimate, networks = solved.camera_from_lidar, (solved.networks or solved).camera_from_lidar
                 aligned = aligned or solved.networks is not None
@@ -98,7 +97,7 @@ def evaluate_drives(
 
 
 def shares_mount(sequence: Sequence) -> bool:
-    """Whether the first, middle and last frames have one extrinsic, as those of a drive do."""
+    """Whether the first, middle and last frames have the same extrinsic, as frames of a drive do."""
     if len(sequence) < FEWEST_FRAMES:
         return False
     some = {0, len(sequence) // 2, len(sequence) - 1}

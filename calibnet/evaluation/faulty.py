@@ -15,7 +15,7 @@ from calibnet.verdict import DRIVE_LIMITS
 
 
 class Faulty:
-    """A drive with a fault in its frames; what the fault needs that a frame lacks makes the frame unreadable."""
+    """A drive with a fault in its frames; a frame that the fault cannot be applied to is unreadable."""
 
     def __init__(
         self, sequence: FrameSequence, positions: list[int], fault: Corruption | None, donors: list[Frame]
@@ -48,14 +48,14 @@ class Faulty:
 
 
 def farthest(extrinsic: Extrinsic, drive: Faulty) -> PoseError:
-    """The largest error against a frame of a drive, in limits of a drive; frames may be on different mounts."""
+    """The largest error against the frames of a drive, relative to `DRIVE_LIMITS`; they may be on different mounts."""
     truths = {frame.camera_from_lidar.tobytes(): frame.camera_from_lidar for frame in readable(drive)}
     errors = [pose_error(extrinsic, truth) for truth in truths.values()]
     return max(errors, key=lambda one: one.translation_cm / DRIVE_LIMITS[1] + one.rotation_deg / DRIVE_LIMITS[0])
 
 
 def readable(drive: Faulty) -> Iterator[Frame]:
-    """The frames that can be read."""
+    """The frames of a drive that can be read."""
     for number in range(len(drive)):
         try:
             yield drive[number]

@@ -18,7 +18,7 @@ from calibnet.judging.lens_predictors import lens_fits, lens_predictors
 from calibnet.trace import CascadeTrace
 
 CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
-"""The name for each fault of the battery; runs with other faults count as without a fault of the lens."""
+"""Name of each fault of the battery; runs with other faults count as runs without a fault of the lens."""
 TOO_WEAK = (
     ("focal-length", "+2 %"),
     ("focal-length", "-2 %"),
@@ -28,7 +28,8 @@ TOO_WEAK = (
     ("distorted", "k1 -0.1"),
     ("distorted", "k1 0.1"),
 )
-"""Not fitted to: faults that a frame hardly shows, and a principal point moved down, which looks like pitch."""
+"""Faults left out of the fit: those that hardly show in a frame, and a principal point moved down, which looks like a
+pitch."""
 RIDGE = 1.0
 """Penalty of `calibnet.evaluation.logistic.regression`."""
 WRONG_NAMES = 0.05

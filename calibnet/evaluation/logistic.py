@@ -20,7 +20,7 @@ def regression(values: Floats, kinds: NDArray[np.integer], count: int, ridge: fl
 
     Args:
         values: predictors ``[N, W]``.
-        kinds: ``[N]``, what each row is: 0 to ``count - 1``.
+        kinds: ``[N]``, kind of each row: 0 to ``count - 1``.
         count: number of kinds.
         ridge: weight of the penalty; between two kinds it amounts to half as much on the coefficients of their odds.
 

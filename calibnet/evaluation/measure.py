@@ -1,4 +1,4 @@
-"""The measurement whose figures documents quote: `measure` makes every row of the table that ``evaluate`` prints."""
+"""The measurement that documents quote: `measure` computes all rows of the table that ``evaluate`` prints."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ NO_CORRECTION = "no correction"
 
 
 class Step(NamedTuple):
-    """How far a measurement is.
+    """The progress of a measurement.
 
     Attributes:
-        row: what is being measured, for people.
-        done: runs on frames of this row so far; 0 once before the first.
-        total: of them; None where it is not known beforehand.
-        sequence: name of the sequence that the last of them is from; empty before the first.
+        row: what is being measured, in words.
+        done: number of finished runs on frames of this row; 0 before the first.
+        total: number of all runs of this row; None if it is not known beforehand.
+        sequence: name of the sequence of the last run; empty before the first.
     """
 
     row: str
@@ -37,7 +37,7 @@ class Step(NamedTuple):
 
 
 Observer = Callable[[Step], None]
-"""Called before a row and after every run on a frame of it."""
+"""Called before a row, and after each of its runs on a frame."""
 
 
 def measure(
@@ -53,27 +53,27 @@ def measure(
     beside: Callable[[], Iterable[Sequence]] = tuple,
     observer: Observer | None = None,
 ) -> Evaluation:
-    """Measure a cascade on single frames and on drives, and what it is held against.
+    """Measure a cascade on single frames and on drives, and the methods that it is compared with.
 
-    The same arguments give the same figures: miscalibrations depend on the seed, the frame's index and the repeat.
+    The same arguments give the same figures: miscalibrations depend only on the seed, the frame's index and the repeat.
 
     Args:
-        cascade: what to measure, for instance ``Cascade.load(stages=stages_within(range_))``.
-        sequences: where the frames come from; their own extrinsics are the reference.
+        cascade: the cascade to measure, for instance ``Cascade.load(stages=stages_within(range_))``.
+        sequences: sequences with the frames, whose extrinsics are the reference.
         range_: range of the miscalibrations.
-        repeats: miscalibrations a frame and a drive, at least 1.
-        seed: of the miscalibrations.
+        repeats: miscalibrations per frame and per drive, at least 1.
+        seed: seed of the miscalibrations.
         references: other methods by name, measured on the same single frames; by default `EdgeAlignment`, which needs
             no training.
-        drives: whether the extrinsic of every drive is solved from all its frames, too.
-        audit: whether the single frames are measured again with the image swapped, grey, and with fewer LiDAR rings,
-            see `calibnet.evaluation.audit`.
-        beside: opens what else the audit may take images of another drive from.
-        observer: told how far it is.
+        drives: whether the extrinsic of every drive is solved from all its frames too.
+        audit: whether single frames are also measured with another image, a grey one, and with fewer LiDAR rings, see
+            `calibnet.evaluation.audit`.
+        beside: opens further sequences that the audit may take images from.
+        observer: called with the progress.
 
     Raises:
-        DatasetError: when there is no frame to measure on, or one cannot be read.
-        CalibrationError: when not a single frame could be calibrated.
+        DatasetError: there is no frame to measure on, or one cannot be read.
+        CalibrationError: no frame could be calibrated.
     """
     measurement = _Measurement(sequences, range_, repeats, seed, observer or (lambda step: None))
     evaluation = measurement.frames("single frames", cascade)
@@ -87,13 +87,13 @@ def measure(
 
 
 def classical(range_: MiscalibrationRange) -> dict[str, Calibrator]:
-    """The refinement without training that networks are held against, by the name that tables and JSON use."""
+    """The method without training that networks are compared with, by the name that tables and JSON use."""
     return {"edge alignment": EdgeAlignment(range_)}
 
 
 @dataclass(frozen=True)
 class _Measurement:
-    """What all rows have in common; one method a kind of row."""
+    """The arguments that all rows share; each method measures one kind of row."""
 
     sequences: list[Sequence]
     range: MiscalibrationRange
@@ -102,7 +102,7 @@ class _Measurement:
     observer: Observer
 
     def frames(self, row: str, calibrator: Calibrator, sequences: list[Sequence] | None = None) -> Evaluation:
-        """Every frame by itself."""
+        """Measure every frame by itself."""
         chosen = self.sequences if sequences is None else sequences
         advance = self._counter(row, self.repeats * sum(map(len, chosen)))
         return evaluate_frames(
@@ -110,7 +110,7 @@ class _Measurement:
         )
 
     def held_against(self, row: str, method: Calibrator) -> Metrics:
-        """Another method on single frames or, where it knows whole drives alone, on the drives."""
+        """Measure another method on single frames, or on drives if it only solves drives."""
         if not drives_only(method):
             return self.frames(row, method).final
         assert isinstance(method, DriveCalibrator)
@@ -123,7 +123,7 @@ class _Measurement:
         return solved.estimate
 
     def with_drives(self, evaluation: Evaluation, cascade: DriveCalibrator) -> Evaluation:
-        """Every drive from all its frames."""
+        """Measure every drive, solved from all its frames."""
         advance = self._counter("drives", None)
         solved = evaluate_drives(
             cascade, self.sequences, self.range, self.repeats, self.seed, lambda name, *_: advance(name)
@@ -142,7 +142,7 @@ class _Measurement:
     def with_audit(
         self, evaluation: Evaluation, cascade: Calibrator, beside: Callable[[], Iterable[Sequence]]
     ) -> Evaluation:
-        """Every frame by itself, altered in each of the ways."""
+        """Measure every frame by itself with each of the alterations."""
         donors = [other_drive(sequence, self.sequences, beside) for sequence in self.sequences]
         altered = {}
         for name in alterations(donors[0]):
@@ -160,7 +160,7 @@ class _Measurement:
         )
 
     def _counter(self, row: str, total: int | None) -> Callable[[str], None]:
-        """Announce a row; returns what to call after every run on a frame, with the frame's sequence."""
+        """Announce a row; returns a function to call after every run on a frame, with the sequence's name."""
         done = 0
         self.observer(Step(row, done, total, ""))
 

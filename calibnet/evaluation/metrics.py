@@ -23,7 +23,7 @@ class Distribution:
 
     @classmethod
     def of(cls, errors: Floats) -> Distribution:
-        """Summarise errors ``[N]``; the standard deviation is that of the frames, not of a sample."""
+        """Summarise errors ``[N]``; the standard deviation is that of these frames (divided by N)."""
         return cls(
             mean=float(errors.mean()),
             median=float(np.median(errors)),
@@ -71,11 +71,11 @@ class Metrics:
         """Summarise the errors of frames.
 
         Raises:
-            ValueError: when there are none, since no statistic of nothing is honest.
+            ValueError: there are no errors.
         """
         if not errors:
             raise ValueError("There are no errors to summarise.")
-        # One row a frame, so that every mean below runs down the column and over all frames.
+        # one row per frame: means run along the columns
         rotation = np.array([[e.rotation_deg, e.roll_deg, e.pitch_deg, e.yaw_deg] for e in errors])
         translation = np.array([[e.translation_cm, e.x_cm, e.y_cm, e.z_cm] for e in errors])
         angle, distance = rotation[:, 0], translation[:, 0]
@@ -91,7 +91,7 @@ class Metrics:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that JSON files hold; keys carry the units."""
+        """The content of JSON files; keys end with the unit."""
         return {
             "rotation_deg": dict(vars(self.rotation_deg)),
             "translation_cm": dict(vars(self.translation_cm)),

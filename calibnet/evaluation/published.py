@@ -1,8 +1,7 @@
-"""Results that papers report of their own methods, to stand beside those measured here.
+"""Results that papers report of their own methods, to compare with those measured here.
 
-They were measured on other frames, mostly of the rig that was trained on.
-
-Only figures that were found in print are here. Translation is in centimetres, rotation in degrees; a mean unless said.
+They were measured on other frames, mostly of the rig that was trained on. Only figures that were found in print are
+here: means, unless the rig says otherwise.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ class Published:
     """A published result.
 
     Attributes:
-        range: of the miscalibrations, as far as it is said.
-        rotation_deg: error.
-        translation_cm: error.
-        rig: that it was measured on.
-        source: who says so, and where.
+        range: range of the miscalibrations, as far as the source gives it.
+        rotation_deg: rotation error in degrees.
+        translation_cm: translation error in centimetres.
+        rig: rig or frames that it was measured on.
+        source: publication with the result.
     """
 
     range: str
@@ -34,7 +33,7 @@ class Published:
     source: str
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that JSON files hold."""
+        """The content of JSON files."""
         return dict(vars(self))
 
 
@@ -74,11 +73,11 @@ class PublishedAblation(NamedTuple):
     """A row of the paper's ablation (its Table 3), on its machine and its own car's frames.
 
     Attributes:
-        parameters_m: millions.
-        flops_g: what the paper calls FLOPs, 1e9; its numbers are those of multiply-adds.
-        latency_ms: on its GPU.
-        translation_cm: error.
-        rotation_deg: error.
+        parameters_m: parameters in millions.
+        flops_g: FLOPs of the paper in 1e9; the numbers are those of multiply-adds.
+        latency_ms: latency on the paper's GPU.
+        translation_cm: translation error in centimetres.
+        rotation_deg: rotation error in degrees.
     """
 
     parameters_m: float
@@ -96,4 +95,4 @@ PUBLISHED_ABLATION = {
     "hybrid-loss": PublishedAblation(20.2, 77.4, 22.6, 0.997, 0.074),
     "full": PublishedAblation(20.5, 78.3, 23.3, 0.864, 0.068),
 }
-"""The rows of the paper by the names of `calibnet.training.ablations.ABLATIONS`."""
+"""The rows of the paper by the names in `calibnet.training.ablations.ABLATIONS`."""

@@ -1,8 +1,8 @@
-"""What a stage of another paper's cascade costs on the same machine: the measure that times of ours are held against.
+"""Times a stage of another paper's cascade on the same machine, to compare our times with.
 
-Milliseconds say as much of a machine, and of what else runs on it, as of a network. LCCNet's five networks
+Milliseconds depend on the machine, and on what else runs there, as much as on a network. LCCNet's five networks
 (`calibnet.methods.learned.lccnet`: two ResNet-18, 58 M parameters, 9.4 G multiply-adds) are the usual cascade of this
-field; one of its shape, with random weights, is timed in turn with ours, in the form that is fastest for it.
+field. One such network with random weights is timed in turn with ours, in its fastest form.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from calibnet.runtime.precision import fastest
 
 NAME = "lccnet"
 STAGES = 5
-"""Networks of its cascade."""
+"""Number of networks of its cascade."""
 RUNS = 3
-"""Runs that a precision is chosen by."""
+"""Number of runs by which the precision is chosen."""
 
 
 def reference_run(device: torch.device) -> Callable[[], float]:
-    """A function that runs one such network on one frame and returns the milliseconds that took."""
+    """A function that runs one such network on one frame and returns the milliseconds."""
     runs = [_timed(device, precision) for precision in {torch.float32, fastest(device)}]
     return min(runs, key=lambda run: min(run() for _ in range(RUNS)))
 
@@ -58,7 +58,7 @@ def _timed(device: torch.device, precision: torch.dtype) -> Callable[[], float]:
 
 
 def fold(network: nn.Module) -> None:
-    """Put every batch norm into the convolution before it, as that of `calibnet.network.convolution`, in place."""
+    """Fold every batch norm into the convolution before it, and make convolutions packable, in place."""
     for sequence in [module for module in network.modules() if isinstance(module, nn.Sequential)]:
         for position, (layer, norm) in enumerate(itertools.pairwise([*sequence, None])):
             if not isinstance(layer, nn.Conv2d):
@@ -71,7 +71,7 @@ def fold(network: nn.Module) -> None:
 
 
 def packable(layer: nn.Conv2d) -> Conv2d:
-    """The same convolution as one that can be packed."""
+    """The same convolution as one of `calibnet.network.convolution`, which can be packed."""
     sizes = (layer.in_channels, layer.out_channels, layer.kernel_size, layer.stride, layer.padding)
     same = Conv2d(*sizes, bias=layer.bias is not None)
     same.load_state_dict(layer.state_dict())

@@ -1,4 +1,4 @@
-"""Single frames: calibrate each from seeded miscalibrations and summarise the errors."""
+"""Measures single frames: calibrates each from seeded miscalibrations and summarises the errors."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Run:
     Attributes:
         sequence: name of the frame's sequence.
         frame: index of the frame in it.
-        repeat: which of the frame's miscalibrations, from 0.
+        repeat: number of the frame's miscalibration, from 0.
         initial: error before the first stage.
-        stages: error after each stage that ran, by stage number, whatever the verdict; empty when the frame could not
-            be calibrated.
-        applied: error of the result as it is applied: the initial one, where what was found is rejected.
-        verdict: accepted, rejected or cannot tell; empty where there is none.
-        squared_error: of the result by its stated covariance, see `calibnet.evaluation.coverage`; not a number without.
-        within: the tolerance that the verdict is certain of; None without.
+        stages: error after each stage that ran, by stage number, whatever the verdict; empty if the frame could not be
+            calibrated.
+        applied: error of the result that is applied, which is the initial extrinsic if the result is rejected.
+        verdict: accepted, rejected or cannot tell; empty without a verdict.
+        squared_error: normalised squared error, see `calibnet.evaluation.coverage`; NaN without a covariance.
+        within: the tolerance that the verdict is certain of; None if it is certain of none.
     """
 
     sequence: str
@@ -66,26 +66,26 @@ class Evaluation:
     """The measured errors, before the cascade and after each stage.
 
     Attributes:
-        sequences: names of what was measured on.
-        rig: its sensors; several are joined by a semicolon.
-        range: range the miscalibrations were drawn from.
-        repeats: miscalibrations a frame.
-        seed: of the miscalibrations.
+        sequences: names of the sequences.
+        rig: their sensors; those of several rigs are joined by semicolons.
+        range: range of the miscalibrations.
+        repeats: miscalibrations per frame.
+        seed: seed of the miscalibrations.
         frames: number of frames.
-        failed: runs in which a frame could not be calibrated; they count with their initial error.
+        failed: number of runs in which a frame could not be calibrated; they count with their initial error.
         initial: errors before the first stage.
         stages: errors after each stage that ran, coarse to fine.
-        runs: every single result.
-        drives: errors of the drives' extrinsics, each solved from all its frames; None where none was measured.
-        drives_networks: likewise of what the networks alone made of them, before edges were aligned.
-        drives_coverage: how their stated covariances compare with their errors; None where none is stated.
-        drives_verdicts: how many of them have each verdict.
-        drives_claims: how many are certain to be within the coarser tolerance of drives; None where none was measured.
-        references: errors of other methods on the same single frames, by name: no correction, a classical refinement.
-        audit: errors with altered frames, by name, see `calibnet.evaluation.audit`: of the results as applied.
-        audit_arrived: the same before the verdict, after the last stage.
-        audit_rejected: how many of those runs were rejected, by the same names.
-        audit_images: where the swapped images come from.
+        runs: the single runs.
+        drives: errors of drives, each solved from all its frames; None if none was measured.
+        drives_networks: errors of drives before edges were aligned; None if none were aligned.
+        drives_coverage: how the stated covariances of drives compare with their errors; None without covariances.
+        drives_verdicts: number of drives with each verdict.
+        drives_claims: how many drives are certain of the coarser tolerance; None if none was measured.
+        references: errors of other methods on the same single frames, by name, also without any correction.
+        audit: errors of the applied results on altered frames, by alteration, see `calibnet.evaluation.audit`.
+        audit_arrived: errors after the last stage, whatever the verdict, by alteration.
+        audit_rejected: number of rejected runs, by alteration.
+        audit_images: names of the sequences that the swapped images come from.
     """
 
     sequences: tuple[str, ...]
@@ -111,17 +111,17 @@ class Evaluation:
 
     @property
     def verdicts(self) -> dict[str, int]:
-        """How many runs have each verdict."""
+        """Number of runs with each verdict."""
         return {word: sum(run.verdict == word for run in self.runs) for word in WORDS}
 
     @property
     def claims(self) -> Claims:
-        """How many runs are certain to be within the coarser tolerance of frames."""
+        """How many runs are certain of the coarser tolerance of frames, and how many wrongly."""
         return Claims.of(FRAME_TOLERANCES[-1], [(run.within, run.applied) for run in self.runs])
 
     @property
     def accepted(self) -> Metrics | None:
-        """Errors of the accepted runs; None where there are none."""
+        """Errors of the accepted runs; None without accepted runs."""
         errors = [run.applied for run in self.runs if run.verdict == ACCEPTED]
         return Metrics.of(errors) if errors else None
 
@@ -132,12 +132,12 @@ class Evaluation:
 
     @property
     def coverage_accepted(self) -> Coverage | None:
-        """The same of the accepted ones."""
+        """How the stated covariances of accepted runs compare with their errors."""
         return Coverage.of(run.squared_error for run in self.runs if run.verdict == ACCEPTED)
 
     @property
     def applied(self) -> Metrics:
-        """Errors of the results as they are applied."""
+        """Errors of the applied results."""
         return Metrics.of([run.applied for run in self.runs])
 
     @property
@@ -146,7 +146,7 @@ class Evaluation:
         return self.stages[-1].metrics
 
     def as_dict(self) -> dict[str, Any]:
-        """The form that JSON files hold, without the single runs."""
+        """The content of JSON files, without the single runs."""
         content: dict[str, Any] = {
             "sequences": list(self.sequences),
             "rig": self.rig,
@@ -180,7 +180,7 @@ class Evaluation:
 
 
 def draw_miscalibration(range_: MiscalibrationRange, seed: int, frame: int, repeat: int) -> Transform:
-    """The ``delta`` of one run: whatever else is measured, and in which order, it stays the same."""
+    """The ``delta`` of one run, which does not depend on what else is measured or in which order."""
     return sample_miscalibration(range_, np.random.default_rng([seed, frame, repeat]))
 
 
@@ -195,16 +195,16 @@ def evaluate_frames(
     """Calibrate every frame of ``sequences`` from ``repeats`` miscalibrations each.
 
     Args:
-        calibrator: what to measure.
-        sequences: where the frames come from; their own extrinsics are the reference.
+        calibrator: the calibrator to measure.
+        sequences: sequences with the frames, whose extrinsics are the reference.
         range_: range of the miscalibrations.
-        repeats: miscalibrations a frame, at least 1.
-        seed: of the miscalibrations.
+        repeats: miscalibrations per frame, at least 1.
+        seed: seed of the miscalibrations.
         observer: called after every run.
 
     Raises:
-        DatasetError: when there is no frame to measure on, or one cannot be read.
-        CalibrationError: when not a single frame could be calibrated.
+        DatasetError: there is no frame to measure on, or one cannot be read.
+        CalibrationError: no frame could be calibrated.
     """
     runs: list[Run] = []
     ranges: dict[int, MiscalibrationRange] = {}

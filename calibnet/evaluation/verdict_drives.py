@@ -1,4 +1,4 @@
-"""Runs on drives to fit their verdict to: without a fault, with one fault in all frames, and with two mounts."""
+"""Runs to fit the verdict on drives to: without a fault, with one fault in all frames, or on two mounts."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from calibnet.judging.drive_predictors import drive_predictors
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
 MOST = 16
-"""Most frames of a drive."""
+"""Largest number of frames of a drive."""
 ENOUGH = 8
-"""Sequences of fewer frames are drawn in proportion to their length; all others equally often."""
+"""Sequences with fewer frames are drawn in proportion to their length, all others equally often."""
 VIRTUAL_SHARE = 0.5
 """Share of drives that are seen through a virtual rig, see `calibnet.evaluation.virtual`."""
 
 
 class DriveStream:
-    """The runs on some drives with a cascade, by number, as `calibnet.evaluation.verdict_runs.RunStream` has frames."""
+    """The runs of a cascade on some drives, by number; see `calibnet.evaluation.verdict_runs.RunStream`."""
 
     def __init__(self, cascade: Cascade, sequences: Iterable[FrameSequence], seed: int) -> None:
-        """A run is a part of one of these sequences, as it is or as a virtual rig has it.
+        """A run is a part of one of these sequences, as it is or seen by a virtual rig.
 
-        What is no drive, or has too few frames to be judged, is left out. Sequences of one name, the cameras of one
-        recording, count as one.
+        Sequences that are not drives or too short to be judged are left out. Sequences with the same name (cameras of
+        one recording) count as one.
         """
         self.cascade, self.seed = asking(cascade), seed
         self.sequences = [one for one in sequences if len(one) >= FEWEST_JUDGED and shares_mount(one)]
@@ -48,7 +48,7 @@ class DriveStream:
         self.odds = odds / odds.sum()
 
     def run(self, number: int) -> VerdictRun | None:
-        """The run of this number; None where it cannot be made."""
+        """The run with this number; None if it cannot be made."""
         generator = np.random.default_rng([self.seed, number, 1])
         if not self.sequences:
             return None

@@ -21,18 +21,18 @@ from calibnet.judging.covariance import CovarianceModel
 from calibnet.verdict import DRIVE_TOLERANCES, FRAME_TOLERANCES, Tolerance
 
 Ranges = tuple[MiscalibrationRange, MiscalibrationRange]
-"""The ranges of the last stage and of the first one, which is searched around the guess."""
+"""The range of the last stage, and that of the first, which is searched around the guess."""
 RIDGE = 6.0
 """Penalty of `calibnet.evaluation.logistic.regression`: 3 times the squared coefficients of the odds of being wrong."""
 FALSE_ACCEPTS, FALSE_ACCEPTS_OF_DRIVES = 0.005, 0.02
-"""Largest share of the runs that may be accepted and wrong, on sequences left out. One frame in a hundred is what the
-verdict promises; with half of that among some 600 runs it is kept with 95 % confidence. Drives are too few for this,
+"""Largest share of the runs that may be accepted and wrong, on sequences left out. The verdict promises at most one
+frame in a hundred; half of that among some 600 runs means this with 95 % confidence. There are too few drives for that,
 and most of them end near a limit."""
 CLEAR_FALSE_ACCEPTS = 0.01
 """The same for drives that do not end near a limit (`NEAR`), as a share of these."""
 CERTAIN = 0.5
-"""How much of these shares may be certain to be within the coarser tolerance though it is not: half of the runs have
-no fault, and what is certain shall hold where all have one."""
+"""Factor on these shares for runs that are wrongly certain of the coarser tolerance: half of the runs have no fault,
+but the promise should hold even if all input has one."""
 GOOD_REJECTED = 0.02
 """Share of the good results that may be rejected; the others that are not accepted are *cannot tell*."""
 LEAST_DEG = 1e-3
@@ -40,7 +40,8 @@ LEAST_DEG = 1e-3
 FEWEST, FEWEST_DRIVES = 10, 6
 """Fewest good and fewest wrong results of frames, and of drives, that are fitted."""
 NEAR = 1.25
-"""Errors between a limit divided by this and the limit times this are near it; no predictor tells 24 from 26 cm."""
+"""Errors between a limit divided by this and the limit times this are near it; no predictor distinguishes 24 from 26
+cm."""
 CURVE = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05)
 """Shares of false accepts at which the operating curve is given."""
 
@@ -76,7 +77,7 @@ class FitFigures:
     coarser: FitFigures | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """What the file of coefficients holds; without what is not known, for TOML has no null."""
+        """The content of the file of coefficients, without unknown figures, as TOML has no null."""
         content = asdict(replace(self, coarser=None))
         if self.coarser is not None:
             content["coarser"] = self.coarser.as_dict()
@@ -111,7 +112,7 @@ def fit_drives(runs: Sequence[VerdictRun]) -> tuple[Classifier, float, FitFigure
     clear, fewest = CLEAR_FALSE_ACCEPTS, FEWEST_DRIVES
     classifier, figures, _ = fit_classifier(runs, finest, FALSE_ACCEPTS_OF_DRIVES, fewest, clear)
     coarse, coarse_figures, kept = fit_classifier(graded(runs, coarser), coarser, CERTAIN * clear, fewest)
-    # only runs that are vouched for count: a few gross errors would inflate the covariance of all
+    # only accepted runs count: a few gross errors would inflate the covariance of all
     accepted = [run for run in kept if error_probability(run, coarse) < coarse.accepted_below]
     squares = [np.array(run.offset) @ np.array(run.information) @ np.array(run.offset) / 6 for run in accepted]
     nees = float(np.mean(squares)) if squares else float("nan")
@@ -247,7 +248,7 @@ def rounded(value: float) -> float:
 
 
 def probability(odds: float) -> float:
-    """The probability that belongs to log odds."""
+    """The probability for log odds."""
     return float(1 / (1 + np.exp(-np.clip(odds, -50, 50))))
 
 

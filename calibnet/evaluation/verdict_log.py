@@ -40,13 +40,13 @@ SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
 
 @dataclass(frozen=True)
 class Source:
-    """What a stream of runs is made of, in a form that can be passed to another process.
+    """The cascade and the data of a stream of runs, in a form that can be passed to another process.
 
     Attributes:
-        preset, weights, stages: of the cascade.
-        data: as `calibnet.training.data.open_data` takes them.
+        preset, weights, stages: the cascade.
+        data: texts that `calibnet.training.data.open_data` reads.
         synthetic: number of synthetic drives to add.
-        seed: of everything random.
+        seed: seed of all random numbers.
         kind: runs on single frames with any fault, on frames with faults of the lens, or on drives.
     """
 
@@ -62,8 +62,8 @@ class Source:
         """Open all data.
 
         Raises:
-            ConfigError: there is none.
-            DatasetError: some of it cannot be found.
+            ConfigError: there is no data.
+            DatasetError: some data cannot be found.
         """
         from calibnet.datasets.synthetic import SyntheticSequence
         from calibnet.training.data import open_data
@@ -75,7 +75,7 @@ class Source:
         return found
 
     def open(self) -> RunStream | DriveStream:
-        """The stream, its cascade loaded; one thread, as several processes share the cores."""
+        """Load the cascade and open the stream; with one thread, as several processes share the cores."""
         import torch
 
         from calibnet.cascade import Cascade
@@ -95,11 +95,11 @@ class RunLog:
     """A file of runs, one per line, with a key that says what they depend on; lines with other keys are ignored."""
 
     def __init__(self, path: Path, key: dict[str, Any]) -> None:
-        """Read what there is.
+        """Read the file, if it exists.
 
         Args:
-            path: of the file; it need not be there.
-            key: what the runs depend on besides their number.
+            path: path of the file.
+            key: everything that the runs depend on, except their number.
         """
         self.path, self.key = path, json.dumps(key, sort_keys=True)
         self.known: dict[int, VerdictRun | None] = {}

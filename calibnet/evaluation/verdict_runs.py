@@ -49,9 +49,9 @@ class VerdictRun:
         fault, strength: the fault that was applied, see `calibnet.evaluation.corruptions`.
         rotation_deg, translation_cm: error of the result.
         good: whether the error is within the limits.
-        predictors: by name; None if the verdict needs none, for instance because picture and scan do not fit.
+        predictors: by name; None if the verdict needs none, for instance because image and scan do not fit.
         offset: error of the result as ``(translation m, rotation rad)`` in the camera frame.
-        information: ``[6, 6]`` that the last stage, or the drive, states; None without one.
+        information: ``[6, 6]`` of the last stage, or of the drive; None without one.
         match_error_px: match error that the last stage expects; NaN for a drive.
     """
 
@@ -92,21 +92,21 @@ class Drawn:
 
 
 class RunStream:
-    """The runs on some sequences with a cascade, by number."""
+    """The runs of a cascade on some sequences, by number."""
 
     def __init__(self, cascade: Cascade, sequences: Sequence[FrameSequence], seed: int) -> None:
-        """A run is a random frame of a random sequence, every sequence as often as the others.
+        """A run is a random frame of a random sequence; all sequences are equally probable.
 
         Args:
-            cascade: what calibrates; its verdict is set to accept whatever its predictors would be asked for.
-            sequences: at least one; other pictures come from another one of them.
-            seed: of everything random.
+            cascade: the cascade; its verdict is replaced as in `asking`.
+            sequences: at least one; images of other places come from other sequences.
+            seed: seed of all random numbers.
         """
         self.cascade, self.sequences, self.seed = asking(cascade), list(sequences), seed
         self.read = lru_cache(KEPT)(lambda sequence, position: self.sequences[sequence][position])
 
     def run(self, number: int) -> VerdictRun | None:
-        """The run of this number; None where its frame cannot be read or has too few points in the picture."""
+        """The run with this number; None if its frame cannot be read or has too few points in the image."""
         try:
             return measured(self.cascade, self.drawn(number), number, self.told)
         except CalibnetError:
@@ -154,13 +154,13 @@ def measured(
     """Calibrate a frame, and compute the error and the predictors of the result.
 
     Args:
-        cascade: what calibrates.
-        drawn: what it starts with.
-        number: in the stream.
-        told: what predictors say of the run.
+        cascade: the cascade.
+        drawn: the input of the run.
+        number: number of the run in the stream.
+        told: computes the predictors from the trace.
 
     Raises:
-        CalibrationError: too few points fall into the picture.
+        CalibrationError: too few points fall into the image.
     """
     upright = Upright.of(drawn.guess, cascade.stages[0].range)
     frame, start = prepared(drawn.frame, upright), upright.extrinsic(drawn.guess)
@@ -184,7 +184,7 @@ def measured(
 
 
 def asking(cascade: Cascade) -> Cascade:
-    """The cascade with a verdict that accepts whatever its predictors would be asked for."""
+    """The cascade with a verdict that accepts every result for which it needs the classifier's predictors."""
     everything = Classifier(0.0, {}, accepted_below=1.0, rejected_above=1.0)
     finest = cascade.stages[-1].range
     return cascade.with_coefficients(Coefficients(everything, drive=everything, weights={finest: ""}, missing=""))

@@ -1,7 +1,7 @@
-"""Virtual rigs: the frames of a sequence as another camera, turned another way, and another scanner would have them.
+"""Virtual rigs: the frames of a sequence as seen by a rotated camera with another lens, and by another scanner.
 
-A figure on one rig says little of other rigs, and there are few. The picture is turned about the camera's centre and
-cut to a narrower lens, which moves no parallax and is exact, and half of the rigs have half of the rings.
+Figures on one rig say little about other rigs, of which there are few. The image is rotated about the camera's centre
+and cropped to a narrower lens, which is exact as it causes no parallax. Half of the rigs have half of the rings.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from calibnet.evaluation.faults import thinned
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz, transform
 
 NARROWEST = 1.6
-"""Largest factor on the focal length; a wider lens would show what the picture does not have."""
+"""Largest factor on the focal length; the smallest is 1, as the image does not have more than the lens saw."""
 OFF_CENTRE = 0.1
-"""Share of the picture by which the part that is kept may lie beside its middle."""
+"""Largest offset of the crop from the middle, as a share of the image."""
 MOST_PITCH_DEG, MOST_YAW_DEG, MOST_ROLL_DEG = 4.0, 10.0, 5.0
 """Largest angles by which the camera is turned, either way."""
 RESIZED = (0.6, 1.2)
-"""Pixels of the virtual camera, relative to those of the part that it shows."""
+"""Smallest and largest width of the virtual camera's image, relative to that of the crop."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class VirtualRig:
     """Another camera and scanner in the place of the real ones.
 
     Attributes:
-        zoom: times the focal length, by cropping.
-        beside: shares of the picture (right, down) by which the cut lies beside the middle.
-        turn_deg: pitch, yaw and roll of the camera against the real one.
-        resized: pixels, relative to those that are left.
-        thinned: every second ring alone.
+        zoom: factor on the focal length, by cropping.
+        beside: offset (right, down) of the crop from the middle, as shares of the image.
+        turn_deg: pitch, yaw and roll of the camera relative to the real one.
+        resized: width of the image relative to that of the crop.
+        thinned: whether only every second ring is kept.
     """
 
     zoom: float
@@ -48,7 +48,7 @@ class VirtualRig:
 
     @classmethod
     def drawn(cls, seed: int, number: int) -> VirtualRig:
-        """The rig of a number; every second one is thinned."""
+        """Draw the rig with a number; every second rig is thinned."""
         generator = np.random.default_rng([seed, number])
         right, down = generator.uniform(-OFF_CENTRE, OFF_CENTRE, 2)
         pitch, yaw, roll = generator.uniform(-1, 1, 3) * (MOST_PITCH_DEG, MOST_YAW_DEG, MOST_ROLL_DEG)
@@ -57,7 +57,7 @@ class VirtualRig:
         return cls(float(zoom), (float(right), float(down)), turn, float(size), number % 2 == 1)
 
     def __call__(self, frame: Frame) -> Frame:
-        """A frame as this rig has it; its extrinsic is still the truth."""
+        """A frame as seen by this rig; its extrinsic is still the truth."""
         rotation = rotation_from_euler_xyz(np.radians(self.turn_deg))
         image, camera = turned(frame.image, frame.camera, rotation)
         width, height = round(camera.width / self.zoom), round(camera.height / self.zoom)
@@ -81,10 +81,10 @@ class VirtualRig:
 
 
 class Virtual:
-    """A sequence as a virtual rig has it."""
+    """A sequence as seen by a virtual rig."""
 
     def __init__(self, sequence: FrameSequence, number: int, seed: int) -> None:
-        """The rig of a number, the same for all frames."""
+        """See all frames of ``sequence`` by the rig with this number."""
         self.sequence, self.virtual = sequence, VirtualRig.drawn(seed, number)
         self.name = f"{sequence.name}, virtual rig {number}"
         thinner = ", half the rings" if self.virtual.thinned else ""
@@ -102,7 +102,7 @@ class Virtual:
 
 
 def virtual_rigs(sequences: list[FrameSequence], count: int, seed: int) -> list[FrameSequence]:
-    """So many virtual rigs of every sequence."""
+    """Every sequence as seen by ``count`` virtual rigs."""
     return [
         Virtual(sequence, count * position + number, seed)
         for position, sequence in enumerate(sequences)

@@ -1,4 +1,4 @@
-"""What can be wrong with input that can still be read: each fault as a function of a frame."""
+"""Faults of input that can still be read, each as a function of a frame."""
 
 from calibnet.evaluation.faults.alteration import NATIVE_WIDTH, Alteration, unaltered
 from calibnet.evaluation.faults.camera import distorted, equidistant, focal, matrix_of_size, principal

@@ -1,4 +1,4 @@
-"""What all faults have in common."""
+"""The type of all faults, and the unit of their strengths."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from calibnet.datasets.frame import Frame
 
 NATIVE_WIDTH = 1242
-"""Width of the picture whose pixels strengths are given in; in another one, as many of its own in proportion."""
+"""Image width to which strengths in pixels refer ("native pixels"); they scale with the width of an image."""
 
 Alteration = Callable[[Frame], Frame]
 """Puts a fault into a frame."""

@@ -1,4 +1,4 @@
-"""Faults of what is said of the camera."""
+"""Faults of the camera's intrinsics."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from calibnet.geometry import PinholeCamera
 
 
 def with_matrix(frame: Frame, change: NDArray[np.float64]) -> Frame:
-    """The frame whose camera is said to have the matrix ``change @ matrix``."""
+    """The frame with the camera matrix ``change @ matrix``."""
     camera = frame.camera
     return replace(frame, camera=PinholeCamera(camera.width, camera.height, change @ camera.matrix))
 
 
 def focal(factor: float) -> Alteration:
-    """Say that the focal length is so many times the true one."""
+    """Multiply the focal length by ``factor``; the image stays."""
 
     def alter(frame: Frame) -> Frame:
         matrix = frame.camera.matrix.copy()
@@ -32,7 +32,7 @@ def focal(factor: float) -> Alteration:
 
 
 def principal(right: float, down: float) -> Alteration:
-    """Say that the principal point lies so many native pixels from the true one."""
+    """Move the principal point by this many native pixels; the image stays."""
 
     def alter(frame: Frame) -> Frame:
         scale = frame.camera.width / NATIVE_WIDTH
@@ -42,7 +42,7 @@ def principal(right: float, down: float) -> Alteration:
 
 
 def matrix_of_size(factor: float) -> Alteration:
-    """Give the matrix of the picture resized by a factor."""
+    """Give the camera matrix of the image resized by a factor."""
 
     def alter(frame: Frame) -> Frame:
         width, height = round(factor * frame.camera.width), round(factor * frame.camera.height)
@@ -53,7 +53,7 @@ def matrix_of_size(factor: float) -> Alteration:
 
 
 def distorted(k1: float) -> Alteration:
-    """The picture of a lens of this radial distortion, not undone."""
+    """The image of a lens with this radial distortion, not rectified."""
 
     def alter(frame: Frame) -> Frame:
         return relensed(frame, lambda radius: radius * (1 + k1 * radius**2))
@@ -62,18 +62,18 @@ def distorted(k1: float) -> Alteration:
 
 
 def equidistant(frame: Frame) -> Frame:
-    """The picture of a fisheye lens, whose small coefficients were taken for those of an ordinary one."""
+    """The image of a fisheye lens (equidistant projection), treated as that of a pinhole."""
     return relensed(frame, np.arctan)
 
 
 def relensed(frame: Frame, bend: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Frame:
-    """The picture of a lens that shows at ``bend(r)`` what a pinhole shows at ``r`` (tangents of angles, [N]).
+    """The image of a lens that shows at ``bend(r)`` what a pinhole shows at ``r`` (tangents of angles, ``[N]``).
 
-    Cut to the rectangle that it fills, as a user's picture is full; the matrix goes along.
+    It is cropped to the largest rectangle without black borders, and the camera matrix accordingly.
     """
     camera = frame.camera
     (fx, fy), (cx, cy) = camera.focal, camera.center
-    # the inverse by a table, as far as the lens is one to one
+    # a table of the inverse, as far as the lens is invertible
     pinhole = np.linspace(0.0, 3.0, 3001)
     seen = bend(pinhole)
     rising = int(np.argmax(np.diff(seen) <= 0)) or len(seen)

@@ -1,4 +1,4 @@
-"""Faults of what the picture shows."""
+"""Faults of the image."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from calibnet.geometry import rotation_from_euler_xyz, transform
 
 
 def grey(frame: Frame) -> Frame:
-    """Nothing to see."""
+    """The frame with a uniformly grey image."""
     return replace(frame, image=np.full_like(frame.image, 128))
 
 
 def picture_of(donor: Frame) -> Alteration:
-    """The picture of another frame, fitted to the size."""
+    """The image of another frame, resized to fit."""
     return lambda frame: replace(frame, image=resize_image(donor.image, frame.camera))
 
 
 def blurred(pixels: float) -> Alteration:
-    """Blur the picture by a Gaussian of so many native pixels."""
+    """Blur the image by a Gaussian with a standard deviation in native pixels."""
 
     def alter(frame: Frame) -> Frame:
         sigma = pixels * frame.camera.width / NATIVE_WIDTH
@@ -34,17 +34,17 @@ def blurred(pixels: float) -> Alteration:
 
 
 def exposed(gain: float) -> Alteration:
-    """Expose the picture so many times as long; what is too bright is white."""
+    """Multiply the exposure of the image by ``gain``; values beyond white are clipped."""
     return lambda frame: replace(frame, image=np.minimum(frame.image * np.float32(gain), 255).astype(np.uint8))
 
 
 def mirrored(frame: Frame) -> Frame:
-    """Left and right of the picture exchanged."""
+    """Mirror the image, left to right."""
     return replace(frame, image=np.ascontiguousarray(frame.image[:, ::-1]))
 
 
 def rolled(degrees: float) -> Alteration:
-    """Turn the picture clockwise about the principal point, and the true camera with it."""
+    """Rotate the image clockwise about the principal point, and the true extrinsic with it."""
 
     def alter(frame: Frame) -> Frame:
         turn = rotation_from_euler_xyz([0.0, 0.0, np.radians(degrees)])
@@ -57,7 +57,7 @@ def rolled(degrees: float) -> Alteration:
 
 
 def shifted(right: float, down: float) -> Alteration:
-    """Move what the picture shows by so many native pixels."""
+    """Shift the image by this many native pixels."""
 
     def alter(frame: Frame) -> Frame:
         size, scale = (frame.camera.width, frame.camera.height), frame.camera.width / NATIVE_WIDTH
@@ -68,12 +68,12 @@ def shifted(right: float, down: float) -> Alteration:
 
 
 def high_byte(bits: int) -> Alteration:
-    """A picture of so many bits, stored in 16, of which the high byte is read: almost black."""
+    """The high byte of an image of this many bits stored in 16, which is almost black."""
     return lambda frame: replace(frame, image=frame.image >> np.uint8(16 - bits))
 
 
 def low_byte(bits: int) -> Alteration:
-    """A picture of so many bits of which the low byte is read: brightness goes round and round."""
+    """The low byte of an image of this many bits, in which brightness wraps around."""
 
     def alter(frame: Frame) -> Frame:
         steps = 1 << (bits - 8)

@@ -16,22 +16,22 @@ from calibnet.geometry import invert, rotation_from_euler_xyz, transform, transf
 from calibnet.geometry.types import Transform
 
 BAND_DEG = 0.4
-"""Degrees of elevation that are kept or dropped together when a scan is thinned: about a ring of 64."""
+"""Height of the bands of elevation that are kept or dropped when a scan is thinned: about one ring of 64."""
 AXES = {
     "x right, y forward, z up": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     "x right, y down, z forward": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
     "x backward, y right, z up": np.diag([-1.0, -1.0, 1.0]),
 }
-"""Axes in which other software gives scans, and the rotation of a scan (x forward, y left, z up) into them."""
+"""Axes of other software, and the rotations that give a scan (x forward, y left, z up) these axes."""
 
 
 def with_positions(frame: Frame, positions: NDArray[np.floating]) -> Frame:
-    """The frame with its points elsewhere, ``[N, 3]``."""
+    """The frame with its points moved to ``positions``, ``[N, 3]``."""
     return replace(frame, points=np.column_stack([positions, frame.points[:, 3]]).astype(np.float32))
 
 
 def thinned(share: int) -> Alteration:
-    """Keep one band of elevation of so many, as a scanner with fewer beams would."""
+    """Keep one of ``share`` bands of elevation, as a scanner with fewer beams would."""
 
     def alter(frame: Frame) -> Frame:
         elevation = np.degrees(np.arctan2(frame.points[:, 2], np.hypot(frame.points[:, 0], frame.points[:, 1])))
@@ -41,7 +41,7 @@ def thinned(share: int) -> Alteration:
 
 
 def remounted(degrees: float, metres: float) -> Alteration:
-    """The LiDAR turned about its upward axis and moved ahead, and the truth with it."""
+    """Rotate the LiDAR about its upward axis and move it forward, and the true extrinsic with it."""
     delta = transform(rotation_from_euler_xyz([0.0, 0.0, np.radians(degrees)]), np.array([metres, 0.0, 0.0]))
 
     def alter(frame: Frame) -> Frame:
@@ -52,13 +52,13 @@ def remounted(degrees: float, metres: float) -> Alteration:
 
 
 def half_missing(frame: Frame) -> Frame:
-    """No point in the left half of what the camera sees."""
+    """The frame without the points left of the camera's axis."""
     across = transform_points(frame.camera_from_lidar, frame.points[:, :3])[:, 0]
     return replace(frame, points=frame.points[across > 0])
 
 
 def noisy(metres: float) -> Alteration:
-    """Points nearer or farther by a Gaussian of so many metres."""
+    """Add Gaussian noise with this standard deviation to the range of each point."""
 
     def alter(frame: Frame) -> Frame:
         positions = frame.points[:, :3].astype(np.float64)
@@ -80,7 +80,7 @@ def turned(rotation: NDArray[np.float64]) -> Alteration:
 
 
 def flipped(axis: int) -> Alteration:
-    """The scan with one axis the other way round, so that its axes are left-handed."""
+    """The scan with one axis reversed, so that its axes are left-handed."""
     sign = np.where(np.arange(3) == axis, -1.0, 1.0)
     return lambda frame: with_positions(frame, frame.points[:, :3] * sign)
 
@@ -95,19 +95,19 @@ def reflecting(change: Callable[[NDArray[np.float32]], NDArray[np.float32]]) -> 
 
 
 def glint(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Intensities scaled to one reflection that is 200 times as bright."""
+    """Intensities scaled to a single reflection that is 200 times as bright."""
     faint = values / np.float32(200)
     faint[:1] = 1.0
     return faint
 
 
 def scan_at(sequence: FrameSequence, position: int) -> Alteration:
-    """The scan of another moment of the same drive."""
+    """The scan of another frame of the same drive."""
     return lambda frame: replace(frame, points=sequence[position].points)
 
 
 def accumulated(sequence: SyntheticSequence, position: int, count: int) -> Alteration:
-    """So many scans around a position, put together by where the car was."""
+    """Join ``count`` scans around a position by the motion of the car."""
     first = min(max(0, position - count // 2), len(sequence) - count)
 
     def world_from_lidar(at: int) -> Transform:
