@@ -1,4 +1,4 @@
-"""Other methods than the cascade, behind the interface `calibnet.calibrator`: one module or package each.
+"""Methods to compare the cascade with, one module or package each, with the interface of `calibnet.calibrator`.
 
-`registry` knows them by name. The cascade, ours, is `calibnet.cascade`.
+`registry` has them by name. The cascade itself is `calibnet.cascade`.
 """

@@ -1,4 +1,4 @@
-"""What a method costs and what it was trained on, as tables of methods state it."""
+"""The card of a method: its cost and its training data, for tables of methods."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 _FOLDER = "folder/"
-"""Records of weights that were trained on packed frames name a rig by its sequence; a folder's begins with this."""
+"""Prefix of a folder's sequence: records of weights trained on packed frames name rigs by their sequences."""
 _AS_DATASETS_SAY = {
     "kitti-object/train": "KITTI object detection",
     "folder/kitti360-image00": "KITTI-360, camera 0",
@@ -18,18 +18,18 @@ _AS_DATASETS_SAY = {
     "folder/nuscenes-n015a-back-left": "nuScenes, CAM_BACK_LEFT",
     "folder/nuscenes-n015a-back-right": "nuScenes, CAM_BACK_RIGHT",
 }
-"""What such records name, and the rig as the dataset names it that these frames are from."""
+"""Rigs by the sequences in such records, as the datasets of these frames name them."""
 
 
 @dataclass(frozen=True)
 class MethodCard:
-    """What a method costs and what it was trained on, for tables.
+    """The cost of a method, and what it was trained on.
 
     Attributes:
-        parameters: of its networks, of all stages that run; 0 without networks.
-        multiply_adds: of its networks for one frame, likewise.
-        samples_trained: that its networks have seen, all stages together.
-        trained_on: the rigs of these, `Sequence.rig`, with or without the camera: ``("KITTI 2011_09_26",)``.
+        parameters: number of parameters of the networks of all stages that run; 0 without networks.
+        multiply_adds: multiply-adds of these networks for one frame.
+        samples_trained: number of samples that all stages together were trained on.
+        trained_on: rigs of these samples (`Sequence.rig`), with or without the camera: ``("KITTI 2011_09_26",)``.
     """
 
     parameters: int = 0
@@ -42,9 +42,9 @@ class MethodCard:
         """The card of trained networks.
 
         Args:
-            parameters: of all networks together.
-            multiply_adds: of all networks together, for one frame.
-            records: training records of the networks, as `calibnet.weights.read_record` reads them.
+            parameters: parameters of all networks together.
+            multiply_adds: multiply-adds of all networks together, for one frame.
+            records: training records of the networks, see `calibnet.weights.read_record`.
         """
         records = list(records)
         rigs = (rig for record in records for said in record.get("rigs", ()) for rig in _rigs(said))
@@ -52,12 +52,12 @@ class MethodCard:
         return cls(parameters, multiply_adds, samples, tuple(dict.fromkeys(rigs)))
 
     def knows(self, rig: str) -> bool:
-        """Whether it was trained on a rig, `Sequence.rig`; a record may leave the camera out."""
+        """Whether the method was trained on a rig (`Sequence.rig`); records may leave out the camera."""
         return any(rig == known or rig.startswith(f"{known}, ") for known in self.trained_on)
 
 
 def _rigs(said: str) -> list[str]:
-    """The names that datasets give to a rig of a record: of a folder its own, and that of the dataset it is from."""
+    """The names of a rig in a record: for a folder, its own name and that of the dataset it was made from."""
     folder, dataset = said.removeprefix(_FOLDER), _AS_DATASETS_SAY.get(said)
     if dataset is None:
         return [folder]
@@ -66,14 +66,14 @@ def _rigs(said: str) -> list[str]:
 
 @runtime_checkable
 class Described(Protocol):
-    """A method that says what it costs; one that does not is taken to have no networks."""
+    """A method with a card; one without is taken to have no networks."""
 
     @property
     def card(self) -> MethodCard:
-        """Its costs."""
+        """The card of this method."""
         ...
 
 
 def card_of(calibrator: object) -> MethodCard:
-    """What a method costs."""
+    """The card of a method; an empty one if it has none."""
     return calibrator.card if isinstance(calibrator, Described) else MethodCard()

@@ -1,6 +1,6 @@
-"""A classical refinement without training, to hold the networks against: `calibnet.alignment` on single frames.
+"""A classical refinement without training, to compare the networks with: `calibnet.alignment` on single frames.
 
-It starts where networks would, which is mostly farther than edges pull: that is what networks are for.
+It starts from the same guesses as the networks, most of which are farther off than edges can correct.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class EdgeAlignment:
     """A `Calibrator` without weights."""
 
     def __init__(self, range_: MiscalibrationRange) -> None:
-        """Expect miscalibrations within ``range_``; farther ones are held back by it."""
+        """Expect miscalibrations within ``range_``, which is the prior of the correction."""
         self.range = range_
         self.covariance = np.diag(1 / np.diag(range_.information))
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """Refine ``initial`` on one frame; it stays as it is where nothing in the frame tells."""
+        """Refine ``initial`` on one frame; it stays as it is if the frame has no evidence."""
         clock = Clock(torch.device("cpu"))
         evidence = gather(frame, initial)
         clock("evidence")
@@ -44,7 +44,7 @@ class EdgeAlignment:
 
 
 def exhibits(frame: Frame) -> tuple[Exhibit, ...]:
-    """The edges of the picture that those of the scan are drawn to."""
+    """The edges of the image that edges of the scan are aligned to."""
     camera = picture_camera(frame.camera)
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
     across, any_way = picture_edges(grey, camera)

@@ -1,9 +1,8 @@
-"""Information distance, after Koide et al., "General, single-shot, target-less" (2023): reflectance against brightness.
+"""Information distance of reflectance and brightness, after Koide et al., "General, single-shot, target-less" (2023).
 
-Where scan and picture fit, the reflectance of a point and the brightness of its pixel tell most of each other. The
-normalised information distance of the two is made small from several starts around the guess, of which the best is
-taken. Theirs matches learned features for a guess and then descends once; the guess is given here, and farther off than
-descending reaches, so that the starts are ours.
+Reflectance and brightness depend on each other most where scan and image fit. Their normalised information distance is
+minimised from several starts around the guess, and the best result is taken. The paper gets its guess from matched
+features, close enough for a single descent; here the guess is given and farther off, so the several starts are ours.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from calibnet.runtime.clock import Clock
 from calibnet.trace import CascadeTrace, StageTrace
 
 STARTS = 20
-"""From where it descends: the guess, and places drawn around it."""
+"""Number of starts: the guess, and random poses around it."""
 SEED = 0
 
 
@@ -38,10 +37,10 @@ class InformationDistance:
         self.covariance = np.diag(1 / np.diag(range_.information))
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """Descend from all starts.
+        """Minimise the distance from all starts.
 
         Raises:
-            CalibrationError: the scan has no reflectance, or too few of its points are in the picture.
+            CalibrationError: the scan has no reflectance, or too few of its points are in the image.
         """
         clock = Clock(torch.device("cpu"))
         terms = [term for term in gather(frame, initial).terms if isinstance(term, Reflectance)]

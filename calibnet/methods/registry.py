@@ -1,7 +1,7 @@
-"""The methods by name; those of other packages register as ``calib_inspect.methods``.
+"""Registry of the methods by name; other packages register theirs as ``calib_inspect.methods``.
 
-A method is a class that is called with the `MiscalibrationRange` to expect and is a `Calibrator`; what else it can be
-told it names as keywords: ``weights`` and ``masks``, folders, and ``intrinsics``.
+A method is a `Calibrator` class that is called with the `MiscalibrationRange` to expect. Its options are keywords:
+``weights`` and ``masks``, which are folders, and ``intrinsics``.
 `calibnet.conformance.check_method` tests one.
 """
 
@@ -16,7 +16,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.runtime.plugins import Registry
 
 CASCADE = "cascade"
-"""Name of our own, which is opened by `calibnet.cascade.Cascade.load`."""
+"""Name of the cascade, which `calibnet.cascade.Cascade.load` opens."""
 METHODS = Registry(
     "methods",
     "method",
@@ -38,12 +38,12 @@ def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calib
 
     Args:
         name: one of ``METHODS.names()``.
-        range_: of the miscalibrations to expect.
-        **options: what else it is told; those that are None or False are not passed on.
+        range_: range of the miscalibrations to expect.
+        **options: its options; those that are None or False are not passed on.
 
     Raises:
         ConfigError: there is no such method, its package is broken, or it has no such option.
-        WeightsError: it needs weights that are not there.
+        WeightsError: it needs weights that do not exist.
     """
     maker = METHODS.load(name)
     asked = {option: value for option, value in options.items() if value is not None and value is not False}
@@ -59,6 +59,6 @@ def open_method(name: str, range_: MiscalibrationRange, **options: Any) -> Calib
 
 
 def accepts(maker: Any, option: str) -> bool:
-    """Whether a method can be told something."""
+    """Whether a method has an option."""
     parameters = inspect.signature(maker).parameters
     return option in parameters or any(one.kind is one.VAR_KEYWORD for one in parameters.values())

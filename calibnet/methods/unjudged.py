@@ -1,7 +1,7 @@
-"""A method under its name, for whoever shows or stores results: nothing it finds is accepted.
+"""Wraps another method so that its traces have its name, and none of its results is accepted.
 
-A verdict is fitted to what one method leaves wrong, and that was done for the cascade alone. So whatever another method
-says of itself, it cannot be told whether its result is good; only that it is bad is believed.
+A verdict is fitted to the errors of one method, so far only to those of the cascade. So whatever another method says of
+its result, the verdict is *cannot tell*; only its own rejections are kept.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from calibnet.verdict import CANNOT_TELL, REJECTED, Verdict, moved
 
 
 def unjudged(name: str, calibrator: Calibrator) -> Calibrator:
-    """The same method with its name in every trace, and with the verdict that nobody can tell."""
+    """The same method with its name in every trace, and with the verdict *cannot tell* on its results."""
     return UnjudgedDrive(name, calibrator) if isinstance(calibrator, DriveCalibrator) else Unjudged(name, calibrator)
 
 
@@ -26,7 +26,7 @@ class Unjudged:
     """A method for single frames, see `unjudged`."""
 
     def __init__(self, name: str, calibrator: Calibrator) -> None:
-        """Put ``name`` on what ``calibrator`` finds."""
+        """Wrap ``calibrator`` under a ``name``."""
         self.name, self.calibrator = name, calibrator
 
     @property

@@ -1,4 +1,4 @@
-"""What is known of every point of a scan by itself: its reflectance, its normal and the segment it belongs to."""
+"""Computes the attributes of the points of a scan: reflectance, normal and segment."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ if TYPE_CHECKING:
     from open3d.geometry import PointCloud
 
 MOST_POINTS = 9000
-"""Points that are searched with, evenly from the scan: each look at a pose reads all of them."""
+"""Largest number of points, evenly from the scan; the score of every pose reads all of them."""
 NEIGHBOURS = 20
-"""Points that a normal is fitted to."""
+"""Number of points that a normal is fitted to."""
 PLANES, PLANE_M, PLANE_SHARE = 3, 0.15, 0.08
-"""Most planes that are cut out (the ground, walls), how far off them their points may be, and the share of the scan
-that has to lie on one."""
+"""Largest number of planes to extract (ground, walls), largest distance of their points, and the smallest share of the
+scan on a plane."""
 CLUSTER_M, PIECE_M, CLUSTER_FEWEST = 0.8, 1.6, 8
-"""Largest distance of neighbours in a cluster, and in a piece of a plane; the fewest points of a cluster."""
+"""Largest distance of neighbours in a cluster, and in a piece of a plane; fewest points of a cluster."""
 
 
 @dataclass(frozen=True, eq=False)
 class Attributes:
-    """Points with what is known of each.
+    """Points with their attributes.
 
     Attributes:
         points: ``[N, 3]`` float32, metres, in the LiDAR frame.
-        reflectance: ``[N]``, the share of points with less of it, 0..1: every scanner has a scale of its own.
+        reflectance: ``[N]``, rank 0..1 among all points, as every scanner has its own scale.
         normals: ``[N, 3]``, of unit length, towards the scanner.
-        segments: ``[N]``, from 0; points of no segment have one of their own together.
+        segments: ``[N]``, number of the segment from 1; 0 for points in none.
     """
 
     points: NDArray[np.float32] = field(repr=False)
@@ -42,15 +42,15 @@ class Attributes:
     segments: NDArray[np.int64] = field(repr=False)
 
     def only(self, rows: NDArray[np.int64]) -> Attributes:
-        """Some of them."""
+        """The points in some rows."""
         return Attributes(self.points[rows], self.reflectance[rows], self.normals[rows], self.segments[rows])
 
 
 def attributes(scan: NDArray[np.float32], seed: int = 0) -> Attributes:
     """The attributes of the points of a scan ``[N, 4]``.
 
-    The paper cuts planes out of the scan and clusters what is left; so does this. With the fewer points that are
-    searched with, clusters are wide.
+    As in the paper, planes are extracted first and the remaining points are clustered. Clusters are wide here, as fewer
+    points are used.
     """
     import open3d as o3d
 
@@ -63,7 +63,7 @@ def attributes(scan: NDArray[np.float32], seed: int = 0) -> Attributes:
 
 
 def _segments(cloud: PointCloud) -> NDArray[np.int64]:
-    """Planes first, each in its connected pieces, then clusters of what is left."""
+    """Segments: the connected pieces of every plane, then clusters of the remaining points."""
     total = len(cloud.points)
     segments, left = np.zeros(total, np.int64), np.arange(total)
 

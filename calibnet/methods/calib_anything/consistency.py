@@ -1,4 +1,4 @@
-"""How alike points are that fall into one mask of the picture: the score of the paper, for one extrinsic."""
+"""Scores how alike the points are that fall into the same mask of the image, for one extrinsic (the paper's score)."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from calibnet.methods.calib_anything.masks import Labels
 Rows = NDArray[np.int64]
 NEAREST_M = 0.5
 FEWEST = 5
-"""Points in a mask below which it tells nothing."""
+"""Fewest points in a mask that counts."""
 FEWEST_POINTS = 200
-"""Fewest points in the picture at the guess."""
+"""Fewest points in the image at the guess."""
 WEIGHTS = {"reflectance": 0.35, "normals": 0.3, "segments": 0.35}
-"""Weights of the three attributes in a mask's score. The paper leaves them open: reflectance and segments change at the
-edges of things, normals also within them."""
+"""Weights of the three attributes in the score of a mask. The paper does not give them. Reflectance and segments change
+at the edges of objects, normals also within them."""
 
 
 class Consistency:
-    """The score of extrinsics on one frame: 0 where points are as alike as any, 1 where all of every mask are alike.
+    """The score of extrinsics on one frame: 0 if points in a mask are no more alike than any, 1 if they are equal.
 
-    It is the mean over the points that are in the picture at the guess, whatever becomes of them: one that leaves the
-    picture, or falls into a mask with hardly any other, counts 0. The paper takes the mean over masks; but turned away
-    from what is hard, a camera sees nothing but road, all of it alike.
+    It is the mean over the points that are in the image at the guess; points that leave the image or fall into a mask
+    with few others count 0. The paper takes the mean over masks, but that is largest for a camera turned towards
+    nothing but road, whose points are all alike.
     """
 
     def __init__(self, labels: Labels, camera: PinholeCamera, scan: Attributes, guess: Extrinsic) -> None:
-        """Score ``scan`` in the masks ``labels`` of ``camera``'s picture, around a guess, ``camera_from_lidar``.
+        """Score ``scan`` in the masks ``labels`` of ``camera``'s image, around a guess, ``camera_from_lidar``.
 
         Raises:
-            CalibrationError: too few points are in the picture there.
+            CalibrationError: too few points are in the image at the guess.
         """
         self.labels, self.camera = labels, camera
         self.masks, self.segments = int(labels.max()) + 1, int(scan.segments.max()) + 1
@@ -62,7 +62,7 @@ class Consistency:
         return float(scores[told] @ counts[told]) / len(self.scan.points)
 
     def of_masks(self, camera_from_lidar: Extrinsic) -> tuple[Floats, Floats]:
-        """The score of every mask, and how many points fall into it."""
+        """The score of every mask, and the number of points in it."""
         seen, pixels = self._inside(camera_from_lidar)
         mask = self.labels[pixels[1], pixels[0]]
         seen, mask = seen[mask >= 0], mask[mask >= 0]
@@ -74,7 +74,7 @@ class Consistency:
         return total / sum(self.weights.values()), np.bincount(mask, minlength=len(total)).astype(np.float64)
 
     def _parts(self, seen: Rows, mask: Rows, masks: int) -> dict[str, Floats]:
-        """How alike the points of every mask are, in each of the attributes: the mean over all pairs of points."""
+        """Similarity of the points of every mask in each attribute, as the mean over all pairs of points."""
         n = np.maximum(np.bincount(mask, minlength=masks).astype(np.float64), 1)
         pairs = np.maximum(n * (n - 1), 1)
         first, second, x, y, z = (np.bincount(mask, column[seen], minlength=masks) for column in self.columns)
@@ -88,7 +88,7 @@ class Consistency:
         }
 
     def _inside(self, camera_from_lidar: Extrinsic) -> tuple[Rows, Rows]:
-        """Rows of points in the picture, and the pixel ``[2, N]`` of each, ``(u, v)``."""
+        """Rows of the points in the image, and their pixels ``[2, N]``, ``(u, v)``."""
         x, y, z = transform_points(camera_from_lidar, self.scan.points).T
         ahead = np.flatnonzero(z > NEAREST_M)
         (focal_u, skew, centre_u), (_, focal_v, centre_v), _ = self.camera.matrix

@@ -1,4 +1,4 @@
-"""The picture cut into masks: by Segment Anything, whose masks are read from PNG files, or by a classical method."""
+"""Masks of the image: of Segment Anything, read from PNG files, or of a classical segmentation."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from calibnet.errors import ConfigError
 from calibnet.geometry import PinholeCamera
 
 SCALE, SMALLEST, BLUR = 150.0, 120, 0.8
-"""Parameters of the segmentation: scale (larger regions), fewest pixels of a region, and blur."""
+"""Parameters of the segmentation: scale (larger for larger regions), fewest pixels of a region, and blur."""
 MOST_MASKS = 2000
-"""Files read for a picture."""
+"""Largest number of files read for an image."""
 LARGEST_SHARE = 0.5
-"""Largest share of the picture that a mask may cover: a larger one is the sky, or everything."""
+"""Largest share of the image that a mask may cover; a larger one is the sky, or everything."""
 NONE = -1
 
 Labels = NDArray[np.int64]
@@ -26,26 +26,26 @@ Labels = NDArray[np.int64]
 
 
 def segmented(frame: Frame, camera: PinholeCamera) -> Labels:
-    """Regions of alike colours: the graph segmentation of Felzenszwalb & Huttenlocher (2004)."""
+    """Regions of similar colours, by the graph segmentation of Felzenszwalb & Huttenlocher (2004)."""
     from skimage.segmentation import felzenszwalb
 
-    picture = resize_image(frame.image, camera)
-    return np.asarray(felzenszwalb(picture, scale=SCALE, sigma=BLUR, min_size=SMALLEST), np.int64)
+    image = resize_image(frame.image, camera)
+    return np.asarray(felzenszwalb(image, scale=SCALE, sigma=BLUR, min_size=SMALLEST), np.int64)
 
 
 def read_masks(folder: Path, frame: Frame, camera: PinholeCamera) -> Labels:
-    """The masks of a frame: the PNG files of the folder that has its picture's name, white where the mask is.
+    """Read the masks of a frame: PNG files, white inside the mask, in the folder named after its image.
 
-    Masks may lie over each other. A pixel belongs to the smallest one that has it, which is the most of a thing.
+    Masks may overlap. A pixel belongs to the smallest mask that contains it, which is the most specific.
 
     Raises:
-        ConfigError: there are none, or one has another size than the picture.
+        ConfigError: there are no masks, or one differs from the image in size.
     """
     where = folder / Path(frame.source).stem
     files = sorted(where.glob("*.png"))[:MOST_MASKS] if where.is_dir() else []
     if not files:
         raise ConfigError(
-            f"{where} has no masks; --masks DIR needs a folder for each picture, named like it without suffix, "
+            f"{where} has no masks; --masks DIR needs a folder for each image, named like it without suffix, "
             "with one PNG per mask, as written by Segment Anything's amg.py."
         )
     masks = [_read_mask(file, frame) for file in files]
@@ -62,14 +62,13 @@ def _read_mask(file: Path, frame: Frame) -> NDArray[np.bool_]:
     size = (frame.camera.height, frame.camera.width)
     if pixels.shape[:2] != size:
         raise ConfigError(
-            f"The mask {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels but its picture has {size[1]} x "
-            f"{size[0]}; "
-            "make masks from the same pictures that are calibrated."
+            f"The mask {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels but its image {size[1]} x {size[0]}; "
+            "make masks from the same images that are calibrated."
         )
     return np.asarray(pixels.max(axis=2) > 127)
 
 
 def painted(labels: Labels) -> NDArray[np.uint8]:
-    """Each mask in a colour of its own, ``[H, W, 3]``; black where there is none."""
+    """The masks in different colours, ``[H, W, 3]``; black outside all masks."""
     palette = np.random.default_rng(0).integers(60, 256, (max(int(labels.max()) + 1, 1), 3), dtype=np.uint8)
     return np.where((labels >= 0)[..., None], palette[np.maximum(labels, 0)], np.uint8(0))

@@ -1,4 +1,4 @@
-"""The search: extrinsics drawn at random around the guess, in ever smaller rounds around the best one so far."""
+"""The search: random extrinsics around the guess, then in ever smaller ranges around the best one so far."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from calibnet.runtime.clock import Clock
 from calibnet.trace import CascadeTrace, StageTrace
 
 HEIGHT, WIDTH = 256, 832
-"""The picture is resized to the area of so many pixels, its aspect kept."""
+"""The image is resized to the area of this size, its aspect kept."""
 ROUNDS = ((1.0, 0.0, 300), (0.5, 0.5, 200), (0.25, 0.25, 200), (0.1, 0.15, 200), (0.04, 0.06, 150))
-"""Rounds of the search: shares of the range's angles and of its offsets within which poses are drawn, and how many. The
-paper begins with the rotation alone, then searches all six at random; how far and how often is ours."""
+"""Rounds of the search: shares of the range's rotation and translation within which poses are drawn, and the number of
+poses. As in the paper, the first round draws rotations alone, and the others all six axes; the numbers are ours."""
 SEED = 0
 
 
@@ -32,15 +32,15 @@ class CalibAnything:
     """A `Calibrator` without weights."""
 
     def __init__(self, range_: MiscalibrationRange, masks: Path | None = None) -> None:
-        """Search within ``range_``, in ``masks`` of Segment Anything; by default the picture is cut here."""
+        """Search within ``range_``, with a folder of ``masks`` of Segment Anything or, by default, our own."""
         self.range, self.masks = range_, masks
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         """Search one frame.
 
         Raises:
-            CalibrationError: hardly any point is in the picture under the guess.
-            ConfigError: there are no masks of the frame where these are read.
+            CalibrationError: too few points are in the image under the guess.
+            ConfigError: the folder of masks has none for the frame.
         """
         clock, camera = Clock(torch.device("cpu")), frame.camera.fitted(HEIGHT, WIDTH, 1)
         labels = segmented(frame, camera) if self.masks is None else read_masks(self.masks, frame, camera)
@@ -58,7 +58,7 @@ class CalibAnything:
         return CascadeTrace(initial, (stage,))
 
     def _search(self, score: Consistency, initial: Extrinsic) -> tuple[Transform, Floats]:
-        """The best change of the guess, and the score of the best so far after every draw."""
+        """The best change of the guess, and the best score so far after every draw."""
         generator = np.random.default_rng(SEED)
         best, scores = np.zeros(6), [score(initial)]
         for turned, shifted, count in ROUNDS:
@@ -75,13 +75,13 @@ class CalibAnything:
 
 
 def exhibits(labels: Labels, score: Consistency, stage: StageTrace) -> Iterator[Exhibit]:
-    """The masks, and how alike the points in each are at the start and in the end."""
+    """The masks, and the similarity of the points in each at the start and at the end."""
     yield Exhibit("Masks", painted(labels))
     maps = {}
     for name, extrinsic in (("at the start", stage.before), ("at the end", stage.after)):
         scores, counts = score.of_masks(extrinsic)
-        known = np.append(np.where(counts >= FEWEST, scores, np.nan), np.nan)  # the last one for no mask
+        known = np.append(np.where(counts >= FEWEST, scores, np.nan), np.nan)  # the last is for pixels in no mask
         maps[f"Similarity of the points in each mask, {name}"] = known[labels].astype(np.float32)
     seen = np.concatenate([values[np.isfinite(values)] for values in maps.values()])
-    limits = (float(seen.min()), float(seen.max())) if seen.size else None  # of both, since they are to be compared
+    limits = (float(seen.min()), float(seen.max())) if seen.size else None  # of both maps, since they are compared
     yield from (Exhibit(name, values, limits) for name, values in maps.items())

@@ -1,5 +1,5 @@
-"""Networks of other papers: RegNet, CalibNet, LCCNet and what is known of CalibFormer, trained and run here.
+"""Networks of other papers, trained and run here: RegNet, CalibNet, LCCNet, and CalibFormer as far as it is public.
 
-They are written from the papers. Each module says what its paper leaves open and how it is decided. None starts from
-weights that were trained elsewhere, as their papers do from ImageNet: the package has none for them.
+They are implemented from the papers; each module says what its paper leaves open and what we chose. Papers start from
+ImageNet weights. These networks start from random weights, as the package has no others for them.
 """

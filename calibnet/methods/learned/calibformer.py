@@ -1,9 +1,9 @@
 """After CalibFormer (Xiao, Li, Meng, Li, Ji, Zhang, ICRA 2024), of which only the abstract is public.
 
-From the abstract: layers of picture and depth features are aggregated to a fine resolution and correlated by several
+From the abstract: layers of image and depth features are aggregated to a fine resolution and correlated by several
 heads, and a transformer estimates the pose from the correlation. All else is ours, and its figures are not
 CalibFormer's: two ResNet-18 whose levels from 1/8 to 1/32 are summed at 1/8; eight heads, each the cosine of its share
-of the channels with a window of 4 cells around; three convolutions to tokens at 1/32, their place in the picture added;
+of the channels with a window of 4 cells around; three convolutions to tokens at 1/32, with position embeddings;
 four encoder layers; two decoder layers with a query for the translation and one for the rotation. The loss is
 LCCNet's without the points: smooth L1 of the translation and the quaternions' distance.
 """
@@ -48,7 +48,7 @@ class FineFeatures(nn.Module):
         self.project = nn.Conv2d(FEATURES, FEATURES, 1)
 
     def forward(self, x: Tensor) -> Tensor:
-        """See the class."""
+        """The features, see the class."""
         levels = [lateral(level) for lateral, level in zip(self.lateral, self.encoder(x)[1:], strict=True)]
         size = levels[0].shape[2:]
         summed = levels[0]
@@ -59,7 +59,7 @@ class FineFeatures(nn.Module):
 
 
 class CalibFormer(MethodNetwork):
-    """Picture and depth to translation and quaternion through correlation and attention."""
+    """Image and depth to translation and quaternion through correlation and attention."""
 
     NAME = "calibformer"
 
@@ -82,7 +82,7 @@ class CalibFormer(MethodNetwork):
             "batch_first": True,
             "norm_first": True,
         }
-        # one module a layer: nn.TransformerEncoder's fast path would be another computation than training's
+        # one module per layer: nn.TransformerEncoder's fast path would compute otherwise than in training
         self.encoder = nn.ModuleList(nn.TransformerEncoderLayer(WIDTH, HEADS, **options) for _ in range(ENCODER))
         self.decoder = nn.ModuleList(nn.TransformerDecoderLayer(WIDTH, HEADS, **options) for _ in range(DECODER))
         self.norm = nn.LayerNorm(WIDTH)
@@ -102,7 +102,7 @@ class CalibFormer(MethodNetwork):
         answers = self.norm(answers)
         translation, rotation = self.translation(answers[:, 0]).float(), self.rotation(answers[:, 1]).float()
         shown = {
-            "Picture features": picture.abs().mean(1),
+            "Image features": picture.abs().mean(1),
             "Depth features": scan.abs().mean(1),
             "Correlation, best in the window": heads.mean(1).flatten(1, 2).amax(1),
         }
@@ -110,7 +110,7 @@ class CalibFormer(MethodNetwork):
         return MethodOutput(scaled_pose(translation, rotation, self.range), regressed, shown)
 
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
-        """The pose's error."""
+        """Weighted errors of translation and rotation."""
         estimate, truth = output.correction, target.correction
         return told(
             estimate,
@@ -121,5 +121,5 @@ class CalibFormer(MethodNetwork):
 
 
 def by_head(features: Tensor) -> Tensor:
-    """Features ``[B, C, h, w]`` of which each head's share of the channels has unit length."""
+    """Normalise features ``[B, C, h, w]`` so that each head's share of the channels has unit length."""
     return F.normalize(features.unflatten(1, (HEADS, -1)), dim=2).flatten(1, 2)

@@ -1,14 +1,14 @@
 """CalibNet (Iyer, Ram, Murthy, Krishna, IROS 2018), not to be confused with this package: geometric supervision alone.
 
-From the paper: a ResNet-18 for the picture and its twin of half the channels for the depth map, whose sparse points are
+From the paper: a ResNet-18 for the image and one of half the channels for the depth map, whose sparse points are
 spread by max pooling; their features are concatenated and aggregated by convolutions; the output is decoupled, a
-branch for the translation and one for the rotation, which is an axis and angle in so(3). No pose is told in training:
+branch for the translation and one for the rotation, as a vector in so(3). The true pose is no target in training:
 the loss compares depth maps (photometric) and clouds of points, both moved by the estimate and by the truth. The
 trained network runs several times, each time on the scan projected anew.
 
-Ours: of the distances between clouds that the paper tries, the Chamfer distance, over the nearest point of every
-16 x 16 pixels; depth maps of inverse depth at 1/8, each point spread over four cells, as maps of single pixels tell
-nothing of which way to go; the weights of the two; three looks; outputs in units of the range.
+Ours: among the cloud distances that the paper tries, the Chamfer distance, of the nearest points of every 16 x 16
+pixels; depth maps of inverse depth at 1/8, with each point spread over four cells, as single pixels have no gradient;
+the weights of the two terms; three looks; outputs in units of the range.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ AGGREGATED = (512, 512)
 BRANCH = 256
 HIDDEN = 512
 POOLED = (2, 4)
-"""Cells to which a branch is pooled before it is fully connected."""
+"""Size to which a branch is pooled before its fully connected layers."""
 DROPOUT = 0.3
 PHOTOMETRIC, POINTS = 1.0, 0.5
 
 
 class CalibNet2018(MethodNetwork):
-    """Picture and depth to translation and rotation vector."""
+    """Image and depth to translation and rotation vector."""
 
     NAME, LOOKS, POOLING, LEARNING_RATE = "calibnet", 3, 5, 5e-4
 
@@ -57,7 +57,7 @@ class CalibNet2018(MethodNetwork):
         translation, rotation = self.translation(aggregated).float(), self.rotation(aggregated).float()
         turn = rotation_from_vector(math.radians(self.range.rotation_deg) * rotation)
         shown = {
-            "Picture features": picture.abs().mean(1),
+            "Image features": picture.abs().mean(1),
             "Depth features": scan.abs().mean(1),
             "Aggregated": aggregated.abs().mean(1),
         }
@@ -65,7 +65,7 @@ class CalibNet2018(MethodNetwork):
         return MethodOutput(correction, torch.cat([translation, rotation], dim=-1), shown)
 
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
-        """Depth maps and clouds, as the estimate and as the truth move them."""
+        """Differences of depth maps and clouds under the estimate and under the truth."""
         estimate, truth = output.correction, target.correction
         stride = self.config.scales[0]
         return told(
@@ -77,7 +77,7 @@ class CalibNet2018(MethodNetwork):
 
 
 def convolution(inputs: int, outputs: int, stride: int = 1) -> list[nn.Module]:
-    """A 3x3 convolution with its normalisation."""
+    """A 3x3 convolution with batch normalisation and ReLU."""
     return [
         nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False),
         nn.BatchNorm2d(outputs),

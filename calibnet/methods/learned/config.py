@@ -1,4 +1,4 @@
-"""What a network of another paper is made of: its name and the size of its input."""
+"""The configuration of a network of another paper: its name and input size."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import ClassVar
 
 @dataclass(frozen=True)
 class MethodConfig:
-    """What a weights file says of such a network.
+    """The configuration of such a network, as stored in a file of weights.
 
     Attributes:
-        name: of the method, see `calibnet.methods.learned.networks.NETWORKS`.
-        input_height: rows of its input; scans are projected at a size of the same area and the frame's own aspect.
-        input_width: columns.
+        name: name of the method, see `calibnet.methods.learned.networks.NETWORKS`.
+        input_height: height of the input; scans are projected at a size of this area with the frame's own aspect.
+        input_width: width of the input.
     """
 
     name: str
@@ -21,8 +21,8 @@ class MethodConfig:
     input_width: int = 512
 
     scales: ClassVar[tuple[int, ...]] = (8, 16, 32)
-    """Strides of the cells whose points losses are about."""
+    """Strides of the cells whose points the losses use."""
     trains_features: ClassVar[bool] = False
-    """Whether batches are made that train features alone; it is our network that needs them."""
+    """Whether some batches train the features alone, as our network needs."""
     image_encoder: ClassVar[str] = "own"
     share_image_branch: ClassVar[bool] = False

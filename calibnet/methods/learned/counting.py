@@ -1,4 +1,4 @@
-"""What a network of another paper costs: its multiply-adds, counted by running it on no data."""
+"""Counts the multiply-adds of a network of another paper, by running it on the meta device."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from calibnet.network.batch import NetworkInputs
 def multiply_adds(network: MethodNetwork) -> int:
     """Multiply-adds of a network's convolutions and matrix products, for one look at one frame.
 
-    A network like it is run as in training: PyTorch counts nothing of the form that attention has in inference alone.
+    A copy is run in training mode, as PyTorch does not count the fused attention of inference.
     """
     config = network.config
     height, width = config.input_height, config.input_width

@@ -1,12 +1,12 @@
 """LCCNet (Lv, Wang, Dou, Ye, Wang, CVPRW 2021): two ResNet-18, their correlation at 1/32, fully connected heads.
 
-From the paper: a ResNet-18 for the picture and one for the depth map; correlation within 4 cells at 1/32;
-five convolutions, each of which sees all that came before; a fully connected layer of 512 and two branches of 256
+From the paper: a ResNet-18 for the image and one for the depth map; correlation within 4 cells at 1/32;
+five densely connected convolutions; a fully connected layer of 512 and two branches of 256
 for translation and quaternion. Loss: smooth L1 of the translation, quaternion distance, and the mean distance of
 the scan's points, half and half. Five such networks, of ever narrower ranges, run one after the other.
 
-The published code builds layers that its forward pass leaves out; this has what is used: 58 M parameters. Ours: the
-depth goes in as inverse depth, as all methods here have it; both outputs are in units of the range, see
+The published code has layers that its forward pass does not use; they are left out here: 58 M parameters. Ours: the
+input is inverse depth, as for all methods here; both outputs are in units of the range, see
 `calibnet.methods.learned.network.scaled_pose`; points are the nearest of every 8 x 8 pixels.
 """
 
@@ -31,11 +31,11 @@ BRANCH = 256
 LEAK = 0.1
 STRIDE = 32
 TRANSLATION, ROTATION, POINTS = 2.0, 1.0, 0.5
-"""Weights of the translation's and of the rotation's error in the pose loss, and the share of the points' distance."""
+"""Weights of translation and rotation in the pose loss, and the share of the points' distance in the loss."""
 
 
 class LCCNet(MethodNetwork):
-    """Picture and depth to translation and quaternion through a correlation volume."""
+    """Image and depth to translation and quaternion through a correlation volume."""
 
     NAME, CASCADED = "lccnet", True
 
@@ -62,7 +62,7 @@ class LCCNet(MethodNetwork):
         hidden = self.hidden(x)
         translation, rotation = self.translation(hidden).float(), self.rotation(hidden).float()
         shown = {
-            "Picture features": picture.abs().mean(1),
+            "Image features": picture.abs().mean(1),
             "Depth features": scan.abs().mean(1),
             "Correlation, best in the window": volume.amax(1),
         }

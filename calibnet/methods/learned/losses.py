@@ -1,4 +1,4 @@
-"""The terms that the losses of other papers are made of; metres and radians."""
+"""Terms of the losses of other papers, in metres and radians."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ def smooth_offset(estimate: Tensor, truth: Tensor) -> Tensor:
 
 
 def cloud(cells: Tensor) -> tuple[Tensor, Tensor]:
-    """Points ``[B, N, 3]`` of cells ``[B, 3, h, w]``, and which of them are there, ``[B, N]``."""
+    """Points ``[B, N, 3]`` of cells ``[B, 3, h, w]``, and a mask ``[B, N]`` of cells that have a point."""
     points = cells.flatten(2).transpose(1, 2)
     return points, points[..., 2] > 0
 
 
 FARTHEST_M = 100.0
-"""Distance of two points that no pair exceeds in a loss."""
+"""Distance at which pairs of points are clipped in a loss, metres."""
 
 
 def point_distance(estimate: Tensor, truth: Tensor, cells: Tensor) -> Tensor:
-    """Mean distance, metres, between where the estimate and where the truth puts the same points."""
+    """Mean distance, metres, between the same points under the estimate and under the truth."""
     points, there = cloud(cells)
     distance = (transform_points(estimate, points) - transform_points(truth, points)).square().sum(-1).add(1e-12).sqrt()
     return (distance.clamp(max=FARTHEST_M) * there).sum() / there.sum().clamp(min=1)
 
 
 def chamfer_distance(estimate: Tensor, truth: Tensor, cells: Tensor) -> Tensor:
-    """Mean distance, metres, of each point to the nearest of the other cloud, both ways."""
+    """Mean distance, metres, of each point to the nearest point of the other cloud, in both directions."""
     points, there = cloud(cells)
     ours, true = transform_points(estimate, points), transform_points(truth, points)
     between = torch.cdist(ours, true, compute_mode="donot_use_mm_for_euclid_dist")
@@ -55,15 +55,15 @@ def chamfer_distance(estimate: Tensor, truth: Tensor, cells: Tensor) -> Tensor:
 def splat(points: Tensor, there: Tensor, intrinsics: Tensor, size: tuple[int, int], stride: int, above: int) -> Tensor:
     """Inverse depth of points ``[B, N, 3]``, spread over the four nearest of ``size`` cells: ``[B, h, w]``.
 
-    Differentiable in the points, as the spatial transformer of CalibNet is.
+    It is differentiable with respect to the points, like the spatial transformer of CalibNet.
 
     Args:
-        points: in the camera frame.
-        there: ``[B, N]``, which of them count.
+        points: points in the camera frame, metres.
+        there: ``[B, N]``, mask of the points that count.
         intrinsics: ``[B, 3, 3]``.
-        size: rows and columns.
-        stride: pixels a cell.
-        above: rows of cells that were cut off at the top.
+        size: rows and columns of cells.
+        stride: side of a cell, pixels.
+        above: rows of cells that were cropped at the top.
     """
     height, width = size
     pixels = project_points(points, intrinsics)
@@ -85,9 +85,9 @@ def splat(points: Tensor, there: Tensor, intrinsics: Tensor, size: tuple[int, in
 
 
 def photometric_error(estimate: Tensor, truth: Tensor, inputs: NetworkInputs, stride: int) -> Tensor:
-    """Mean squared difference of the depth maps (inverse depths) under the estimate and under the truth.
+    """Mean squared difference of the maps of inverse depth under the estimate and under the truth.
 
-    Over the cells that hold something in either, of the points that are the nearest of their cell of ``stride`` pixels.
+    The maps have cells of ``stride`` pixels, and the nearest point of each. Cells that are empty in both do not count.
     """
     cells = inputs.cells[0]
     points, there = cloud(cells)
@@ -107,7 +107,7 @@ def told(
     points: Tensor | None = None,
     photometric: Tensor | None = None,
 ) -> MethodLosses:
-    """The terms that a method has, with the errors for the progress line."""
+    """The losses of a method from its terms, with the errors for the progress line."""
     none = estimate.new_zeros(())
 
     def given(term: Tensor | None) -> Tensor:

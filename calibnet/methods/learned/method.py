@@ -1,4 +1,4 @@
-"""Methods that were trained: networks of another paper, one after the other from wide to narrow, as `Calibrator`."""
+"""Trained methods: the networks of another paper, run from wide to narrow ranges, as a `Calibrator`."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from calibnet.weights.files import read_record, weights_path
 
 
 class LearnedMethod:
-    """A method that needs weights; subclasses say which."""
+    """A method with networks; subclasses name their weights."""
 
     NAME: ClassVar[str]
 
     def __init__(self, range_: MiscalibrationRange, weights: Path | None = None) -> None:
         """Load the networks for miscalibrations within ``range_``.
 
-        A method whose paper runs several networks one after the other runs those that ``weights`` has, from the one
-        for ``range_`` to the narrowest; any other runs that one alone.
+        A method whose paper runs several networks in sequence runs those that the folder ``weights`` has, from the one
+        for ``range_`` to the narrowest. Any other method runs the one for ``range_``.
 
         Raises:
-            WeightsError: ``weights`` is not given or has no network for the range; the sentence says how to make one.
+            WeightsError: ``weights`` is not given, or has no network for the range; the message says how to make one.
         """
         self.range = range_
         numbers = stages_within(range_)
@@ -46,7 +46,7 @@ class LearnedMethod:
 
     @cached_property
     def card(self) -> MethodCard:
-        """What its networks cost and were trained with."""
+        """The cost of the networks, and their training data."""
         networks = [stage.network for stage in self.stages]
         paths = [weights_path(self.NAME, stage.range, self.weights) for stage in self.stages]
         return MethodCard.trained(
@@ -56,7 +56,7 @@ class LearnedMethod:
         )
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
-        """See `calibnet.calibrator.Calibrator.calibrate`; with ``detail``, what the networks have to show."""
+        """See `calibnet.calibrator.Calibrator.calibrate`; with ``detail``, with the networks' exhibits."""
         clock = Clock(self.stages[0].device)
         view = self.stages[0].view(frame, clock)
         traces: list[StageTrace] = []

@@ -1,4 +1,4 @@
-"""The networks by the name of their method."""
+"""Registry of the networks, by the names of their methods."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NETWORKS = Registry(
         "calibformer": f"{FOLDER}.calibformer:CalibFormer",
     },
 )
-"""Classes of `calibnet.methods.learned.network.MethodNetwork`; those of other packages register likewise."""
+"""Subclasses of `calibnet.methods.learned.network.MethodNetwork`; other packages register theirs as entry points."""
 
 
 def method_network(config: MethodConfig, range_: MiscalibrationRange) -> MethodNetwork:

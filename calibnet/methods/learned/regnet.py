@@ -1,13 +1,13 @@
-"""RegNet (Schneider, Piewak, Stiller, Franke, IV 2017): network-in-network blocks on picture and depth, regression.
+"""RegNet (Schneider, Piewak, Stiller, Franke, IV 2017): network-in-network blocks on image and depth, regression.
 
-From the paper: blocks of one convolution and two 1x1 convolutions (Lin et al. 2013), one stream for the picture and one
+From the paper: blocks of one convolution and two 1x1 convolutions (Lin et al. 2013), one stream for the image and one
 with half the channels for the inverse depth, whose sparse points are spread by max pooling; the streams are
 concatenated, two more blocks match them, and two fully connected layers regress a dual quaternion under a Euclidean
 loss. Five such networks, of ever narrower ranges, run one after the other.
 
-Ours: batch normalisation behind every block's first convolution, as its picture stream started from ImageNet and this
-one starts from nothing; the depth map is pooled over 5 pixels; a pooling behind each block but the first three's last,
-so that 2 x 4 cells remain of 256 x 512 pixels; both parts of the dual quaternion are in units of the range, see
+Ours: batch normalisation after the first convolution of every block, as the paper's image stream starts from ImageNet
+and this one from random weights; the depth map is pooled over 5 pixels; pooling after the blocks, so that 2 x 4 cells
+remain of 256 x 512 pixels; both parts of the dual quaternion are in units of the range, see
 `calibnet.methods.learned.network.scaled_pose`.
 """
 
@@ -30,11 +30,11 @@ MATCHING = 512
 HIDDEN = 700
 KERNELS = (11, 5, 3)
 REMAINING = (2, 4)
-"""Cells that the blocks leave of the input."""
+"""Size of the features after the last block, in cells."""
 
 
 class Block(nn.Sequential):
-    """A convolution and two 1x1 convolutions, each with its ReLU; then, where asked for, pooling to half the size."""
+    """A convolution and two 1x1 convolutions with ReLUs, then, if ``pooled``, max pooling to half the size."""
 
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int = 1, pooled: bool = True) -> None:
         layers: list[nn.Module] = [
@@ -59,7 +59,7 @@ def stream(inputs: int, widths: tuple[int, ...]) -> nn.Sequential:
 
 
 class RegNet(MethodNetwork):
-    """Picture and depth to a dual quaternion."""
+    """Image and depth to a dual quaternion."""
 
     NAME, CASCADED, POOLING = "regnet", True, 5
 
@@ -81,7 +81,7 @@ class RegNet(MethodNetwork):
         picture, scan = self.picture(image), self.depth(depth)
         matched = self.matching(torch.cat([picture, scan], dim=1))
         regressed = self.regression(matched).float()
-        shown = {"Picture features": picture.abs().mean(1), "Depth features": scan.abs().mean(1)}
+        shown = {"Image features": picture.abs().mean(1), "Depth features": scan.abs().mean(1)}
         return MethodOutput(self._pose(regressed), regressed, shown)
 
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
@@ -91,7 +91,7 @@ class RegNet(MethodNetwork):
         return told(output.correction, target.correction, translation, rotation)
 
     def in_units(self, correction: Tensor) -> Tensor:
-        """What is to be regressed for ``[B, 4, 4]``: ``[B, 8]``, real part less that of no rotation, and dual part."""
+        """The target ``[B, 8]`` of the regression for ``[B, 4, 4]``: real part minus the identity, and dual part."""
         real = quaternion_of(correction[:, :3, :3])
         dual = 0.5 * product(pure(correction[:, :3, 3]), real)
         half_angle, half_offset = self._units(correction)
@@ -111,7 +111,7 @@ class RegNet(MethodNetwork):
 
 
 def identity(like: Tensor) -> Tensor:
-    """The quaternion of no rotation, ``[4]``."""
+    """The identity quaternion, ``[4]``."""
     return like.new_tensor([1.0, 0.0, 0.0, 0.0])
 
 

@@ -1,4 +1,4 @@
-"""ResNet-18 (He et al. 2016) without its classifier, at any width; CalibNet, LCCNet and CalibFormer begin with it."""
+"""ResNet-18 (He et al. 2016) without its classifier, at any width: the encoder of CalibNet, LCCNet and CalibFormer."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from torch import Tensor, nn
 WIDTHS = (64, 128, 256, 512)
 """Channels at 1/4, 1/8, 1/16 and 1/32."""
 BLOCKS = 2
-"""Residual blocks of each level."""
+"""Number of residual blocks of each level."""
 
 
 class BasicBlock(nn.Module):
@@ -33,7 +33,7 @@ class BasicBlock(nn.Module):
 
 
 class ResNet18(nn.Module):
-    """The features of all levels."""
+    """The encoder, which returns the features of all levels."""
 
     def __init__(self, inputs: int, share: float = 1.0) -> None:
         """Take ``inputs`` channels; every level has this ``share`` of the usual channels."""

@@ -1,4 +1,4 @@
-"""One trained network of another paper's method, used on a frame as `calibnet.cascade.stage.Stage` is."""
+"""A trained network of another paper as a stage, with the interface of `calibnet.cascade.stage.Stage`."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from calibnet.weights.manifest import StageSettings
 
 @dataclass(frozen=True)
 class MethodStage:
-    """A network of a method.
+    """A network of a method as a stage.
 
     Attributes:
         number: 1 (coarsest) to 5 (finest), by its range.
-        range: what it was trained for.
-        network: in evaluation mode.
-        settings: looks and gain; the image always has the network's size.
+        range: the range that it was trained for.
+        network: the network in evaluation mode.
+        settings: number of looks, and gain; the image always has the network's input size.
     """
 
     number: int
@@ -41,28 +41,28 @@ class MethodStage:
 
     @property
     def device(self) -> torch.device:
-        """Where the network lies."""
+        """The device of the network."""
         return next(self.network.parameters()).device
 
     def camera(self, frame: Frame) -> PinholeCamera:
-        """The camera of this stage's image of a frame: of the input's area, in the frame's aspect."""
+        """The camera of the frame's image at this stage: with the area of the input and the frame's aspect."""
         config = self.network.config
         return frame.camera.fitted(config.input_height, config.input_width, config.scales[-1])
 
     def view(self, frame: Frame, clock: Callable[[str], None] = lambda part: None) -> View:
-        """The frame's image as this stage sees it."""
+        """The frame's image at this stage's size."""
         image = torch.from_numpy(resize_image(frame.image, self.camera(frame))).permute(2, 0, 1)[None]
         clock("resize")
         return View(image.to(self.device), [])
 
     def correct(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
-        """Look at a frame, and again from where that arrives, as often as the method does.
+        """Run all looks of the method at a frame, each from the result of the one before.
 
         Args:
-            frame: scan and camera; its own extrinsic is not looked at.
-            view: its image, as `view` gives it.
+            frame: scan and camera; its own extrinsic is not used.
+            view: its image from `view`.
             before: the extrinsic to correct.
-            detail: keep what the network has to show of the first look.
+            detail: keep the exhibits of the first look.
 
         Raises:
             CalibrationError: see `look`.
@@ -75,7 +75,7 @@ class MethodStage:
 
     @torch.inference_mode()
     def look(self, frame: Frame, view: View, before: Extrinsic, detail: bool = False) -> StageTrace:
-        """Project the scan under an extrinsic, and correct that once; arguments as of `correct`.
+        """Project the scan under an extrinsic, and correct it once; for the arguments see `correct`.
 
         Raises:
             CalibrationError: too few LiDAR points fall into the image, or the network gives no finite correction.
@@ -105,5 +105,5 @@ class MethodStage:
 
 
 def exhibits(shown: dict[str, Tensor]) -> tuple[Exhibit, ...]:
-    """What a network has to show of a batch of one."""
+    """The exhibits of a network's output for a batch of one."""
     return tuple(Exhibit(name, maps[0].float().cpu().numpy()) for name, maps in shown.items())

@@ -1,4 +1,4 @@
-"""The weights of other papers' methods: in a folder with a manifest, as ours, and never in the package."""
+"""Loads the weights of other papers' methods from a folder with a manifest; the package ships none."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ REMEDY = "train it again with `calib-inspect train --method`"
 
 
 def load_method_network(path: Path) -> MethodNetwork:
-    """Build the network a weights file describes and fill it; in evaluation mode, single precision.
+    """Load the network of a file of weights; it is in evaluation mode and single precision.
 
     Raises:
-        WeightsError: the file is missing, cut short, foreign or does not fit its own config.
+        WeightsError: the file is missing, cut short, of another kind or does not fit its own configuration.
     """
     header = read_header(path)
     if header.config.get("name") not in NETWORKS:
@@ -38,7 +38,7 @@ def load_method_network(path: Path) -> MethodNetwork:
         raise WeightsError(f"{path}: {error} Copy it again, or {REMEDY}.") from None
     if (config.input_height, config.input_width) != (MethodConfig.input_height, MethodConfig.input_width):
         raise WeightsError(f"{path} has another input size than the networks of this version; {REMEDY}.")
-    with torch.device("meta"):  # its size costs no memory there
+    with torch.device("meta"):  # which needs no memory
         promised = method_network(config, range_).state_dict()
     stored = load_file(path)
     if {name: t.shape for name, t in promised.items()} != {name: t.shape for name, t in stored.items()}:
@@ -51,14 +51,14 @@ def load_method_network(path: Path) -> MethodNetwork:
 
 
 def method_settings(manifest: Manifest, range_: MiscalibrationRange) -> StageSettings:
-    """How a network is used: as the manifest says, or where that has none of this range, as its paper does."""
+    """Settings of a network, from the manifest or, if that has none for this range, from the paper."""
     if any(entry.range == range_ for entry in manifest.stages):
         return manifest.settings(range_)
     return replace(StageSettings(), looks=NETWORKS.load(manifest.preset).LOOKS)
 
 
 def load_method_stage(name: str, range_: MiscalibrationRange, folder: Path) -> MethodStage | None:
-    """The network of a method and range, ready to run; None where the folder has none.
+    """The stage of a method and range, ready to run; None if the folder has no weights for it.
 
     Raises:
         WeightsError: the file cannot be used, or is of another method or range.
@@ -75,7 +75,7 @@ def load_method_stage(name: str, range_: MiscalibrationRange, folder: Path) -> M
 
 
 def missing(name: str, range_: MiscalibrationRange, folder: Path | None) -> WeightsError:
-    """That a method has not been trained, with the command that does it."""
+    """The error for a method that has not been trained, with the command that trains it."""
     where = f"no weights for {range_.label} in {folder}" if folder else "no weights in the package"
     return WeightsError(
         f"Method {name} has {where}; make them with `calib-inspect train --method {name} --range {range_} "

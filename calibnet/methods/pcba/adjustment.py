@@ -16,11 +16,11 @@ from calibnet.methods.pcba.planes import Planes
 from calibnet.methods.pcba.tracks import Tracks
 
 PIXEL = 0.7
-"""Standard deviation, in pixels, of where a point is tracked."""
+"""Standard deviation of a tracked point, in pixels."""
 PLANE_M = 0.04
 """Standard deviation, in metres, of a landmark's distance from its plane: noise of the scanner, and small planes."""
 FOCAL, CENTRE_PX = 0.02, 10.0
-"""Prior standard deviations of adjusted intrinsics: of the focal lengths, relative; of the principal point, pixels."""
+"""Prior standard deviations of adjusted intrinsics: relative, of focal lengths; in pixels, of the principal point."""
 NEAREST_M = 0.5
 
 
@@ -71,11 +71,11 @@ class Problem:
         """One adjustment.
 
         Args:
-            extrinsic: to start from, ``camera_from_lidar``.
-            landmarks: ``[N, 3]`` to start from.
-            planes: of the map.
+            extrinsic: initial ``camera_from_lidar``.
+            landmarks: ``[N, 3]``, initial landmarks.
+            planes: the planes of the map.
             rows: ``[N]``, the plane of each landmark.
-            on: ``[N]``, whether it has one.
+            on: ``[N]``, whether a landmark has a plane.
         """
         extra = 4 if self.intrinsics else 0
         head = 6 + extra
@@ -127,7 +127,7 @@ def seen(
 
 
 def adjusted_matrix(camera: PinholeCamera, change: Floats) -> Floats:
-    """The camera matrix, changed by shares of the focal lengths and by pixels of the centre; none for no change."""
+    """The camera matrix after a ``change``: relative of the focal lengths, in pixels of the centre; may be empty."""
     matrix = camera.matrix.astype(np.float64).copy()
     if len(change):
         matrix[0, 0] *= 1 + change[0]

@@ -1,4 +1,4 @@
-"""Pictures of a frame of an adjusted drive: its tracks, and the planes in front of the camera."""
+"""Exhibits of a frame of an adjusted drive: its tracks, and the planes in front of the camera."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ from calibnet.methods.pcba.planes import Planes
 from calibnet.methods.pcba.tracks import Tracks
 
 WIDTH = 960
-"""Width of the pictures in pixels."""
+"""Width of the exhibits in pixels."""
 FARTHEST_M = 40.0
 BAD_PX = 3.0
 """Reprojection error, in pixels, at which a landmark is fully red."""
 
 
 def exhibits(
-    picture: NDArray[np.uint8], position: int, tracks: Tracks, found: Adjusted, planes: Planes, pose: Transform
+    image: NDArray[np.uint8], position: int, tracks: Tracks, found: Adjusted, planes: Planes, pose: Transform
 ) -> tuple[Exhibit, ...]:
-    """The two pictures of a frame.
+    """The two exhibits of a frame.
 
     Args:
-        picture: grey, ``[H, W]``.
-        position: of the frame in the drive.
-        tracks: of the drive.
+        image: grey image, ``[H, W]``.
+        position: position of the frame in the drive.
+        tracks: tracks of the drive.
         found: result of the adjustment.
-        planes: of the drive's map.
+        planes: planes of the drive's map.
         pose: ``world_from_lidar`` of the frame.
     """
     return (
-        Exhibit("Tracks, green where the landmark is seen there", _tracked(picture, position, tracks, found)),
-        Exhibit("Planes of the scans, coloured by their normals", _planes(picture, found, planes, pose)),
+        Exhibit("Tracks, green where the landmark is seen there", _tracked(image, position, tracks, found)),
+        Exhibit("Planes of the scans, coloured by their normals", _planes(image, found, planes, pose)),
     )
 
 
-def _small(picture: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
-    scale = min(1.0, WIDTH / picture.shape[1])
-    small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+def _small(image: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], float]:
+    scale = min(1.0, WIDTH / image.shape[1])
+    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return np.repeat((small * 0.7).astype(np.uint8)[..., None], 3, axis=2), scale
 
 
-def _tracked(picture: NDArray[np.uint8], position: int, tracks: Tracks, found: Adjusted) -> NDArray[np.uint8]:
-    canvas, scale = _small(picture)
+def _tracked(image: NDArray[np.uint8], position: int, tracks: Tracks, found: Adjusted) -> NDArray[np.uint8]:
+    canvas, scale = _small(image)
     here = np.flatnonzero(tracks.frame == position)
     for row in here:
         same = np.flatnonzero(tracks.landmark == tracks.landmark[row])
@@ -59,8 +59,8 @@ def _tracked(picture: NDArray[np.uint8], position: int, tracks: Tracks, found: A
     return canvas
 
 
-def _planes(picture: NDArray[np.uint8], found: Adjusted, planes: Planes, pose: Transform) -> NDArray[np.uint8]:
-    canvas, scale = _small(picture)
+def _planes(image: NDArray[np.uint8], found: Adjusted, planes: Planes, pose: Transform) -> NDArray[np.uint8]:
+    canvas, scale = _small(image)
     camera_from_world = found.camera_from_lidar @ invert(pose)
     points = transform_points(camera_from_world, planes.points)
     ahead = np.flatnonzero((points[:, 2] > 1.0) & (points[:, 2] < FARTHEST_M))

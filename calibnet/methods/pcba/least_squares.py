@@ -32,7 +32,7 @@ class Solution:
 
     Attributes:
         x: the parameters.
-        normal: sparse ``J^T W J`` where the last step began, from which it gained next to nothing.
+        normal: sparse ``J^T W J`` at the start of the last step, which hardly changed anything.
         cost: sum of the robust losses.
     """
 
@@ -49,8 +49,8 @@ def solve(
     """Minimise residuals under the robust loss ``2 (sqrt(1 + r^2) - 1)``.
 
     Args:
-        residuals: of parameters.
-        start: parameters to start from.
+        residuals: function from parameters to residuals.
+        start: initial parameters.
         columns: which residuals each parameter moves.
     """
     from scipy.sparse import csc_matrix, diags

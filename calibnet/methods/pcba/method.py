@@ -25,7 +25,7 @@ from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import CANNOT_TELL, BadFrame, Verdict, moved
 
 MOST_FRAMES = 24
-"""Most frames of a drive: the first ones, which must be successive because points are tracked through them."""
+"""Largest number of frames of a drive; the first ones are used, as points are tracked through successive frames."""
 LEAST_MOTION_M = 2.0
 """Shortest distance, in metres, that the car has to drive: without motion there is no parallax."""
 FEWEST = 60
@@ -50,9 +50,10 @@ class Round(NamedTuple):
 
 
 TURN = (Round(2.0, 15.0, 0.02), Round(1.5, 8.0, 0.02), Round(1.0, 6.0, 0.1))
-"""First the rotation: motion tells it whatever the translation is, and the depth of what is tracked depends on it."""
+"""Rounds that adjust mostly the rotation. Motion determines it whatever the translation is, and the depths of tracked
+points depend on it."""
 ALL = (Round(2.0, 8.0), Round(1.0, 5.0), Round(0.7, 4.0), Round(0.5, 3.0), Round(0.5, 3.0))
-"""Then everything, with points followed anew from where the scan has them by then."""
+"""Rounds that then adjust everything, with points tracked again from their depths under the new extrinsic."""
 COVARIANCE_WIDER = 9.0
 """Inflation of the residuals' covariance: errors of registration, shutters and planes are common to all frames."""
 
@@ -62,16 +63,16 @@ class Drive:
     """The frames of a drive that are used.
 
     Attributes:
-        indices: of the frames.
-        pictures: grey, ``[H, W]``.
-        scans: ``[N, 4]``.
-        poses: ``world_from_lidar`` of each.
-        camera: common to all frames.
+        indices: indices of the frames.
+        images: grey images, ``[H, W]``.
+        scans: scans, ``[N, 4]``.
+        poses: ``world_from_lidar`` of each frame.
+        camera: the camera of all frames.
         skipped: frames that could not be read.
     """
 
     indices: list[int]
-    pictures: list[NDArray[np.uint8]] = field(repr=False)
+    images: list[NDArray[np.uint8]] = field(repr=False)
     scans: list[NDArray[np.float32]] = field(repr=False)
     poses: list[Transform] = field(repr=False)
     camera: PinholeCamera
@@ -101,7 +102,7 @@ class PCBA:
         """Adjust the extrinsic of the first `MOST_FRAMES` of a drive.
 
         Raises:
-            CalibrationError: the drive does not move, too little of its pictures can be followed, or the adjustment
+            CalibrationError: the drive does not move, too few points can be tracked, or the adjustment
                 ends far out of the range.
         """
         drive = read_drive(frames, observer)
@@ -128,8 +129,8 @@ class PCBA:
     def _rounds(
         self, drive: Drive, planes: Planes, schedule: tuple[Round, ...], extrinsic: Extrinsic, initial: Extrinsic
     ) -> Iterator[tuple[Tracks, Adjusted]]:
-        """Follow points; then adjust, drop what does not fit, and choose planes anew, round by round."""
-        tracks = sample_tracks(follow(drive.pictures, drive.scans, drive.poses, drive.camera, extrinsic))
+        """Track points; then, in every round, adjust, drop landmarks that do not fit, and assign planes again."""
+        tracks = sample_tracks(follow(drive.images, drive.scans, drive.poses, drive.camera, extrinsic))
         known = np.array([self.range.translation_m] * 3 + [np.radians(self.range.rotation_deg)] * 3) / 3**0.5
         lidar_from_world = np.stack([invert(pose) for pose in drive.poses])
         landmarks = tracks.start
@@ -137,7 +138,7 @@ class PCBA:
             rows, on = planes.nearest(landmarks, one.within_m)
             if on.sum() < FEWEST:
                 raise CalibrationError(
-                    f"Only {int(on.sum())} points tracked through the pictures are on planes of the "
+                    f"Only {int(on.sum())} points tracked through the images are on planes of the "
                     f"scans, but {FEWEST} are needed; give a better guess."
                 )
             tracks, landmarks, rows = tracks.only(on), landmarks[on], rows[on]
@@ -154,7 +155,7 @@ class PCBA:
     def _estimate(
         self, drive: Drive, planes: Planes, rounds: list[tuple[Tracks, Adjusted]], initial: Extrinsic
     ) -> DriveEstimate:
-        """The last round's result, with what is to be shown of every frame."""
+        """The result of the last round, with the exhibits of every frame."""
         tracks, found = rounds[-1]
         extrinsic, covariance = found.camera_from_lidar, COVARIANCE_WIDER * found.covariance
         curves = (
@@ -165,7 +166,7 @@ class PCBA:
         stage = StageTrace(1, self.range, found.camera, initial, correction @ initial, correction, curves=curves)
         traces = {}
         for position, index in enumerate(drive.indices):
-            shown = exhibits(drive.pictures[position], position, tracks, found, planes, drive.poses[position])
+            shown = exhibits(drive.images[position], position, tracks, found, planes, drive.poses[position])
             traces[index] = CascadeTrace(initial, (replace(stage, exhibits=shown),))
         history = tuple(
             (index, Estimate(one.camera_from_lidar, COVARIANCE_WIDER * one.covariance, len(drive.indices)))

@@ -19,7 +19,7 @@ NEIGHBOURS = 12
 WIDEST_M = 0.8
 """Largest distance to the farthest neighbour of a plane, in metres: sparser points are no surface."""
 FLATTEST = 0.05
-"""Most of the variance of neighbours that may lie across their plane, as a share of that along its narrower side."""
+"""Largest variance of neighbours across their plane, relative to that along its narrower side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Planes:
     normals: Floats = field(repr=False)
 
     def nearest(self, positions: Floats, within: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """For positions ``[M, 3]`` the row of the nearest plane, and whether there is one within so many metres."""
+        """For positions ``[M, 3]`` the row of the nearest plane, and whether it is within ``within`` metres."""
         from scipy.spatial import cKDTree
 
         if not len(self.points) or not len(positions):

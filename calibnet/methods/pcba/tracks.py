@@ -1,4 +1,4 @@
-"""Points of the pictures, followed from frame to frame: Lucas-Kanade, begun where the scan says that they will be."""
+"""Tracks points from image to image by Lucas-Kanade, starting from where the scan's depth predicts them."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from calibnet.geometry.se3 import invert, transform_points
 from calibnet.geometry.types import Extrinsic, Floats, Transform
 
 CORNERS, QUALITY, APART_PX = 500, 0.01, 12
-"""Corners of a frame: the most, least strength relative to the strongest, and how far they stand apart."""
+"""Corners of a frame: largest number, smallest strength relative to the strongest, and smallest distance."""
 LONGEST, SHORTEST = 6, 3
-"""Frames that a point is followed through, and the fewest."""
+"""Largest and smallest number of frames of a track."""
 WINDOW_PX, LEVELS = 21, 3
 RETURN_PX = 0.7
-"""How far from where it began a point may end when it is followed back."""
+"""Largest distance from its start at which a point may arrive when it is tracked back."""
 DEPTH_PX = 4.0
-"""Distance in the picture up to which a point of the scan gives a corner its depth."""
+"""Largest distance, in pixels, of the scan's point that gives a corner its depth."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """Points that were followed.
+    """M observations of N landmarks.
 
     Attributes:
-        landmark: ``[M]`` int, of each observation the number of its landmark.
-        frame: ``[M]`` int, and the position of its frame.
-        pixel: ``[M, 2]``, where it was seen.
-        start: ``[N, 3]`` metres in the world frame, where each landmark would be by the depth of the scan there.
+        landmark: ``[M]`` int, number of the landmark of each observation.
+        frame: ``[M]`` int, position of its frame.
+        pixel: ``[M, 2]``, pixel where the landmark was seen.
+        start: ``[N, 3]`` metres in the world frame, initial landmarks by the depth of the scan.
     """
 
     landmark: NDArray[np.int64] = field(repr=False)
@@ -42,36 +42,36 @@ class Tracks:
     start: Floats = field(repr=False)
 
     def only(self, kept: NDArray[np.bool_]) -> Tracks:
-        """Some of the landmarks, ``kept [N]``."""
+        """The tracks of some landmarks, ``kept [N]``."""
         number = np.cumsum(kept) - 1
         seen = kept[self.landmark]
         return Tracks(number[self.landmark[seen]], self.frame[seen], self.pixel[seen], self.start[kept])
 
 
 def follow(
-    pictures: Sequence[NDArray[np.uint8]],
+    images: Sequence[NDArray[np.uint8]],
     scans: Sequence[NDArray[np.float32]],
     poses: Sequence[Transform],
     camera: PinholeCamera,
     camera_from_lidar: Extrinsic,
 ) -> Tracks:
-    """Follow corners of grey pictures ``[H, W]`` through a drive.
+    """Track corners of grey images ``[H, W]`` through a drive.
 
     Args:
-        pictures: one a frame.
-        scans: likewise, ``[N, 4]``.
-        poses: likewise, ``world_from_lidar``.
-        camera: of all pictures.
-        camera_from_lidar: where the camera is about: how far a point moves in the picture hardly depends on it.
+        images: image of each frame.
+        scans: scan of each frame, ``[N, 4]``.
+        poses: ``world_from_lidar`` of each frame.
+        camera: camera of all images.
+        camera_from_lidar: approximate extrinsic, on which the motion of points in the image hardly depends.
     """
     landmarks: list[NDArray[np.int64]] = []
     frames: list[NDArray[np.int64]] = []
     pixels: list[Floats] = []
     starts: list[Floats] = []
     total = 0
-    for first in range(len(pictures) - SHORTEST + 1):
-        corners: Any = cv2.goodFeaturesToTrack(pictures[first], CORNERS, QUALITY, APART_PX)
-        if corners is None:  # a picture without any
+    for first in range(len(images) - SHORTEST + 1):
+        corners: Any = cv2.goodFeaturesToTrack(images[first], CORNERS, QUALITY, APART_PX)
+        if corners is None:  # an image without corners
             continue
         begun = np.asarray(corners, np.float32).reshape(-1, 2)
         depth, known = depths(begun, scans[first], camera, camera_from_lidar)
@@ -79,12 +79,12 @@ def follow(
         world = placed(begun, depth, camera, poses[first] @ invert(camera_from_lidar))
         seen, alive, now = [begun], np.ones(len(begun), bool), begun
         lengths = np.ones(len(begun), np.int64)
-        for position in range(first + 1, min(first + LONGEST, len(pictures))):
+        for position in range(first + 1, min(first + LONGEST, len(images))):
             guess = _seen(world, camera, camera_from_lidar @ invert(poses[position])).astype(np.float32)
-            if position > first + 1:  # the guess misses by about as much as it did in the frame before
+            if position > first + 1:  # the guess is off by about as much as in the frame before
                 before = _seen(world, camera, camera_from_lidar @ invert(poses[position - 1])).astype(np.float32)
                 guess += now - before
-            now, ok = _followed(pictures[position - 1], pictures[position], now, guess)
+            now, ok = _followed(images[position - 1], images[position], now, guess)
             alive &= ok
             lengths += alive
             seen.append(now)
@@ -105,7 +105,7 @@ def follow(
 def depths(
     pixels: NDArray[np.float32], scan: NDArray[np.float32], camera: PinholeCamera, camera_from_lidar: Extrinsic
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Depth in metres that the scan has at pixels ``[N, 2]``, and whether it has any there."""
+    """Depth of the scan in metres at pixels ``[N, 2]``, and whether there is any."""
     from scipy.spatial import cKDTree
 
     points = transform_points(camera_from_lidar, scan[:, :3].astype(np.float64))
@@ -121,7 +121,7 @@ def depths(
 
 
 def placed(pixels: NDArray[np.float32], depth: Floats, camera: PinholeCamera, world_from_camera: Transform) -> Floats:
-    """Where pixels ``[N, 2]`` at depths ``[N]`` are in the world, ``[N, 3]`` metres."""
+    """Back-project pixels ``[N, 2]`` at depths ``[N]`` to the world frame, ``[N, 3]`` metres."""
     rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(camera.matrix).T
     return np.asarray(transform_points(world_from_camera, rays * depth[:, None]))
 
@@ -134,7 +134,7 @@ def _seen(world: Floats, camera: PinholeCamera, camera_from_world: Transform) ->
 def _followed(
     one: NDArray[np.uint8], other: NDArray[np.uint8], pixels: NDArray[np.float32], guess: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where pixels of one picture are in another, and which of them come back when they are followed back."""
+    """Positions of pixels of one image in another, and whether they return when they are tracked back."""
     if not len(pixels):
         return pixels, np.zeros(0, bool)
     there, ok = _moved(one, other, pixels, guess)
@@ -147,7 +147,7 @@ def _followed(
 def _moved(
     one: NDArray[np.uint8], other: NDArray[np.uint8], pixels: NDArray[np.float32], guess: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Where pixels of one picture are in another, begun at a guess, and whether they were found."""
+    """Positions of pixels of one image in another, searched from a guess, and whether they were found."""
     there, ok, _ = cv2.calcOpticalFlowPyrLK(
         one,
         other,

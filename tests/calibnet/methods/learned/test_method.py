@@ -24,7 +24,7 @@ def test_a_cascaded_method_runs_the_networks_that_are_there(tmp_path: Path) -> N
     assert [stage.number for stage in trace.stages] == [1, 3]
     np.testing.assert_array_equal(trace.stages[1].before, trace.stages[0].after)
     names = [shown.name for shown in trace.stages[0].exhibits]
-    assert names == ["Inverse depth, input of the network", "Picture features", "Depth features"]
+    assert names == ["Inverse depth, input of the network", "Image features", "Depth features"]
     assert trace.stages[0].exhibits[0].picture.shape == (256, 512)
     assert not method.calibrate(boxes(), REFERENCE).stages[0].exhibits
     card = card_of(method)
