@@ -183,6 +183,12 @@ SOURCES = (
                 metavar="MS",
                 help="Largest time difference between an image and its scan, in milliseconds.  [default: 50]",
             ),
+            click.Option(
+                ["--by-recording-time"],
+                is_flag=True,
+                help="Pair by when messages were recorded rather than by their stamps, if camera and LiDAR have "
+                "different clocks. Trust only frames at a standstill then.",
+            ),
         ),
         open=open_bag,
         given=True,

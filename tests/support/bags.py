@@ -19,6 +19,10 @@ from calibnet.datasets.frame import Frame
 from calibnet.geometry import invert
 
 CAMERA_FRAME, LIDAR_FRAME = "cam_optical", "velodyne"
+LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line\n"
+LIVOX_SCAN = (
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\nCustomPoint[] points\n"
+)
 
 
 class BagWriter:
@@ -107,6 +111,37 @@ class BagWriter:
             data=table.view(np.uint8).reshape(-1),
             is_dense=True,
         )
+
+    def livox(self, points: np.ndarray, seconds: float, package: str) -> Any:
+        """As Livox's drivers write it, with the definitions that they bring."""
+        scan, point = f"{package}/msg/CustomMsg", f"{package}/msg/CustomPoint"
+        self.types.register(get_types_from_msg(LIVOX_POINT, point) | get_types_from_msg(LIVOX_SCAN, scan))
+        rows = [
+            self.make(
+                point,
+                offset_time=number,
+                **dict(zip("xyz", map(float, row[:3]), strict=True)),
+                reflectivity=int(row[3] * 255),
+                tag=0,
+                line=0,
+            )
+            for number, row in enumerate(points)
+        ]
+        return self.make(
+            scan,
+            header=self.header(seconds, LIDAR_FRAME),
+            timebase=0,
+            point_num=len(rows),
+            lidar_id=0,
+            rsvd=np.zeros(3, np.uint8),
+            points=rows,
+        )
+
+    def write_all_but_points(self, frame: Frame, seconds: float) -> None:
+        """Calibration and image of a frame."""
+        self.write("/tf_static", self.transforms(frame.camera_from_lidar), seconds)
+        self.write("/cam/camera_info", self.info(frame, "plumb_bob", [0.0] * 5), seconds)
+        self.write("/cam/image_raw/compressed", self.compressed(frame.image, seconds), seconds)
 
     def info(self, frame: Frame, model: str, distortion: Sequence[float]) -> Any:
         matrix = frame.camera.matrix.ravel()

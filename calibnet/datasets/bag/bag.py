@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.bag import calibration
 from calibnet.datasets.bag.messages import IMAGES, POINTS, columns_of, levels_of
-from calibnet.datasets.bag.moments import STILL_M, change, periods, stillest
+from calibnet.datasets.bag.moments import STILL_M, motion, periods, standing, stillest
 from calibnet.datasets.bag.recording import BagRecording, Stamped
 from calibnet.datasets.bag.topics import found_topic
 from calibnet.datasets.calibration_files import BY_NAME, FrameChoice, Wanted
@@ -44,6 +44,7 @@ class BagOptions:
         every: seconds from one frame to the next; None for about 40 frames.
         accumulate: number of scans to accumulate at a standstill, for scanners with a non-repeating pattern.
         max_time_difference: largest time between an image and its scan, in milliseconds.
+        by_recording_time: pair by the times of recording, if the clocks of camera and LiDAR differ.
     """
 
     image: str | None = None
@@ -55,6 +56,7 @@ class BagOptions:
     every: float | None = None
     accumulate: int = 1
     max_time_difference: float | None = None
+    by_recording_time: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,10 @@ class Bag:
         self._bag, self._options = BagRecording(paths), options
         self.image = found_topic(self._bag, options.image, IMAGES, "image", "images")
         self.points = found_topic(self._bag, options.points, POINTS, "points", "point clouds")
-        images, scans = self._bag.times(self.image), self._bag.times(self.points)
+        images, scans = (
+            [one.as_recorded() if options.by_recording_time else one for one in self._bag.times(topic)]
+            for topic in (self.image, self.points)
+        )
         first_image = self._bag.message(self.image).content
         first_scan = self._bag.message(self.points).content
         frames = FrameChoice(
@@ -188,28 +193,37 @@ class Bag:
         if not len(paired):
             raise DatasetError(
                 f"No scan of {self.points} has an image of {self.image} within {most:g} ms, the nearest is "
-                f"{apart.min():.0f} ms away; check the clocks, or give a larger --max-time-difference."
+                f"{apart.min():,.0f} ms away; give a larger --max-time-difference or, if camera and LiDAR "
+                "have different clocks, --by-recording-time."
             )
 
-        def moved(position: int) -> float:
-            other = position + 1 if position + 1 < len(scans) else position - 1
-            return change(self._raw(scans[position]), self._raw(scans[other])) if other >= 0 else np.inf
+        def moved(position: int, other: int | None = None) -> float:
+            if other is None:
+                other = position + 1 if position + 1 < len(scans) else position - 1
+            return motion(self._raw(scans[position]), self._raw(scans[other])) if other >= 0 else np.inf
 
-        moments, still = [], 0
+        moments, farthest, moving = list[Moment](), [0.0], [0.0]
         for period in periods(swept[paired], self._options.every):
-            position, motion = stillest(paired[period].tolist(), moved)
-            still += motion <= STILL_M
-            together = self._options.accumulate if motion <= STILL_M else 1
-            start = max(0, min(position - together // 2, len(scans) - together))
-            chosen = scans[start : start + together] if together > 1 else scans[position : position + 1]
+            position, motion_there = stillest(paired[period].tolist(), moved)
+            is_still = motion_there <= STILL_M
+            (farthest if is_still else moving).append(float(apart[position]))
+            together = self._options.accumulate if is_still else 1
+            chosen = [scans[one] for one in standing(position, together, len(scans), moved)]
             moments.append(Moment(images[image_of[position]], tuple(chosen)))
-        farthest = max(abs(one.image.seconds - _middle(one.scans)) for one in moments) if moments else 0.0
         notes = [
-            f"{self.image} ({len(images)}) and {self.points} ({len(scans)}): {len(moments)} frames, {still} of them at "
-            f"a standstill, image and scan up to {1000 * farthest:.0f} ms apart."
+            f"{self.image} ({len(images)}) and {self.points} ({len(scans)}): {len(moments)} frames, "
+            f"{len(farthest) - 1} of them at a standstill, image and scan up to {max(farthest + moving):.0f} ms apart."
         ]
-        if 1000 * farthest > WORTH_A_WARNING_MS and still < len(moments):
-            notes.append(f"At 50 km/h that is {farthest * 50 / 3.6 * 100:.0f} cm; record at a standstill if possible.")
+        if self._options.accumulate > 1:
+            counts = sorted(len(one.scans) for one in moments)
+            notes.append(f"{counts[0]} to {counts[-1]} scans accumulated per frame, and only at a standstill.")
+        if self._options.by_recording_time:
+            notes.append(
+                "Paired by when they were recorded, up to 0.1 s after they were taken; trust standstills only."
+            )
+        elif max(moving) > WORTH_A_WARNING_MS:
+            away = max(moving) / 1000 * 50 / 3.6 * 100
+            notes.append(f"At 50 km/h that is {away:.0f} cm; record at a standstill if possible.")
         return moments, tuple(notes)
 
 
@@ -217,7 +231,3 @@ def _around(taken: NDArray[np.float64], swept: NDArray[np.float64]) -> NDArray[n
     """``[N, 2]``: the images before and after each scan."""
     after = np.clip(np.searchsorted(taken, swept), 0, len(taken) - 1)
     return np.stack([np.maximum(after - 1, 0), after], axis=1)
-
-
-def _middle(scans: Sequence[Stamped]) -> float:
-    return float(np.mean([one.seconds for one in scans]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from typing import Any
@@ -18,7 +19,11 @@ from calibnet.geometry import transform
 from calibnet.geometry.types import Rotation
 
 IMAGES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
-POINTS = ("sensor_msgs/msg/PointCloud2",)
+LIVOX = tuple(f"{package}/msg/CustomMsg" for package in ("livox_ros_driver", "livox_ros_driver2", "livox_interfaces"))
+"""Names of the scans of Livox's drivers, which are all of the same form."""
+POINTS = ("sensor_msgs/msg/PointCloud2", *LIVOX)
+PACKETS = re.compile(r"packet|(velodyne|hesai|pandar|rslidar|robosense|seyond)\w*scan", re.IGNORECASE)
+"""Pattern in the names of messages with the raw data of a scanner."""
 INFOS = ("sensor_msgs/msg/CameraInfo",)
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
@@ -88,11 +93,15 @@ def levels_of(message: Any) -> Levels:
 
 
 def columns_of(message: Any) -> Columns:
-    """Columns ``[N]`` of a PointCloud2 of any layout, by name in lower case.
+    """Columns ``[N]`` of a PointCloud2 of any layout, or of Livox's message, by name in lower case.
 
     Raises:
         CloudError: it has fewer bytes than its header states.
     """
+    if not hasattr(message, "fields"):
+        names = ("x", "y", "z", "reflectivity")
+        rows = [[getattr(point, name) for name in names] for point in message.points]
+        return dict(zip(names, np.array(rows, np.float32).reshape(-1, len(names)).T, strict=True))
     order = ">" if message.is_bigendian else "<"
     count, step, width = int(message.width) * int(message.height), int(message.point_step), int(message.width)
     if count > MOST_POINTS or not 0 < step <= 4096:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from calibnet.datasets.bag.mcap_file import McapFile, is_foreign
-from calibnet.datasets.bag.messages import IMAGES, INFOS, POINTS, stamp_of
+from calibnet.datasets.bag.messages import IMAGES, INFOS, LIVOX, POINTS, stamp_of
 from calibnet.datasets.bag.unpacking import bound_unpacking
 from calibnet.errors import DatasetError
 from calibnet.runtime.reading import MEGABYTE, require_file
@@ -26,6 +26,7 @@ METADATA_BYTES = 16 * MEGABYTE
 DEFINED = {
     *IMAGES,
     *POINTS,
+    *(scan.replace("CustomMsg", "CustomPoint") for scan in LIVOX),
     *INFOS,
     "tf2_msgs/msg/TFMessage",
     "sensor_msgs/msg/PointField",
@@ -38,6 +39,11 @@ DEFINED = {
     "geometry_msgs/msg/Quaternion",
 }
 """Message types that are read, including nested ones; a bag has definitions of its own."""
+LIVOX_POINT = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line\n"
+LIVOX_SCAN = (
+    "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\nCustomPoint[] points\n"
+)
+"""Livox's messages, which ROS does not define, nor an old bag of ROS 2 that has them."""
 
 
 class Topic(NamedTuple):
@@ -53,6 +59,10 @@ class Stamped(NamedTuple):
 
     recorded: int
     seconds: float
+
+    def as_recorded(self) -> Stamped:
+        """The same message, with the time of its recording for its stamp."""
+        return Stamped(self.recorded, self.recorded * 1e-9)
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,6 @@ class BagRecording:
             DatasetError: it is missing, damaged, or of an unsupported kind.
         """
         from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
 
         self.paths = [file for path in paths for file in _parts(path)]
         for path in self.paths:
@@ -95,7 +104,7 @@ class BagRecording:
                     if channel.store is not None:
                         self._check_definitions(channel.store, channel.old)
             else:
-                standard = get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+                standard = _standard(old)
                 self._reader = AnyReader(self.paths, default_typestore=standard)
                 self._reader.open()
                 self._check_definitions(self._reader.typestore, old)
@@ -172,11 +181,9 @@ class BagRecording:
         Raises:
             DatasetError: a field is missing or has another type.
         """
-        from rosbags.typesys import Stores, get_typestore
-
-        standard = dict(get_typestore(Stores.ROS2_HUMBLE).fielddefs)
+        standard = dict(_standard(False).fielddefs)
         if old:  # ROS 1's stored types lack TFMessage, which is the same in both
-            standard |= get_typestore(Stores.ROS1_NOETIC).fielddefs
+            standard |= _standard(True).fielddefs
         for name in sorted(store.fielddefs.keys() & DEFINED):
             fields = dict(store.fielddefs[name][1])
             wrong = [field for field, kind in standard[name][1] if fields.get(field) != kind]
@@ -211,6 +218,17 @@ class BagRecording:
             with self._naming(connection):
                 return connection.decode(data)
         return self._reader.deserialize(data, connection.msgtype)
+
+
+def _standard(old: bool) -> Typestore:
+    """ROS's message types, of ROS 1 or 2, and Livox's."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+    for scan in LIVOX:
+        store.register(get_types_from_msg(LIVOX_SCAN, scan))
+        store.register(get_types_from_msg(LIVOX_POINT, scan.replace("CustomMsg", "CustomPoint")))
+    return store
 
 
 def _parts(path: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from calibnet.datasets.bag.messages import IMAGES, INFOS
+from calibnet.datasets.bag.messages import IMAGES, INFOS, PACKETS, POINTS
 from calibnet.datasets.bag.recording import BagRecording, Topic
 from calibnet.errors import DatasetError
 
@@ -36,6 +36,12 @@ def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], opti
     if len(found) == 1:
         return found[0].name
     if not found:
+        packets = [topic.name for topic in bag.topics if types == POINTS and PACKETS.search(topic.type)]
+        if packets:
+            raise DatasetError(
+                f"Bag {bag} has no {what}, only a scanner's packets in {packets[0]}; play it with the scanner's driver "
+                "running, and record the PointCloud2 that this publishes."
+            )
         raise DatasetError(f"Bag {bag} has no {what}; {_listed(bag.topics, 'messages', bag)}.")
     raise DatasetError(
         f"Bag {bag} has several topics of {what}; choose one with --{option}: {_listed(found, what, bag)}."

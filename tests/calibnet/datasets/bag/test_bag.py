@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from rosbags.typesys import get_types_from_msg
 
 from calibnet.conformance import check_dataset
 from calibnet.datasets.bag import Bag, BagOptions
 from calibnet.datasets.bag.messages import columns_of, levels_of
-from calibnet.datasets.bag.moments import change
 from calibnet.datasets.calibration_files import FrameChoice
 from calibnet.datasets.images.development import Development
 from calibnet.errors import DatasetError
@@ -262,7 +262,36 @@ def test_a_transform_that_is_none_is_left_out_as_ros_does(quaternion: tuple[floa
         Bag([bag.close()])
 
 
-def test_points_without_a_place_do_not_move_a_scan() -> None:
-    points = make_frame(0).points
-    nowhere = np.vstack([points, np.full((3, 4), np.nan, np.float32), np.full((3, 4), np.inf, np.float32)])
-    assert change(points, nowhere) == 0.0
+def test_scans_of_livox_s_drivers_are_read(tmp_path: Path) -> None:
+    for kind, package in (("ros1", "livox_ros_driver"), ("sqlite3", "livox_ros_driver2"), ("mcap", "livox_interfaces")):
+        bag = BagWriter(tmp_path / f"drive-{kind}{'.bag' if kind == 'ros1' else ''}", kind)
+        bag.write_all_but_points(FRAMES[0], 10.0)
+        bag.write("/livox/lidar", bag.livox(FRAMES[0].points, 10.0, package), 10.0)
+        (frame,) = Bag([bag.close()])
+        assert_array_equal(frame.points[:, :3], FRAMES[0].points[:, :3])
+        assert_allclose(frame.points[:, 3], np.floor(FRAMES[0].points[:, 3] * 255) / 255, atol=1e-6)
+
+
+def test_clocks_that_differ_are_paired_by_recording_time_on_request(tmp_path: Path) -> None:
+    """The scanner counts from its start, as an Ouster does by default."""
+    bag = BagWriter(tmp_path / "drive", "mcap")
+    for number, frame in enumerate(FRAMES):
+        bag.write_all_but_points(frame, 1000.0 + number)
+        bag.write("/points", bag.cloud(frame.points, 7.0 + number), 1000.04 + number)
+    path = bag.close()
+    with pytest.raises(DatasetError, match=r"the nearest is 99\d,\d{3} ms away; .*, --by-recording-time"):
+        Bag([path])
+    found = Bag([path], BagOptions(by_recording_time=True))
+    for frame, expected in zip(found, FRAMES, strict=True):
+        assert_array_equal(frame.points[:, :3], expected.points[:, :3])
+    assert found.notes[1].endswith("trust standstills only.")
+
+
+def test_packets_of_a_scanner_have_to_be_unpacked(tmp_path: Path) -> None:
+    bag = BagWriter(tmp_path / "drive", "mcap")
+    bag.types.register(get_types_from_msg("std_msgs/Header header\n", "velodyne_msgs/msg/VelodyneScan"))
+    bag.write_all_but_points(FRAMES[0], 10.0)
+    packets = bag.make("velodyne_msgs/msg/VelodyneScan", header=bag.header(10.0, "velodyne"))
+    bag.write("/velodyne_packets", packets, 10.0)
+    with pytest.raises(DatasetError, match=r"only a scanner's packets in /velodyne_packets; play it with the scanner"):
+        Bag([bag.close()])
