@@ -24,6 +24,8 @@ CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
 """Unit in seconds of a time since 1970, by its number of digits."""
 TIME_IN_NAME = re.compile(r"(?:.*[^\d.])?(\d{13}|\d{16}|\d{19}|\d{10}[._]\d{3,9})|(\d{10,19}|\d{9,10}[._]\d+)")
 """A time since 1970 as a file name or, for milliseconds and finer, at its end, as in nuScenes."""
+DATE = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[ T_-](\d\d)[:-]?(\d\d)[:-]?(\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
+"""A date as a time or a file name, as in KITTI and ISO 8601, with up to nine digits of a second."""
 NEWEST = 4e9
 """Largest time in seconds since 1970."""
 
@@ -182,6 +184,7 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
     if path.exists():
         lines = [line.strip() for line in read_text(path, "Times", TEXT_BYTES).splitlines()]
         words = [line for line in lines if line and not line.startswith("#")]
+        words = _by_file(words, files) or words
         seconds = [_seconds(word) for word in words]
         if None in seconds:
             raise DatasetError(
@@ -192,9 +195,29 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
         if len(seconds) != len(files):
             raise DatasetError(f"{path} has {len(seconds)} times for {len(files)} files; write one per line.")
         return np.array(seconds, dtype=np.float64)
-    named = [TIME_IN_NAME.fullmatch(stem) for stem in files]
-    seconds = [None if match is None else _seconds((match[1] or match[2]).replace("_", ".")) for match in named]
+    seconds = [_in_name(stem) for stem in files]
     return None if None in seconds else np.array(seconds, dtype=np.float64)
+
+
+def _by_file(lines: list[str], files: Mapping[str, Path]) -> list[str] | None:
+    """The times of all files in order, from lines that name a file and its time, in either order; None for others."""
+    names = {name: stem for stem, path in files.items() for name in (path.name, stem)}
+    found: dict[str, str] = {}
+    for line in lines:
+        first, second = ([*re.split(r"[,;\s]+", line, maxsplit=1), ""])[:2]
+        for name, time in ((first, second), (second, first)):
+            if (stem := names.get(name.rpartition("/")[2])) is not None and _seconds(time) is not None:
+                found.setdefault(stem, time)
+                break
+    return [found[stem] for stem in files] if found.keys() == files.keys() else None
+
+
+def _in_name(stem: str) -> float | None:
+    """The time that a file name is, or ends with."""
+    if "." in stem and (seconds := _of_date(stem)) is not None:
+        return seconds
+    match = TIME_IN_NAME.fullmatch(stem)
+    return None if match is None else _seconds((match[1] or match[2]).replace("_", "."))
 
 
 def _seconds(word: str) -> float | None:
@@ -209,12 +232,15 @@ def _seconds(word: str) -> float | None:
 
 
 def _of_date(word: str) -> float | None:
-    """Seconds of a date in KITTI's format, with up to nine digits of a second."""
-    match = re.fullmatch(r"(\d{4}-\d{2}-\d{2})[ T](\d{2}:\d{2}:\d{2})(\.\d+)?Z?", word)
+    """Seconds of a `DATE`, in UTC unless it says otherwise; a leap second counts as the one after it."""
+    match = DATE.fullmatch(word)
     if match is None:
         return None
+    year, month, day, hour, minute, second, fraction, zone = match.groups()
+    leap = second == "60"
+    text = f"{year}-{month}-{day}T{hour}:{minute}:{'59' if leap else second}{zone or '+00:00'}"
     try:
-        whole = datetime.datetime.fromisoformat(f"{match[1]}T{match[2]}+00:00").timestamp()
+        whole = datetime.datetime.fromisoformat(text).timestamp()
     except ValueError:
         return None
-    return whole + float(match[3] or 0)
+    return whole + leap + float(fraction or 0)

@@ -16,6 +16,8 @@ MATRIX = r"cameramat(rix)?|k|m1|intrinsics?|intrinsicmatrix|cam(era)?intrinsics?
 COEFFICIENTS = r"distortioncoeff(icient)?s?|distcoeffs?|distortion|d|d1|dist"
 MODEL = r"distortionmodel|lensmodel|cameramodel"
 WIDTH, HEIGHT, SIZE = r"(image|img|frame)?width", r"(image|img|frame)?height", r"(image|img|frame)size|resolution"
+SECOND = "M2"
+"""Matrix of the right camera in the file of a stereo pair."""
 LIDAR_FROM_CAMERA = "CameraExtrinsicMat"
 """Key of Autoware.AI's calibration tool, which also writes ``CameraMat``, ``DistCoeff`` and ``ImageSize``."""
 
@@ -35,6 +37,8 @@ def read(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> CalibrationF
         DatasetError: there is no camera matrix, no distortion, or no size.
     """
     matrix_key, coefficients_key = _key(content, MATRIX), _key(content, COEFFICIENTS)
+    if SECOND in content:
+        raise DatasetError(f"Calibration {path} has two cameras (M1, {SECOND}); keep the matrix and lens of one.")
     extrinsic = values.extrinsic(content, path)
     if extrinsic is None and LIDAR_FROM_CAMERA in content:
         extrinsic = invert(values.pose(content[LIDAR_FROM_CAMERA], path, LIDAR_FROM_CAMERA))

@@ -17,6 +17,15 @@ OPENCV_YAML, OPENCV_TAG = "%YAML:1.0", "!!opencv-matrix"
 END_OF_MESSAGE = re.compile(r"^---[ \t]*$", re.MULTILINE)
 """Line that ROS's ``topic echo`` prints after every message."""
 MOST_MESSAGES = 100
+AS_EXTRINSIC = "write them as 'lidar_from_camera: {translation: [x, y, z], quaternion_xyzw: [x, y, z, w]}'"
+UNREADABLE = {
+    r"^(from [\w.]+ )?import \w": "is a program, which is not run; print its numbers, and " + AS_EXTRINSIC,
+    r"\A(At time [\d.]+\s+)?- Translation: \[": "is printed by tf_echo, which does not name its frames; if that was "
+    f"'tf2_echo LIDAR CAMERA', take translation and quaternion, and {AS_EXTRINSIC}",
+    r"\A[-+\d.eE,;\s\[\]]{20,}\Z": "has numbers without a name, so the direction of the extrinsic is unknown; name its "
+    "matrix 'camera_from_lidar: [[…], …]' or 'lidar_from_camera: [[…], …]'",
+}
+"""What cannot be read, as patterns of the start of a file, and what to do about it."""
 REMEDY = (
     "write width, height, camera_matrix, distortion and camera_from_lidar to it, or give the file of another tool "
     "(docs/own-sensors.md)"
@@ -38,6 +47,10 @@ def parse(path: Path) -> Parsed:
     """
     text = read_text(path, "Calibration", remedy=REMEDY)
     start = text.lstrip()
+    if problem := next(
+        (words for pattern, words in UNREADABLE.items() if re.search(pattern, start, re.MULTILINE)), None
+    ):
+        raise DatasetError(f"Calibration {path} {problem}.")
     if start.startswith("<"):
         try:
             root = ElementTree.fromstring(text)

@@ -168,3 +168,43 @@ def test_times_that_are_asked_for_and_missing(write_layout):
     layout = write_layout("folder")
     with pytest.raises(DatasetError, match=r"images has no times for pairing; write .*timestamps\.txt"):
         layout.open(max_time_difference=20)
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ["2026-03-01T14:05:06.1+09:00", "2026-03-01T05:05:07.1Z", "2026-03-01 05:05:09.1"],
+        ["20260301T050506.100", "20260301T050507.100", "20260301T050509.100"],
+        ["2016-12-31 23:59:60.5", "2017-01-01 00:00:01.5", "2017-01-01 00:00:03.5"],
+        ["-1.5", "-0.5", "1.5"],
+    ],
+)
+def test_dates_of_other_forms_are_times(times, write_layout):
+    """Also in other zones, at a leap second, and of a clock that starts below zero."""
+    layout = write_layout("folder")
+    for files in (layout.images, layout.scans):
+        write_times(files, times)
+    assert_allclose([frame.timestamp for frame in layout.open(max_time_difference=5)], [0, 1, 3], atol=1e-6)
+
+
+def test_names_that_are_dates_are_times(write_layout):
+    layout = write_layout("folder")
+    for files, late in ((layout.images, 0), (layout.scans, 4)):
+        stems = [f"2026-03-01_14-05-0{second}.12{late}" for second in (6, 7, 9)]
+        files[:] = [path.rename(path.parent / f"{stem}{path.suffix}") for path, stem in zip(files, stems, strict=True)]
+    sequence = layout.open()
+    assert sequence.notes == ("Paired by time: 3 frames, image and scan up to 4 ms apart.",)
+    assert_allclose([frame.timestamp for frame in sequence], [0, 1, 3], atol=1e-6)
+
+
+@pytest.mark.parametrize("line", ["{time} images/{name}", "{name},{time}", "{stem}\t{time}"])
+def test_lines_that_name_their_file_need_no_order(line, write_layout):
+    layout = write_layout("folder")
+    for files in (layout.images, layout.scans):
+        times = zip(files, (10.0, 11.0, 13.0), strict=True)
+        lines = [line.format(time=time, name=path.name, stem=path.stem) for path, time in times]
+        (files[0].parent / "timestamps.txt").write_text("# time, file\n" + "\n".join(reversed(lines)))
+    assert_allclose([frame.timestamp for frame in layout.open(max_time_difference=5)], [0, 1, 3])
+    (layout.images[0].parent / "timestamps.txt").write_text("\n".join(lines[:2]))
+    with pytest.raises(DatasetError, match="is not a time; write seconds"):
+        layout.open(max_time_difference=5)

@@ -343,6 +343,25 @@ def test_garbage_is_one_sentence(text, write):
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("from launch import LaunchDescription\nx = {'a': 1}\n", "is a program, which is not run; print its numbers"),
+        ("#!/usr/bin/env python3\nimport os\nprint('a: 1')\n", "is a program, which is not run"),
+        (
+            "At time 12.5\n- Translation: [0.1, 0.2, 0.3]\n- Rotation: in Quaternion [0.5, -0.5, 0.5, 0.5]\n",
+            "is printed by tf_echo, which does not name its frames; if that was 'tf2_echo LIDAR CAMERA', take",
+        ),
+        ("0 -1 0 0.1\n0 0 -1 0.2\n1 0 0 0.3\n0 0 0 1\n", "the direction of the extrinsic is unknown; name its matrix"),
+        ("[[0,-1,0,1e-1],[0,0,-1,.2],[1,0,0,.3],[0,0,0,1]]", "the direction of the extrinsic is unknown"),
+        ("%YAML:1.0\n---\nM1: [1, 0, 0]\nD1: [0]\nM2: [1, 0, 0]\n", "has two cameras \\(M1, M2\\); keep the matrix"),
+    ],
+)
+def test_what_others_print_without_names_says_what_to_do(text, sentence, write):
+    with pytest.raises(DatasetError, match=sentence):
+        read_calibration(write(text))
+
+
 LAUNCHED = {
     "ROS 2, YAML": "launch:\n- group:\n  - node: {pkg: tf2_ros, exec: static_transform_publisher, args: "
     "'--x 0.2 --z -0.1 --roll -1.5707963267948966 --yaw -1.5707963267948966 --frame-id velodyne "
