@@ -18,6 +18,7 @@ from tests.hostile import (
     guesses,
     kinds,
     names,
+    odd,
     options,
     outputs,
     pictures,
@@ -44,6 +45,7 @@ ROWS = list(
         guesses.rows(),
         kinds.rows(),
         training.rows(),
+        odd.rows(),
     )
 )
 

@@ -100,8 +100,8 @@ def columns_of(message: Any) -> Columns:
     """
     if not hasattr(message, "fields"):
         names = ("x", "y", "z", "reflectivity")
-        rows = [[getattr(point, name) for name in names] for point in message.points]
-        return dict(zip(names, np.array(rows, np.float32).reshape(-1, len(names)).T, strict=True))
+        points = np.array([[getattr(one, name) for name in names] for one in message.points], np.float32)
+        return dict(zip(names, points.reshape(-1, len(names)).T, strict=True))
     order = ">" if message.is_bigendian else "<"
     count, step, width = int(message.width) * int(message.height), int(message.point_step), int(message.width)
     if count > MOST_POINTS or not 0 < step <= 4096:
