@@ -139,8 +139,8 @@ def error_drive(kind: str) -> str:
 
 
 def error_limit(kind: str) -> str:
-    """The limit of the success rate, as a curve to compare the others with."""
-    return f"error/{kind}/success_limit"
+    """What a frame's result must be within to be accepted, as a curve to compare the others with."""
+    return f"error/{kind}/limit"
 
 
 def of_scale(stage: int, stride: int, name: str) -> str:

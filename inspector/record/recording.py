@@ -28,9 +28,9 @@ from inspector.record.observation import Layout, Observation
 from inspector.record.outcome import outcome_values
 from inspector.record.stream import Stream, plain
 from inspector.record.subtree import Subtree
+from inspector.record.tabs import overview
 from inspector.record.tabs.blueprint import make_blueprint
 from inspector.record.tabs.drive import log_drive, log_drive_overlay
-from inspector.record.tabs.overview import WORST, log_worst
 from inspector.record.tabs.registry import wanted_tabs
 from inspector.record.tabs.watch import log_watch
 
@@ -93,7 +93,7 @@ class Recording:
             tab.log(self._rec, observation, self._contents)
         if self._layout.with_worst and observation.badness > self._worst:
             self._worst = observation.badness
-            log_worst(self._rec, observation, self._contents)
+            overview.log_worst(self._rec, observation, self._contents)
         self._flush_frame()
 
     def log_skipped(self, frames: Iterable[BadFrame]) -> None:
@@ -123,7 +123,7 @@ class Recording:
         if estimate.verdict is not None:
             self._rec.log_once(entities.VERDICT_DRIVE, verdict_values(estimate.verdict))
         if math.isfinite(self._worst):
-            remarks = [*remarks, f"*{WORST}*, above the picture, shows that one."]
+            remarks = [*remarks, f"*{overview.WORST}*, above the picture of *{overview.NAME}*, shows that one."]
         log_drive(self._rec, estimate, reference, self._seconds, given, remarks)
         self._stream.flush()
 

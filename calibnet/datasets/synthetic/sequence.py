@@ -81,5 +81,5 @@ class SyntheticSequence:
             index=index,
             timestamp=index * FRAME_INTERVAL,
             exposure=self.exposure,
-            source=f"{self.name} frame {index}",
+            source=f"{self.name}/{index:06d}",
         )

@@ -13,6 +13,7 @@ import math
 import rerun as rr
 import rerun.blueprint as rrb
 
+from calibnet.verdict import FRAME_LIMITS
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.frame import image_of
@@ -49,8 +50,8 @@ FIT_LIMIT = f"{FIT}/limit"
 """Largest match error at which the last stage's result is believed."""
 LEGEND_CURVES = "legend/curves"
 """Legend of the curves."""
-SUCCESS = {"rotation": 1.0, "translation": 2.5}
-"""Limits of the stricter success rate, in the units of `entities.ERROR_KINDS`."""
+LIMITS = dict(zip(entities.ERROR_KINDS, FRAME_LIMITS, strict=True))
+"""What the result of a frame must be within to be accepted, in the units of `entities.ERROR_KINDS`."""
 
 
 def fit_stage(number: int) -> str:
@@ -157,7 +158,7 @@ def _log_errors(rec: Subtree, observation: Observation) -> None:
     if observation.reference is None:
         return
     for kind in entities.ERROR_KINDS:
-        rec.log(entities.error_limit(kind), rr.Scalars(SUCCESS[kind]))
+        rec.log(entities.error_limit(kind), rr.Scalars(LIMITS[kind]))
         curves = {entities.error_initial(kind): trace.initial, entities.error_corrected(kind): trace.corrected}
         curves |= {entities.error_stage(kind, stage.number): stage.after for stage in trace.stages}
         for curve, camera_from_lidar in curves.items():
@@ -179,14 +180,15 @@ def _log_fit(rec: Subtree, observation: Observation) -> None:
 
 def _log_curve_styles(rec: Subtree, layout: Layout) -> None:
     looks = {stage.number: (stage.short.lower(), colors.STAGES[stage.number]) for stage in layout.stages}
-    names = {f"after {name}": color for name, color in looks.values()} | {"limit": colors.LIMIT}
+    names = {f"after {name}": color for name, color in looks.values()}
+    names[f"limit: {FRAME_LIMITS}" if layout.has_reference else "limit"] = colors.LIMIT
     log_names(rec, LEGEND_CURVES, names | frames_named(layout))
     curves = {fit_stage(number): look for number, look in looks.items()} if layout.with_fit else {}
     limits = {FIT_LIMIT: "believed: below"} if layout.with_fit else {}
     for kind, unit in entities.ERROR_KINDS.items() if layout.has_reference else ():
         curves[entities.error_initial(kind)] = ("miscalibrated", colors.INITIAL)
         curves |= {entities.error_stage(kind, number): look for number, look in looks.items()}
-        limits[entities.error_limit(kind)] = f"success: below {SUCCESS[kind]:g} {unit}"
+        limits[entities.error_limit(kind)] = f"limit of a frame: {LIMITS[kind]:g} {unit}"
     for path, name in limits.items():
         rec.log_once(path, rr.SeriesLines(names=name, colors=colors.LIMIT, widths=1.5))
     for path, (name, color) in curves.items():
