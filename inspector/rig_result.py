@@ -14,7 +14,9 @@ from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
 COLUMNS = ("camera", "verdict", "off the reference", "uncertainty (1σ)", "camera alone", "corrected by", "match error")
-"""Columns of the table with a row per camera, the most important first: a narrow window cuts off the last."""
+"""Columns of the table with a row per camera, the most important first."""
+VIEWED = 5
+"""Number of its columns that the viewer has room for; reports have all."""
 
 
 class Residual(NamedTuple):
@@ -174,7 +176,8 @@ class RigResult:
         reasons = [*dict.fromkeys(explained(camera.verdict) for camera in self.cameras)]
         if len(reasons) == 1:  # one that holds for all belongs to the word; several are read beside the table
             yield from (reasons.pop(), "")
-        yield from markdown_table(*self.table())
+        headings, rows = self.table()
+        yield from markdown_table(headings[:VIEWED], [row[:VIEWED] for row in rows])
         yield ""
         for reason in reasons:
             yield from (reason, "")

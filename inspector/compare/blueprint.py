@@ -16,6 +16,7 @@ from inspector.record.tabs.views import (
     SCREEN_WIDTH,
     View,
     curve_view,
+    in_rows,
     legend,
     overlay_view,
 )
@@ -53,7 +54,8 @@ def results_tab(comparison: Comparison) -> View:
         below = rrb.Horizontal(plots, table, column_shares=[0.8, 1.0])
     height = _overlay_height(comparison)
     shares = [height, LEGEND_HEIGHT, SCREEN_HEIGHT - LEGEND_HEIGHT - height]
-    answers = side_by_side([_answer(comparison, run) for run in comparison.runs])
+    small = len(comparison.runs) >= MOST_COLUMNS
+    answers = in_rows([_answer(comparison, run, small) for run in comparison.runs], MOST_COLUMNS)
     return rrb.Vertical(answers, _point_legends(comparison), below, row_shares=shares, name="Comparison")
 
 
@@ -68,23 +70,18 @@ def overlays_tab(comparison: Comparison) -> View:
         before.append(_overlay(comparison, "Reference (truth)", entities.OVERLAY_REFERENCE, small=True))
     rows = [before, [_answer(comparison, run, small=True) for run in comparison.runs]]
     rows.append([_alone(comparison, run, small=True) for run in comparison.runs if run.shows_drive])
-    pictures = map(side_by_side, filter(None, rows))
+    pictures = [in_rows(row, MOST_COLUMNS) for row in rows if row]
     shares = [SCREEN_HEIGHT - LEGEND_HEIGHT, LEGEND_HEIGHT]
     return rrb.Vertical(rrb.Vertical(*pictures), _point_legends(comparison), row_shares=shares, name="Before and after")
 
 
-def side_by_side(views: list[rrb.Spatial2DView]) -> View:
-    """Views in rows of at most `MOST_COLUMNS`."""
-    return rrb.Grid(*views, grid_columns=min(len(views), MOST_COLUMNS))
-
-
-def _answer(comparison: Comparison, run: ComparedRun, small: bool = False) -> rrb.Spatial2DView:
+def _answer(comparison: Comparison, run: ComparedRun, small: bool) -> rrb.Spatial2DView:
     if not run.shows_drive:
         return _alone(comparison, run, small)
     return _overlay(comparison, f"{run.name}: whole drive as one", run.path(entities.OVERLAY_DRIVE), small)
 
 
-def _alone(comparison: Comparison, run: ComparedRun, small: bool = False) -> rrb.Spatial2DView:
+def _alone(comparison: Comparison, run: ComparedRun, small: bool) -> rrb.Spatial2DView:
     return _overlay(comparison, f"{run.name}: each frame alone", run.path(entities.OVERLAY_CORRECTED), small)
 
 

@@ -32,7 +32,7 @@ from inspector.record.stream import Stream, plain
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import move_below
 from inspector.record.tabs.scene import BACKGROUND, POINT_SIZE, frustum
-from inspector.record.tabs.views import View, legend, overlay_view, with_legend
+from inspector.record.tabs.views import View, in_rows, legend, overlay_view, with_legend
 from inspector.rig_result import CameraResult, RigResult
 
 MOMENTS = 40
@@ -169,7 +169,7 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
         )
         for camera, size in zip(cameras, sizes, strict=True)
     ]
-    grid = rrb.Grid(*pictures, grid_columns=_columns(len(pictures), sizes[0].width / sizes[0].height))
+    grid = in_rows(pictures, _columns(len(pictures), sizes[0].width / sizes[0].height))
     left = with_legend(grid, legend("Depth of the points", entities.LEGEND_POINTS), "Cameras")
     cloud = rrb.Spatial3DView(
         origin=f"/{WORLD}",

@@ -20,6 +20,9 @@ LINE_POINTS = 600
 MARKED_POINTS = 80
 """Largest number of frames that are drawn as dots with a tooltip."""
 BINS = 24
+MOST_LOG_TICKS = 10
+DECADES, LOG_MARGIN = 4, 1.15
+"""Largest number of powers of ten that a logarithmic axis spans, and the factor by which it goes beyond the values."""
 
 
 @dataclass(frozen=True)
@@ -39,27 +42,34 @@ class Series:
 
 @dataclass(frozen=True)
 class Axes:
-    """Maps data to the drawing and draws the axes; ``x_limits`` and ``y_limits`` are the limits of the plot."""
+    """Maps data to the drawing and draws the axes.
+
+    Attributes:
+        x_limits: limits of the plot.
+        y_limits: likewise.
+        log_x: whether the axis is logarithmic.
+        log_y: likewise.
+    """
 
     x_limits: tuple[float, float]
     y_limits: tuple[float, float]
+    log_x: bool = False
+    log_y: bool = False
 
     def x(self, value: float) -> float:
         """Horizontal position of a value."""
-        low, high = self.x_limits
-        return LEFT + (WIDTH - LEFT - RIGHT) * (value - low) / (high - low)
+        return LEFT + (WIDTH - LEFT - RIGHT) * share(value, self.x_limits, self.log_x)
 
     def y(self, value: float) -> float:
         """Vertical position of a value; the drawing's y points down."""
-        low, high = self.y_limits
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (value - low) / (high - low)
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share(value, self.y_limits, self.log_y)
 
     def frame(self, x_name: str, y_name: str, whole_x: bool = False, whole_y: bool = False) -> str:
         """Grid, numbers and names; ``whole_x`` and ``whole_y`` allow whole numbers only, for frames and counts."""
         parts = []
-        for tick in ticks(*self.y_limits, whole_y):
+        for tick in log_ticks(*self.y_limits) if self.log_y else ticks(*self.y_limits, whole_y):
             parts += [_rule(self.y(tick), "grid"), _text(LEFT - 6, self.y(tick) + 4, f"{tick:g}", "end")]
-        for tick in ticks(*self.x_limits, whole_x):
+        for tick in log_ticks(*self.x_limits) if self.log_x else ticks(*self.x_limits, whole_x):
             parts.append(_text(self.x(tick), HEIGHT - BOTTOM + 16, f"{tick:g}", "middle"))
         parts += [
             _rule(self.y(self.y_limits[0]), "axis"),
@@ -72,7 +82,9 @@ class Axes:
 def line_chart(
     title: str, frames: Sequence[int], series: Sequence[Series], unit: str, spoken: Callable[[float], str]
 ) -> str:
-    """A chart of values over frame numbers, with one line per series and an axis from zero.
+    """A chart of values over frame numbers, with one line per series and a logarithmic axis.
+
+    The start is often a hundred times as far off as the result, which a linear axis would squash onto zero.
 
     Args:
         title: title for screen readers.
@@ -82,8 +94,8 @@ def line_chart(
         spoken: gives a value with its unit, for tooltips.
     """
     first, last = min(frames), max(frames)
-    highest = max(float(one.values.max()) for one in series)
-    axes = Axes((first - 0.5, last + 0.5) if first == last else (first, last), (0.0, headroom(highest)))
+    x_limits = (first - 0.5, last + 0.5) if first == last else (float(first), float(last))
+    axes = Axes(x_limits, log_limits(series), log_y=True)
     shapes = [axes.frame("frame", unit, whole_x=True)]
     for one in series:
         x, y = thinned(np.asarray(frames, dtype=np.float64), one.values)
@@ -100,11 +112,11 @@ def line_chart(
 
 
 def histogram(title: str, series: Sequence[Series], x_name: str) -> str:
-    """A histogram of values over frames, with the same bins for all series, which overlap."""
-    highest = headroom(max(float(one.values.max()) for one in series))
-    edges = np.linspace(0.0, highest, BINS + 1)
-    counts = [np.histogram(one.values, edges)[0] for one in series]
-    axes = Axes((0.0, highest), (0.0, headroom(max(int(count.max()) for count in counts))))
+    """A histogram of values over frames, with the same bins for all series, which overlap; its axis is logarithmic."""
+    limits = log_limits(series)
+    edges = np.geomspace(*limits, BINS + 1)
+    counts = [np.histogram(np.clip(one.values, *limits), edges)[0] for one in series]
+    axes = Axes(limits, (0.0, headroom(max(int(count.max()) for count in counts))), log_x=True)
     shapes = [axes.frame(x_name, "frames", whole_y=True)]
     for one, count in zip(series, counts, strict=True):
         for low, high, number in zip(edges[:-1], edges[1:], count, strict=True):
@@ -127,6 +139,31 @@ def ticks(low: float, high: float, whole: bool = False) -> list[float]:
         step = max(1.0, step)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [round(index * step, 9) for index in range(first, last + 1)]
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Values 1, 2 and 5 times a power of ten between two limits above zero; powers only if these are many."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    within = lambda factors: [f * 10.0**p for p in powers for f in factors if low <= f * 10.0**p <= high]  # noqa: E731
+    fine = within((1, 2, 5))
+    return fine if len(fine) <= MOST_LOG_TICKS else within((1,))
+
+
+def log_limits(series: Sequence[Series]) -> tuple[float, float]:
+    """Limits of a logarithmic axis: a little beyond the values above zero, over at most `DECADES` powers of ten."""
+    values = np.concatenate([one.values[one.values > 0.0] for one in series])
+    if not len(values):
+        return 0.1, 1.0
+    highest = float(values.max())
+    return max(float(values.min()), highest / 10.0**DECADES) / LOG_MARGIN, highest * LOG_MARGIN
+
+
+def share(value: float, limits: tuple[float, float], logarithmic: bool) -> float:
+    """How far along an axis a value lies, 0..1; on a logarithmic one, values below its lower limit lie at 0."""
+    low, high = limits
+    if logarithmic:
+        value, low, high = math.log(max(value, low)), math.log(low), math.log(high)
+    return (value - low) / (high - low)
 
 
 def headroom(highest: float) -> float:

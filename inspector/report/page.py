@@ -171,12 +171,9 @@ def _settings(figures: Figures) -> str:
     if known.get("frames") == ":":
         known["frames"] = "all"
     ordered = {name: known[name] for name in [*SETTING_NAMES, *known] if name in known}
-    ordered |= {f"weights of stage {number}": _record(record) for number, record in run.weights.items()}
-    return "\n".join(
-        f"<tr><th>{escape(SETTING_NAMES.get(name, name))}</th><td>{escape(_told(value))}</td></tr>"
-        for name, value in ordered.items()
-        if str(value)
-    )
+    cells = {SETTING_NAMES.get(name, name): _told(value) for name, value in ordered.items()}
+    cells |= {f"weights of stage {number}": _record(record) for number, record in run.weights.items()}
+    return "\n".join(f"<tr><th>{escape(name)}</th><td>{escape(told)}</td></tr>" for name, told in cells.items() if told)
 
 
 def _told(value: object) -> str:

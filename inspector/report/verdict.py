@@ -10,7 +10,16 @@ import numpy as np
 from calibnet.evaluation.metrics import Distribution, Metrics
 from calibnet.geometry import PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Word
+from calibnet.verdict import (
+    ACCEPTED,
+    CANNOT_TELL,
+    DRIVE_TOLERANCES,
+    FRAME_LIMITS,
+    FRAME_TOLERANCES,
+    REJECTED,
+    Tolerance,
+    Word,
+)
 from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures, State
 from inspector.verdicts import certainty
@@ -27,22 +36,18 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Rotation or translation, with the bounds of the two success rates.
+    """Rotation or translation.
 
     Attributes:
         name: name at the start of a sentence.
         unit: unit, including the space before it if there is one.
         axis: the unit as a word, for charts.
-        good: limit of the stricter success rate.
-        fair: limit of the other success rate.
         decimals: number of meaningful decimals.
     """
 
     name: str
     unit: str
     axis: str
-    good: float
-    fair: float
     decimals: int
 
     def say(self, value: float) -> str:
@@ -54,13 +59,17 @@ class Quantity:
         decimals = 2 if value < 1.0 else 1 if value < 10.0 else 0
         return f"{value:.{decimals}f}{self.unit}"
 
+    def of(self, tolerance: Tolerance) -> float:
+        """Its part of a tolerance."""
+        return tolerance.rotation_deg if self.unit == "°" else tolerance.translation_cm
+
     def bound(self, value: float) -> str:
         """A limit with its unit, without empty decimals."""
         return f"{value:g}{self.unit}"
 
 
-ROTATION = Quantity("Rotation", "°", "degrees", 1.0, 2.0, 2)
-TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 2.5, 5.0, 1)
+ROTATION = Quantity("Rotation", "°", "degrees", 2)
+TRANSLATION = Quantity("Translation", "\u00a0cm", "centimetres", 1)
 GRADES: dict[Word, Grade] = {ACCEPTED: "good", CANNOT_TELL: "fair", REJECTED: "bad"}
 CLEAR_CHANGE = 2.0
 """Ratio of a correction to the frames' disagreement from which the correction is significant."""
@@ -159,15 +168,15 @@ def _judge_error(quantity: Quantity, figures: Figures) -> Finding:
     if after >= before.median:
         return Finding("bad", f"{name} is not corrected: {say(before.median)} before, {say(after)} after.{worse}")
     result = f"{say(before.median)} before, {say(after)} after{spread}"
-    if most < quantity.good:
-        return Finding("good", f"{name} is good: {result}.{worse}")
-    if after < quantity.good:
-        return Finding("fair", f"{name} is good in most frames but not in all: {result}.{worse}")
-    if after < quantity.fair:
-        wanted = f"below {quantity.bound(quantity.good)} would be good"
-        return Finding("fair", f"{name} is roughly right: {result}; {wanted}.{worse}")
-    wanted = f"it should be below {quantity.bound(quantity.fair)}"
-    return Finding("bad", f"{name} is not good enough: {result}; {wanted}.{worse}")
+    good, fair = (quantity.of(one) for one in (FRAME_TOLERANCES if drive is None else DRIVE_TOLERANCES))
+    limit = f"the limit is {quantity.bound(good)}"
+    if most <= good:
+        return Finding("good", f"{name} is good: {result}; {limit}.{worse}")
+    if after <= good:
+        return Finding("fair", f"{name} is good in most frames but not in all: {result}; {limit}.{worse}")
+    if after <= fair:
+        return Finding("fair", f"{name} is roughly right: {result}; {limit}.{worse}")
+    return Finding("bad", f"{name} is not good enough: {result}; {limit}.{worse}")
 
 
 def _worse(quantity: Quantity, figures: Figures, what: str = "it") -> str:
@@ -209,9 +218,10 @@ def _judge_agreement(figures: Figures) -> list[Finding]:
     for quantity in (ROTATION, TRANSLATION):
         start, end = (_statistics(quantity, state) for state in (figures.initial, figures.corrected))
         name, scatter = quantity.name, f"{quantity.say(end.median)} in the median, {quantity.say(end.p95)} at 95 %"
-        if end.p95 < quantity.good:
+        limit = quantity.of(FRAME_LIMITS)
+        if end.p95 <= limit:
             findings.append(Finding("good", f"{name}: the frames agree well ({scatter})."))
-        elif end.median < quantity.fair:
+        elif end.median <= limit:
             findings.append(Finding("fair", f"{name}: the frames agree roughly ({scatter})."))
         else:
             findings.append(Finding("bad", f"{name}: the frames do not agree ({scatter})."))

@@ -20,6 +20,7 @@ from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import (
     View,
+    in_rows,
     map_legends,
     map_view,
     overlay_view,
@@ -88,7 +89,7 @@ def view(layout: Layout) -> View:
             layout.image,
         )
         pages = [
-            with_legend(rrb.Grid(*overlays, grid_columns=columns), point_legend(layout), "All stages"),
+            with_legend(in_rows(overlays, columns), point_legend(layout), "All stages"),
             with_legend(current, point_legend(layout), "Step by step"),
         ]
     if Part.VOLUMES in layout.contents.parts:

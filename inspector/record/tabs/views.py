@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import rerun as rr
@@ -83,6 +84,12 @@ def image_view(name: str, path: str, grid: Grid | None = None, *marks: str) -> r
     return rrb.Spatial2DView(
         origin=f"/{path}", contents=contents, name=name, visual_bounds=bounds, background=colors.GROUND
     )
+
+
+def in_rows(views: Sequence[View], columns: int) -> View:
+    """Views in rows of at most ``columns``, of which a shorter last one fills the width: an empty cell looks broken."""
+    rows = [rrb.Horizontal(*views[first : first + columns]) for first in range(0, len(views), columns)]
+    return rrb.Vertical(*rows) if len(rows) > 1 else rows[0]
 
 
 def scale_name(grid: Grid) -> str:
