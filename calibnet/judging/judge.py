@@ -126,8 +126,7 @@ def judge(
     known = predictors(trace)
     wrong, within = classifier(known), classifier.finest(known, FRAME_TOLERANCES)
     if within == FRAME_LIMITS:
-        reason = f"Picture and scan fit together (match error {last.match_error_px:.1f} px)."
-        return verdict(ACCEPTED, reason, within=within)
+        return verdict(ACCEPTED, "Picture and scan fit together.", within=within)
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
     fit = "Picture and scan fit together, but less well than in runs with a correct result"

@@ -142,11 +142,15 @@ def ticks(low: float, high: float, whole: bool = False) -> list[float]:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Values 1, 2 and 5 times a power of ten between two limits above zero; powers only if these are many."""
-    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    within = lambda factors: [f * 10.0**p for p in powers for f in factors if low <= f * 10.0**p <= high]  # noqa: E731
-    fine = within((1, 2, 5))
-    return fine if len(fine) <= MOST_LOG_TICKS else within((1,))
+    """Values 1, 2 and 5 times a power of ten between two limits above zero; powers only if these are many.
+
+    If there are fewer than two of them, the ticks are those of a linear axis.
+    """
+    powers = [10.0**power for power in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)]
+    fine = [factor * power for power in powers for factor in (1, 2, 5) if low <= factor * power <= high]
+    if len(fine) < 2:
+        return ticks(low, high)
+    return fine if len(fine) <= MOST_LOG_TICKS else [power for power in powers if low <= power <= high]
 
 
 def log_limits(series: Sequence[Series]) -> tuple[float, float]:

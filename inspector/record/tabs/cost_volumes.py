@@ -45,6 +45,8 @@ TRUE_MATCH = "true_match"
 """Displacement to where the reference puts each cell's point, as flow colours."""
 PEAK_PROBABILITY = "peak_probability"
 """Probability of the best match of each cell."""
+LOW_PROBABILITIES = 0.3
+"""Exponent by which small probabilities are seen too: those of most displacements are below a hundredth."""
 SLICES = "slices"
 """All slices of the aggregated volume side by side, one for every displacement."""
 SLICE_MARKS = f"{SLICES}/marks"
@@ -154,6 +156,7 @@ def _tensor_row(number: int, grid: Grid) -> View:
             tensor_view(
                 f"{scale_name(grid)}: {kind}, displaced by dy, dx (middle: not at all)",
                 entities.of_scale(number, grid.stride, name),
+                gamma=LOW_PROBABILITIES if name == PROBABILITY else 1.0,
             )
             for name, kind in kinds.items()
         )

@@ -37,9 +37,9 @@ def stage_table(observation: Observation, path: Callable[[str], str] | None = No
         *_verdicts(observation),
         f"### {_headline(observation)}",
         "",
-        *_match_error(observation),
         *_stages(observation, path),
         "",
+        *_match_error(observation),
         *_axes(observation),
         "",
     ]

@@ -155,13 +155,13 @@ def span_named(first: int, last: int) -> dict[str, colors.Rgb]:
     return {f"frames {first} to {last}": colors.GROUND}
 
 
-def tensor_view(name: str, path: str) -> rrb.TensorView:
-    """A view of a cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``."""
+def tensor_view(name: str, path: str, gamma: float = 1.0) -> rrb.TensorView:
+    """A view of a cost volume as an image over ``(x, y)`` with sliders for ``(dy, dx)``; brighter for a small gamma."""
     return rrb.TensorView(
         origin=f"/{path}",
         name=name,
         slice_selection=rrb.TensorSliceSelection(width=3, height=2, slider=[0, 1]),
-        scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="nearest"),
+        scalar_mapping=rrb.TensorScalarMapping(colormap="viridis", mag_filter="nearest", gamma=gamma),
         view_fit="FillKeepAspectRatio",
     )
 

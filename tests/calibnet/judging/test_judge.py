@@ -33,7 +33,7 @@ CLASSIFIER = fitted(Classifier(0.0, {"match_error": 1.0}, accepted_below=0.6, re
 def test_what_fits_is_accepted_with_what_was_found() -> None:
     verdict = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=1.2), CLASSIFIER)
     assert verdict.word == ACCEPTED and verdict.causes == ()
-    assert verdict.reason == "Picture and scan fit together (match error 1.2 px)."
+    assert verdict.reason == "Picture and scan fit together."
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
     away = pose_error(REFERENCE, GUESS)
     assert verdict.moved == (pytest.approx(away.rotation_deg), pytest.approx(away.translation_cm))

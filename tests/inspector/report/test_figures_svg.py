@@ -8,7 +8,18 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
-from inspector.report.figures_svg import HEIGHT, WIDTH, Series, histogram, line_chart, thinned, ticks
+from inspector.report.figures_svg import (
+    HEIGHT,
+    WIDTH,
+    Series,
+    histogram,
+    line_chart,
+    log_limits,
+    log_ticks,
+    share,
+    thinned,
+    ticks,
+)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +34,27 @@ from inspector.report.figures_svg import HEIGHT, WIDTH, Series, histogram, line_
 )
 def test_ticks_are_round(limits: tuple[float, float], whole: bool, expected: list[float]) -> None:
     assert ticks(*limits, whole) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        ((0.15, 6.0), [0.2, 0.5, 1, 2, 5]),
+        ((0.009, 30.0), [0.01, 0.1, 1, 10]),
+        ((3.0, 4.1), [3.0, 3.2, 3.4, 3.6, 3.8, 4.0]),
+    ],
+)
+def test_ticks_of_a_logarithmic_axis_are_round(limits: tuple[float, float], expected: list[float]) -> None:
+    assert log_ticks(*limits) == pytest.approx(expected)
+
+
+def test_a_logarithmic_axis_shows_small_values_beside_large_ones() -> None:
+    limits = log_limits(
+        [Series("start", "initial", np.full(3, 20.0)), Series("end", "stage-5", np.array([0.2, 0, 2.0]))]
+    )
+    assert limits == pytest.approx((0.2 / 1.15, 20.0 * 1.15))
+    assert share(2.0, limits, True) == pytest.approx(0.5)
+    assert share(0.0, limits, True) == 0.0
 
 
 def test_long_lines_keep_their_peaks() -> None:

@@ -81,15 +81,15 @@ def test_the_drive_leads_where_it_is_believed(known: RecordedRun) -> None:
     reference = known.frames[0].reference
     assert reference is not None
     drive = reference.copy()
-    drive[0, 3] += 0.04
+    drive[0, 3] += 0.12
     skipped = (BadFrame(known.frames[2].index, "no points"), BadFrame(99, "it is not recorded"))
     believed = Verdict(CANNOT_TELL, "too few frames", drive, skipped=skipped)
     run = replace(known, drive=drive, drive_verdict=believed)
     figures = Figures.of(run)
-    assert "to 0.00° / 4.0 cm, 4 of 5 frames as one;" in headline(figures).replace("\u00a0", " ")
+    assert "to 0.00° / 12 cm, 4 of 5 frames as one;" in headline(figures).replace("\u00a0", " ")
     rotation, translation, alone = (finding.sentence.replace("\u00a0", " ") for finding in findings(figures))
-    assert rotation.startswith("Rotation is good") and "0.00° after." in rotation
-    assert translation.startswith("Translation is roughly right") and "4.0 cm after;" in translation
+    assert rotation.startswith("Rotation is good") and "0.00° after; the limit is 0.3°." in rotation
+    assert translation.startswith("Translation is roughly right") and "12.0 cm after; the limit is 8 cm" in translation
     assert alone.startswith("One by one, 95 % of the frames end below")
     rejected = Figures.of(replace(run, drive_verdict=replace(believed, word=REJECTED)))
     assert findings(rejected) == findings(Figures.of(known)) and headline(rejected) == headline(Figures.of(known))
@@ -145,7 +145,7 @@ def test_without_reference_it_says_change_and_agreement_only(unknown: RecordedRu
 
 
 def test_frames_that_disagree_are_not_called_good(unknown: RecordedRun) -> None:
-    found = findings(Figures.of(moved(unknown, [-0.2, 0.0, 0.3])))
+    found = findings(Figures.of(moved(unknown, [-0.4, 0.0, 0.5])))
     assert any(finding.grade == "bad" and "do not agree" in finding.sentence for finding in found)
     assert any("may have been right" in finding.sentence for finding in found)
 
