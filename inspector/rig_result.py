@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from calibnet.geometry import CameraModel, PoseError, pose_error
+from calibnet.geometry import CameraModel, PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.markdown import markdown_table
@@ -65,14 +65,14 @@ class CameraResult:
     def line(self) -> str:
         """The result in a sentence, for the terminal."""
         turned, shifted = self.verdict.moved
-        said = f"{self.name}: {self.verdict.word}, corrected by {turned:.2f}° / {shifted:.1f} cm"
+        said = f"{self.name}: {self.verdict.word}, corrected by {degrees_and_cm(turned, shifted)}"
         if self.verdict.covariance is not None:
-            said += f", ±{self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm (1σ)"
+            said += f", ±{degrees_and_cm(self.verdict.sigma_rotation_deg, self.verdict.sigma_translation_cm)} (1σ)"
         if self.residual.rotation_deg is not None:
-            alone = f"{self.residual.rotation_deg:.2f}° / {self.residual.translation_cm:.1f} cm"
+            alone = degrees_and_cm(self.residual.rotation_deg, self.residual.translation_cm)
             said += f", {alone} from the result of its own frames"
         if self.error is not None:
-            said += f", off the reference by {self.error.rotation_deg:.2f}° / {self.error.translation_cm:.1f} cm"
+            said += f", off the reference by {degrees_and_cm(self.error.rotation_deg, self.error.translation_cm)}"
         return f"{said}." if self.verdict.word == ACCEPTED else f"{said}. {explained(self.verdict)}"
 
     def row(self) -> list[str]:
@@ -80,14 +80,12 @@ class CameraResult:
         turned, shifted = self.verdict.moved
         residual, sure, off = self.residual, "", ""
         if self.verdict.covariance is not None:
-            sure = f"{self.verdict.sigma_rotation_deg:.2f}° / {self.verdict.sigma_translation_cm:.1f} cm"
+            sure = degrees_and_cm(self.verdict.sigma_rotation_deg, self.verdict.sigma_translation_cm)
         if self.error is not None:
-            off = f"{self.error.rotation_deg:.2f}° / {self.error.translation_cm:.1f} cm"
-        alone = (
-            "" if residual.rotation_deg is None else f"{residual.rotation_deg:.2f}° / {residual.translation_cm:.1f} cm"
-        )
+            off = degrees_and_cm(self.error.rotation_deg, self.error.translation_cm)
+        alone = "" if residual.rotation_deg is None else degrees_and_cm(residual.rotation_deg, residual.translation_cm)
         px = "" if math.isnan(residual.match_error_px) else f"{residual.match_error_px:.1f} px"
-        return [self.name, self.verdict.word, off, sure, alone, f"{turned:.2f}° / {shifted:.1f} cm", px]
+        return [self.name, self.verdict.word, off, sure, alone, degrees_and_cm(turned, shifted), px]
 
     def recorded(self) -> dict[str, Any]:
         """The JSON object that a recording keeps."""
@@ -151,9 +149,9 @@ class RigResult:
         errors = [camera.error for camera in self.cameras if camera.error is not None]
         if len(errors) == len(self.cameras):
             far = max(error.rotation_deg for error in errors), max(error.translation_cm for error in errors)
-            return f"{said}: {far[0]:.2f}° / {far[1]:.1f} cm off the reference{self._at_most}."
+            return f"{said}: {degrees_and_cm(far[0], far[1])} off the reference{self._at_most}."
         turned, shifted = (max(camera.verdict.moved[i] for camera in self.cameras) for i in (0, 1))
-        return f"{said}: corrected by {turned:.2f}° / {shifted:.1f} cm{self._at_most}."
+        return f"{said}: corrected by {degrees_and_cm(turned, shifted)}{self._at_most}."
 
     @property
     def _at_most(self) -> str:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from calibnet.geometry import degrees_and_cm
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
@@ -42,7 +43,7 @@ def certainty(verdict: Verdict) -> str:
     """Uncertainty of the result in degrees and centimetres; empty where none is stated."""
     if verdict.covariance is None:
         return ""
-    return f"±{verdict.sigma_rotation_deg:.2f}° / {verdict.sigma_translation_cm:.1f} cm (1σ)."
+    return f"±{degrees_and_cm(verdict.sigma_rotation_deg, verdict.sigma_translation_cm)} (1σ)."
 
 
 def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:

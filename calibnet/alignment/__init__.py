@@ -5,7 +5,7 @@ themselves has other errors, so both together come closer than either. It reache
 to correct a drive first.
 """
 
-from calibnet.alignment.evidence import Evidence, gather, picture_camera
+from calibnet.alignment.evidence import Evidence, gather, image_camera
 from calibnet.alignment.solve import align
 
-__all__ = ["Evidence", "align", "gather", "picture_camera"]
+__all__ = ["Evidence", "align", "gather", "image_camera"]

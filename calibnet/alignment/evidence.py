@@ -175,9 +175,9 @@ def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
         seen = zip(frame.faces, turns, strict=True)
         found = [InRig(gather(frame.through(face), turn @ camera_from_lidar), turn) for face, turn in seen]
         return Evidence(tuple(Share(term, 1 / len(found)) for term in found))
-    camera = picture_camera(frame.camera)
+    camera = image_camera(frame.camera)
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
-    across, any_way = picture_edges(grey, camera)
+    across, any_way = image_edges(grey, camera)
     projection = project(frame.points, camera_from_lidar, camera)
     winner = nearest_per_cell(projection, camera)
     rank = ranks(frame.points[projection.index, 3])
@@ -193,12 +193,12 @@ def gather(frame: Frame, camera_from_lidar: Extrinsic) -> Evidence:
     return Evidence(tuple(terms))
 
 
-def picture_camera(camera: PinholeCamera) -> PinholeCamera:
+def image_camera(camera: PinholeCamera) -> PinholeCamera:
     """The camera of the resized image."""
     return camera.fitted(HEIGHT, WIDTH, 1)
 
 
-def picture_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
+def image_edges(grey: NDArray[np.uint8], camera: PinholeCamera) -> tuple[Map, Map]:
     """Strength of edges relative to their surroundings, ``[H, W]``: of edges across the rows, and of all edges.
 
     The rows of a scan run along those of the image, so where depth jumps along a row, an edge should run across it.

@@ -129,9 +129,9 @@ def turned(
     left, top = np.ceil((corners[:2] / corners[2]).min(axis=1)).astype(int).tolist()
     right, bottom = np.floor((corners[:2] / corners[2]).max(axis=1)).astype(int).tolist()
 
-    def warped(picture: NDArray[np.uint8], columns: range, rows: range, border: int) -> NDArray[np.uint8]:
+    def warped(image: NDArray[np.uint8], columns: range, rows: range, border: int) -> NDArray[np.uint8]:
         moved = np.array([[1.0, 0.0, -columns.start], [0.0, 1.0, -rows.start], [0.0, 0.0, 1.0]]) @ homography
-        warped = cv2.warpPerspective(picture, moved, (len(columns), len(rows)), borderMode=border)
+        warped = cv2.warpPerspective(image, moved, (len(columns), len(rows)), borderMode=border)
         return warped.astype(np.uint8, copy=False)
 
     columns, rows = range(left, right + 1), range(top, bottom + 1)

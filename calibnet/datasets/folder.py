@@ -21,7 +21,7 @@ from calibnet.datasets.calibration_files import (
 from calibnet.datasets.clouds.scans import SCAN_SUFFIXES
 from calibnet.datasets.images.development import Development, Levels
 from calibnet.datasets.images.files import BY_ITSELF, read_image, read_levels
-from calibnet.datasets.images.lens import LOOKED_AT, Lens, Picture
+from calibnet.datasets.images.lens import LOOKED_AT, Lens, RectifiedImage
 from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
 from calibnet.datasets.pairing import Pair, pair
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, of_lens, refuse
@@ -95,31 +95,31 @@ class Folder(PairedSequence):
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
 
-    def _picture(self, files: FrameFiles) -> Picture:
+    def _image(self, files: FrameFiles) -> RectifiedImage:
         camera = self._lens.camera
         return self._lens(read_image(files.needed.image, (camera.width, camera.height), self._development))
 
 
 def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -> Development:
     """The conversion of a drive's images to eight bits; several are examined if they have more bits."""
-    pictures = list[Levels]()
+    found = list[Levels]()
     for position in evenly_spaced(len(images), DEPTHS_LOOKED_AT):
         with suppress(DatasetError):  # each frame reports its own error
-            pictures.append(read_levels(images[position], (camera.width, camera.height)))
-            if pictures[0].dtype == np.uint8:
+            found.append(read_levels(images[position], (camera.width, camera.height)))
+            if found[0].dtype == np.uint8:
                 break
-    return Development.of(pictures, bayer)
+    return Development.of(found, bayer)
 
 
 def sample_images(
     images: list[Path], camera: CameraModel, development: Development = BY_ITSELF
 ) -> list[NDArray[np.uint8]]:
     """Some readable images spread over a drive; empty for a pinhole camera."""
-    pictures = list[NDArray[np.uint8]]()
+    found = list[NDArray[np.uint8]]()
     for position in evenly_spaced(len(images), 0 if camera.is_pinhole else LOOKED_AT):
         with suppress(DatasetError):
-            pictures.append(read_image(images[position], (camera.width, camera.height), development))
-    return pictures
+            found.append(read_image(images[position], (camera.width, camera.height), development))
+    return found
 
 
 def calibration_path(root: Path) -> Path:
@@ -180,13 +180,11 @@ def read_calibration_of(folder: Path) -> tuple[Path, CameraModel, Extrinsic]:
     Raises:
         DatasetError: it is missing, malformed, or lacks the camera or the extrinsic.
     """
-    images = folder / "images"
-    pictures = (
-        (path for path in sorted(images.iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES)
-        if images.is_dir()
-        else iter(())
+    at = folder / "images"
+    images = (
+        (path for path in sorted(at.iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES) if at.is_dir() else iter(())
     )
-    found = read_folder(folder, Wanted(picture=next(pictures, None)))
+    found = read_folder(folder, Wanted(image=next(images, None)))
     assert found.camera is not None and found.camera_from_lidar is not None
     return calibration_path(folder), found.camera, found.camera_from_lidar
 

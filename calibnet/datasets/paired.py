@@ -21,7 +21,7 @@ from calibnet.datasets.clouds.plausibility import of_scan
 from calibnet.datasets.clouds.scans import ending, full_scale_of, read_raw, read_scan
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import read_image
-from calibnet.datasets.images.lens import Picture
+from calibnet.datasets.images.lens import RectifiedImage
 from calibnet.datasets.images.plausibility import bit_depth, mosaic
 from calibnet.datasets.pairing import TIMES
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
@@ -114,7 +114,7 @@ class PairedSequence(ABC):
         files = self.files[position]
         image_path, scan_path = files.needed
         calibration = self._calibration(files)
-        image, original, faces = self._picture(files)
+        image, original, faces = self._image(files)
         points = self._points(files)
         camera = PinholeCamera(image.shape[1], image.shape[0], calibration.matrix)
         extrinsic = calibration.camera_from_lidar
@@ -151,9 +151,9 @@ class PairedSequence(ABC):
         """The scan ``[N, 4]`` of one frame, in our axes."""
         return read_scan(files.needed.scan, self.cloud_columns, self._full_scale)
 
-    def _picture(self, files: FrameFiles) -> Picture:
+    def _image(self, files: FrameFiles) -> RectifiedImage:
         """The image of one frame."""
-        return Picture(read_image(files.needed.image))
+        return RectifiedImage(read_image(files.needed.image))
 
 
 def require_folder(folder: Path, remedy: str) -> Path:

@@ -1,10 +1,10 @@
 """Checks that cost nothing: whether a camera matrix, a lens or an extrinsic can be what it is taken to be.
 
-Those of scans and of pictures are in `clouds.plausibility` and `images.plausibility`.
+Those of scans and of images are in `clouds.plausibility` and `images.plausibility`.
 
 Each returns what cannot be right in one sentence, with a short name for machines, or None. What no sensor could have is
 refused as it is read (`refuse`); what some sensor might have is kept beside the frame, and is the first suspect when
-picture and scan do not fit (`suspicion`). The limits leave out no sensor that we know of.
+image and scan do not fit (`suspicion`). The limits leave out no sensor that we know of.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def suspicion(remarks: Iterable[Implausible], otherwise: str) -> str:
 
 def of_camera(camera: PinholeCamera) -> list[Implausible | None]:
     """All checks of a camera matrix; the first finding is the best explanation."""
-    return [focal_length(camera) or pixel_shape(camera), picture_size(camera) or principal_point(camera)]
+    return [focal_length(camera) or pixel_shape(camera), image_size(camera) or principal_point(camera)]
 
 
 def of_lens(camera: CameraModel) -> list[Implausible | None]:
@@ -85,7 +85,7 @@ def of_lens(camera: CameraModel) -> list[Implausible | None]:
         return (
             [] if any(of_camera(camera.pinhole)) else [distortion(camera)]
         )  # a wrong matrix would be blamed on the lens
-    return [pixel_shape(camera.pinhole), picture_size(camera.pinhole) or principal_point(camera.pinhole)]
+    return [pixel_shape(camera.pinhole), image_size(camera.pinhole) or principal_point(camera.pinhole)]
 
 
 def of_extrinsic(camera_from_lidar: Extrinsic) -> list[Implausible | None]:
@@ -104,7 +104,7 @@ def focal_length(camera: PinholeCamera) -> Implausible | None:
         guess = f"it seems to be a share of the width, so multiply by that ({focal * width:.0f} px)"
     elif focal < 100:
         guess = "it seems to be in millimetres, so divide it by the size of a pixel on the sensor"
-    text = f"the focal length {focal:g} px of a picture {width} px wide would see {view:.0f} degrees; {guess}"
+    text = f"the focal length {focal:g} px of an image {width} px wide would see {view:.0f} degrees; {guess}"
     return Implausible("focal-length", text, certain=True)
 
 
@@ -119,7 +119,7 @@ def distortion(camera: CameraModel) -> Implausible | None:
     if inside.mean() >= SEEN:
         return None
     text = (
-        f"with these distortion coefficients only {inside.mean():.0%} of the rectified picture would show anything; "
+        f"with these distortion coefficients only {inside.mean():.0%} of the rectified image would show anything; "
         "give those of this camera, in the order of the lens model"
     )
     return Implausible("distortion", text, certain=True)
@@ -150,7 +150,7 @@ def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection
     if not seen.valid.all() or not any(near < BLACK[0] and BLACK[1] < more for near, more in beyond):
         return None
     text = (
-        "the CameraInfo has a matrix K of larger pictures than its matrix P, so these seem to be rectified already, "
+        "the CameraInfo has a matrix K of larger images than its matrix P, so these seem to be rectified already, "
         "whatever their topic is called (kitti2bag writes such); give their calibration, P without distortion, with "
         "--guess FILE"
     )
@@ -164,21 +164,21 @@ def pixel_shape(camera: PinholeCamera) -> Implausible | None:
         return None
     text = (
         f"the focal lengths {camera.focal[0]:g} and {camera.focal[1]:g} px make pixels {ratio:.2g} times as high as "
-        "wide; unless the picture was resized to another shape, give the same units for both"
+        "wide; unless the image was resized to another shape, give the same units for both"
     )
     return Implausible("focal-length", text, certain=not 1 / STRETCHED <= ratio <= STRETCHED)
 
 
-def picture_size(camera: PinholeCamera) -> Implausible | None:
+def image_size(camera: PinholeCamera) -> Implausible | None:
     """Check that the principal point is not the middle of an image of another size."""
     across, down = 2 * camera.center[0] / camera.width, 2 * camera.center[1] / camera.height
     factor = (max(across, 0.0) * max(down, 0.0)) ** 0.5
     if not factor or abs(across / down - 1) > SAME_SHAPE or 1 / OTHER_SIZE < factor < OTHER_SIZE:
         return None
     text = (
-        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is the middle of a picture of about "
+        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is the middle of an image of about "
         f"{2 * camera.center[0]:.0f}x{2 * camera.center[1]:.0f}, and this one is {camera.width}x{camera.height}; "
-        "scale the camera matrix by the factor that the picture was resized by"
+        "scale the camera matrix by the factor that the image was resized by"
     )
     return Implausible("picture-size", text, certain=not 1 / SURELY_OTHER < factor < SURELY_OTHER)
 
@@ -189,8 +189,8 @@ def principal_point(camera: PinholeCamera) -> Implausible | None:
     if all(MIDDLE[0] <= share <= MIDDLE[1] for share in shares):
         return None
     text = (
-        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is far from the middle of a picture of "
-        f"{camera.width}x{camera.height}; unless the picture was cropped, give the camera matrix of this very size"
+        f"the principal point ({camera.center[0]:g}, {camera.center[1]:g}) is far from the middle of an image of "
+        f"{camera.width}x{camera.height}; unless the image was cropped, give the camera matrix of this very size"
     )
     return Implausible("principal-point", text, certain=not all(CROPPED[0] <= share <= CROPPED[1] for share in shares))
 

@@ -194,7 +194,7 @@ def require_match(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace
     if look.match_error_px > limit_px:
         usual = "check that they belong together and that the start is within the range of the first stage"
         raise CalibrationError(
-            f"Picture and scan of frame {frame.index} ({frame.source}) do not fit together after stage {look.number}, "
+            f"Image and scan of frame {frame.index} ({frame.source}) do not fit together after stage {look.number}, "
             f"which expects its matches to be {look.match_error_px:.1f} px off (at most {limit_px:g}): "
             f"{suspicion(frame.remarks, usual)}."
         )

@@ -52,7 +52,7 @@ def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame])
         position: position of the frame.
         donors: frames of other places, for their images.
     """
-    yield from picture_faults(donors)
+    yield from image_faults(donors)
     yield from camera_faults()
     yield from scan_faults()
     for late in (1, -1, 4, -4):
@@ -70,10 +70,10 @@ def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame])
         yield Corruption("far-start", f"x{factor:g}", None, faults.unaltered, factor == 3.0, farther=factor)
 
 
-def picture_faults(donors: Sequence[Frame]) -> Iterator[Corruption]:
+def image_faults(donors: Sequence[Frame]) -> Iterator[Corruption]:
     """Faults of the image."""
     for number, donor in enumerate(donors):
-        yield Corruption("other-picture", f"{number + 1}", "other-picture", faults.picture_of(donor), number == 0)
+        yield Corruption("other-picture", f"{number + 1}", "other-picture", faults.image_of(donor), number == 0)
     yield Corruption("grey", "", None, faults.grey)
     for pixels in (2.0, 5.0, 10.0):
         yield Corruption("blurred", f"{pixels:g} px", None, faults.blurred(pixels), pixels == 5)

@@ -15,6 +15,7 @@ from calibnet.geometry.miscalibration import (
 from calibnet.geometry.projection import Projection, depth_image, project, project_through
 from calibnet.geometry.se3 import (
     PoseError,
+    degrees_and_cm,
     euler_xyz,
     invert,
     orthonormal,
@@ -34,7 +35,7 @@ __all__ = [
     "PinholeCamera",
     "PoseError",
     "Projection",
-    "range_of",
+    "degrees_and_cm",
     "depth_image",
     "euler_xyz",
     "invert",
@@ -44,6 +45,7 @@ __all__ = [
     "pose_error",
     "project",
     "project_through",
+    "range_of",
     "rotation_angle",
     "rotation_from_euler_xyz",
     "rotation_from_vector",

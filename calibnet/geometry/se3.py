@@ -176,6 +176,11 @@ class PoseError:
     z_cm: float
 
 
+def degrees_and_cm(rotation_deg: float, translation_cm: float) -> str:
+    """The size of an error, a motion or a standard deviation for the reader: ``0.27° / 11.0 cm``."""
+    return f"{rotation_deg:.2f}° / {translation_cm:.1f} cm"
+
+
 def pose_error(estimate: Extrinsic, reference: Extrinsic) -> PoseError:
     """Compare two ``camera_from_lidar``: angle of ``R_est R_ref^T`` and ``|t_est - t_ref|``."""
     rotation = estimate[:3, :3] @ reference[:3, :3].T

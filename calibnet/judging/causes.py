@@ -1,6 +1,6 @@
-"""Why picture and scan do not fit: faults are undone one at a time, and the one without which they fit is the cause.
+"""Why image and scan do not fit: faults are undone one at a time, and the one without which they fit is the cause.
 
-If the picture is mirrored or rolled, or the scan uses other axes, hardly anything can be matched, so the match error of
+If the image is mirrored or rolled, or the scan uses other axes, hardly anything can be matched, so the match error of
 a coarse stage shows whether undoing a fault helps. Every attempt runs the network again, so this is done for frames
 that are not accepted and in `verify`, not for every frame. A wrong lens is recognised from the matches of the run
 itself, see `calibnet.judging.lens_causes`.
@@ -23,7 +23,7 @@ from calibnet.trace import StageTrace
 from calibnet.verdict import Cause
 
 Measure = Callable[[Frame, Extrinsic], float]
-"""How badly picture and scan of a frame fit, from a guess; raises `CalibrationError` if nothing can be matched."""
+"""How badly image and scan of a frame fit, from a guess; raises `CalibrationError` if nothing can be matched."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ class Search:
 def cause(
     search: Search, frame: Frame, guess: Extrinsic, measure: Measure, given: float | None = None
 ) -> tuple[Cause, ...]:
-    """Undo one fault at a time, and name the one without which picture and scan fit best, if they fit clearly better.
+    """Undo one fault at a time, and name the one without which image and scan fit best, if they fit clearly better.
 
     Args:
         search: the attempts.
         frame: the original frame.
         guess: ``camera_from_lidar`` that the run started from.
-        measure: how badly picture and scan fit.
+        measure: how badly image and scan fit.
         given: the measure of the original frame, if it is known already.
     """
 
@@ -113,12 +113,12 @@ def match_error_of(stage: Looking) -> Measure:
 
 
 def mirrored(frame: Frame) -> Frame:
-    """The frame with left and right of its picture exchanged."""
+    """The frame with left and right of its image exchanged."""
     return replace(frame, image=np.ascontiguousarray(frame.image[:, ::-1]))
 
 
 def turned(degrees: float) -> Callable[[Frame], Frame]:
-    """Rotate the picture clockwise about its principal point."""
+    """Rotate the image clockwise about its principal point."""
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
@@ -150,10 +150,10 @@ def scan(rotation: Floats) -> Callable[[Frame], Frame]:
     return undo
 
 
-def _picture_and_scan() -> Iterator[Attempt]:
-    yield Attempt(("mirrored", "left-handed"), "The picture is mirrored, or the scan's axes are left-handed.", mirrored)
+def _image_and_scan() -> Iterator[Attempt]:
+    yield Attempt(("mirrored", "left-handed"), "The image is mirrored, or the scan's axes are left-handed.", mirrored)
     for degrees in (-30, 30, -90, 90, 180):
-        yield Attempt(("roll",), f"The picture is rolled, by about {degrees:+d} degrees.", turned(-degrees))
+        yield Attempt(("roll",), f"The image is rolled, by about {degrees:+d} degrees.", turned(-degrees))
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for axes, rotation in (
         ("x right, y forward, z up", quarter.T),
@@ -169,7 +169,7 @@ def _picture_and_scan() -> Iterator[Attempt]:
         yield Attempt(("left-handed",), text, scan(np.diag(signs)))
 
 
-PICTURE_AND_SCAN = Search(tuple(_picture_and_scan()), share=0.6, most=18.0, unit="px of expected match error")
-"""Compared by the match error of a coarse stage. On 4 frames of 4 rigs, undoing a mirrored picture or other axes cut
-it to 0.13 to 0.5 of its value, undoing a rolled picture to 0.3 to 0.6. For a picture of another place the best attempt
-reached 0.5 once, and otherwise 0.8 and more. Without the fault it is 8 to 12 px; for a picture of another place 23."""
+IMAGE_AND_SCAN = Search(tuple(_image_and_scan()), share=0.6, most=18.0, unit="px of expected match error")
+"""Compared by the match error of a coarse stage. On 4 frames of 4 rigs, undoing a mirrored image or other axes cut
+it to 0.13 to 0.5 of its value, undoing a rolled image to 0.3 to 0.6. For an image of another place the best attempt
+reached 0.5 once, and otherwise 0.8 and more. Without the fault it is 8 to 12 px; for an image of another place 23."""

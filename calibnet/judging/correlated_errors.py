@@ -1,7 +1,7 @@
 """The covariance of a pose whose matches have correlated errors.
 
-Errors of the networks vary slowly over a picture, so a thousand matches are not a thousand independent measurements.
-The model here adds to the independent error of each match a polynomial of its position in the picture, common to all
+Errors of the networks vary slowly over an image, so a thousand matches are not a thousand independent measurements.
+The model here adds to the independent error of each match a polynomial of its position in the image, common to all
 matches. Whatever such a polynomial can imitate (mostly a rotation; with a long lens or on a bare road also a
 translation) is determined only to within the size of the polynomial.
 """
@@ -16,7 +16,7 @@ from calibnet.judging.lens import INDEPENDENT, LEAST_SCALE_PX, view
 from calibnet.trace import Matches
 
 DEGREE = 3
-"""Degree of the polynomial of the position, which is relative to the principal point, in half widths of the picture."""
+"""Degree of the polynomial of the position, which is relative to the principal point, in half widths of the image."""
 SIGMA_PX = 1.0
 """Standard deviation of each coefficient of the polynomial, in pixels of the stage's camera."""
 

@@ -1,6 +1,6 @@
 """The covariance of a single frame's result: that stated by the last stage, made as large as actual errors.
 
-The inverse of the stage's information treats every match as independent and ignores errors that the whole picture has
+The inverse of the stage's information treats every match as independent and ignores errors that the whole image has
 in common. It is therefore inflated by one factor, and a common part is added. Both are fitted to one set of weights,
 see `calibnet.judging.coefficients`.
 """

@@ -9,7 +9,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.plausibility import ROW_STEP, bit_depth
 from calibnet.datasets.plausibility import Implausible, of_camera, of_extrinsic
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.causes import PICTURE_AND_SCAN, Measure, Search, cause
+from calibnet.judging.causes import IMAGE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import covariance
 from calibnet.judging.lens_causes import lens_causes
@@ -31,9 +31,9 @@ from calibnet.verdict import (
 FARTHEST_REACH = 1.6
 """Reach beyond which a run is certainly wrong; between `MARGIN` and this it may have started outside the range."""
 UNRELATED_PX = 8.0
-"""Expected match error beyond which picture and scan have nothing in common."""
+"""Expected match error beyond which image and scan have nothing in common."""
 BLANK = 2.0
-"""Standard deviation of every colour channel below which a picture counts as blank."""
+"""Standard deviation of every colour channel below which an image counts as blank."""
 
 
 def judge(
@@ -50,11 +50,11 @@ def judge(
     Args:
         frame: the frame that was calibrated.
         guess: ``camera_from_lidar`` that the run started from, 4x4.
-        trace: of the run; None if too few points fell into the picture to run it.
+        trace: of the run; None if too few points fell into the image to run it.
         coefficients: fitted to the weights; without any nothing is accepted.
-        match_error: if given, causes are searched for a result that is not accepted: if picture and scan do not fit,
-            with this measure and `calibnet.judging.causes.PICTURE_AND_SCAN`, then by fitting the lens to the matches.
-        lag: attempts of `calibnet.judging.lag.lags` and their measure, used if picture and scan fit outside the range
+        match_error: if given, causes are searched for a result that is not accepted: if image and scan do not fit,
+            with this measure and `calibnet.judging.causes.IMAGE_AND_SCAN`, then by fitting the lens to the matches.
+        lag: attempts of `calibnet.judging.lag.lags` and their measure, used if image and scan fit outside the range
             searched, or hardly; a fault of the lens is looked for only if no lag explains it.
         prior: what the user knows of the extrinsic beforehand, in words. The classifier was fitted to runs in which all
             six axes are free. Such runs err mostly along axes that a prior may fix, so with a prior it can accept a
@@ -78,8 +78,8 @@ def judge(
         return suspects or (() if match_error is None or trace is None else lens_causes(trace, coefficients.lens))
 
     if trace is None or not trace.stages:
-        causes = why(PICTURE_AND_SCAN, match_error)
-        reason = "Hardly any point of the scan falls into the picture under the initial extrinsic."
+        causes = why(IMAGE_AND_SCAN, match_error)
+        reason = "Hardly any point of the scan falls into the image under the initial extrinsic."
         return Verdict(REJECTED, _because(reason, causes), guess, causes=causes)
 
     last = trace.stages[-1]
@@ -91,13 +91,13 @@ def judge(
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)
     if float(frame.image[::ROW_STEP].std(axis=(0, 1)).max()) < BLANK:
-        return verdict(REJECTED, "The picture is blank.")
+        return verdict(REJECTED, "The image is blank.")
     if not trace.fits:
         reason = (
-            f"Picture and scan do not fit together: the expected match error is {last.match_error_px:.1f} px, where at "
+            f"Image and scan do not fit together: the expected match error is {last.match_error_px:.1f} px, where at "
             f"most {trace.match_error_limit_px:g} px is usual."
         )
-        causes = why(PICTURE_AND_SCAN, match_error)
+        causes = why(IMAGE_AND_SCAN, match_error)
         if not causes and match_error is not None:
             if last.match_error_px > UNRELATED_PX:
                 text = "They seem to show different places, or the start is far outside the range searched."
@@ -120,20 +120,20 @@ def judge(
     if isinstance(classifier, str):
         return verdict(
             CANNOT_TELL,
-            f"Picture and scan fit together, but how reliable that is cannot be judged. {classifier}",
+            f"Image and scan fit together, but how reliable that is cannot be judged. {classifier}",
             suspects,
         )
     known = predictors(trace)
     wrong, within = classifier(known), classifier.finest(known, FRAME_TOLERANCES)
     if within == FRAME_LIMITS:
-        return verdict(ACCEPTED, "Picture and scan fit together.", within=within)
+        return verdict(ACCEPTED, "Image and scan fit together.", within=within)
     if math.isnan(wrong):
         return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
-    fit = "Picture and scan fit together, but less well than in runs with a correct result"
+    fit = "Image and scan fit together, but less well than in runs with a correct result"
     causes = why_lens()
     within = None if causes else within  # nothing is certain of a result that a fault may explain
     if within is not None:
-        fit = f"Picture and scan fit together, and the result is within {within}, but perhaps not within {FRAME_LIMITS}"
+        fit = f"Image and scan fit together, and the result is within {within}, but perhaps not within {FRAME_LIMITS}"
     reason = f"{fit} (probability of an error: {wrong:.0%})."
     if prior:
         reason = f"{fit} (probability of an error: {wrong:.0%} without prior knowledge, less with {prior})."

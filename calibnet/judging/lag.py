@@ -1,4 +1,4 @@
-"""Scans that are later or earlier than their pictures, recognised by the motion of the car from scan to scan.
+"""Scans that are later or earlier than their images, recognised by the motion of the car from scan to scan.
 
 A late scan shows the world from where the car is by then. Matches explain this by a camera farther back, or by another
 focal length, and they fit: nothing in one frame contradicts them. But if the scan is moved back by the car's own
@@ -70,7 +70,7 @@ def reach_of(calibrate: Callable[[Frame, Extrinsic], CascadeTrace], odds: LensOd
         odds: of faults of the lens; None if they cannot be told.
 
     Returns:
-        The measure. It is infinite if picture and scan do not fit, or if the matches rather indicate a fault of the
+        The measure. It is infinite if image and scan do not fit, or if the matches rather indicate a fault of the
         lens than none: then a lag does not explain them.
     """
 
@@ -111,9 +111,7 @@ def _backwards(motion: Motion | None) -> Motion:
 def _attempt(motion: Transform, share: float, seconds: float, word: str) -> Attempt:
     moved = pose_from_vector(share * pose_vector(motion))
     by = f"{share * seconds:.2g} s" if seconds > 0 else f"{share:g} of a frame"
-    text = (
-        f"Scans seem {by} {word} than their pictures: the car moves {np.linalg.norm(moved[:3, 3]):.1f} m in that time."
-    )
+    text = f"Scans seem {by} {word} than their images: the car moves {np.linalg.norm(moved[:3, 3]):.1f} m in that time."
     return Attempt(("time-offset",), text, scan_moved(moved))
 
 

@@ -63,7 +63,7 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
     evidence = f"probability {found[name]:.0%}, by a regression fitted to frames with such faults"
     if name == BENT:
         text = (
-            "The picture looks barrel-distorted: either its distortion was not removed, or it was taken with a fisheye "
+            "The image looks barrel-distorted: either its distortion was not removed, or it was taken with a fisheye "
             "lens (equidistant)."
         )
         return tuple(Cause(one, text, evidence) for one in (BENT, FISHEYE))
@@ -73,13 +73,13 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
 def _focal_length(fits: LensFits) -> str:
     longer = fits.focal.focal - 1  # the finest look has the right sign, and underestimates rather than overestimates
     return (
-        f"The picture looks as if its focal length were more than {abs(longer):.1%} "
+        f"The image looks as if its focal length were more than {abs(longer):.1%} "
         f"{'longer' if longer > 0 else 'shorter'} than camera_matrix says."
     )
 
 
 def _principal_point(fits: LensFits) -> str:
     return (
-        f"The picture looks as if its principal point lay more than {abs(fits.aside):.1%} of the width farther to the "
+        f"The image looks as if its principal point lay more than {abs(fits.aside):.1%} of the width farther to the "
         f"{'right' if fits.aside > 0 else 'left'} than camera_matrix says, or as if it were shifted."
     )

@@ -28,7 +28,7 @@ class LensPredictors:
         fine_focal, coarse_focal: logarithm of the fitted focal length relative to that of the calibration.
         fine_focal_size, coarse_focal_size: absolute value of this logarithm.
         fine_center_gain, coarse_center_gain: share of the cost that another principal point saves.
-        fine_center_size, coarse_center_size: horizontal offset of that principal point, in widths of the picture.
+        fine_center_size, coarse_center_size: horizontal offset of that principal point, in widths of the image.
         fine_radial_gain, coarse_radial_gain: share of the cost that radial distortion saves.
         fine_radial, coarse_radial: the fitted coefficient k1.
         fine_equidistant_gain, coarse_equidistant_gain: share of the cost that an equidistant lens saves.
@@ -59,7 +59,7 @@ class LensFits:
     Attributes:
         alone: fit of the pose alone.
         focal, center, radial, equidistant: fits of the pose and that property of the lens.
-        width: width of the picture in pixels.
+        width: width of the image in pixels.
     """
 
     alone: Fit
@@ -82,7 +82,7 @@ class LensFits:
 
     @property
     def aside(self) -> float:
-        """Offset of the principal point to the right, in widths of the picture."""
+        """Offset of the principal point to the right, in widths of the image."""
         return float(self.center.center[0]) / self.width
 
     def gain(self, other: Fit) -> float:

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
 from calibnet.judging.drive import FEWEST_JUDGED
@@ -104,7 +104,7 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     if few is not None:
         return verdict(CANNOT_TELL, few)
     if found.covariance is None:
-        off = f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+        off = degrees_and_cm(error.rotation_deg, error.translation_cm)
         return verdict(
             CANNOT_TELL, f"The calibration seems to be off by {off}, but the uncertainty of that is unknown."
         )
@@ -129,7 +129,7 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
 
 
 def unfit(given: Extrinsic, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:
-    """The verdict if there is no result, because picture and scan do not fit together.
+    """The verdict if there is no result, because image and scan do not fit together.
 
     Args:
         given: ``camera_from_lidar`` to verify, 4x4.

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import torch
 
-from calibnet.alignment import align, gather, picture_camera
-from calibnet.alignment.evidence import picture_edges
+from calibnet.alignment import align, gather, image_camera
+from calibnet.alignment.evidence import image_edges
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import resize_image
 from calibnet.exhibit import Exhibit
@@ -38,16 +38,16 @@ class EdgeAlignment:
         clock("evidence")
         found, _ = align([evidence], np.zeros(6), self.covariance)
         clock("alignment")
-        change, camera = pose_from_vector(found), picture_camera(frame.camera)
+        change, camera = pose_from_vector(found), image_camera(frame.camera)
         stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
         return CascadeTrace(initial, (replace(stage, exhibits=exhibits(frame)) if detail else stage,))
 
 
 def exhibits(frame: Frame) -> tuple[Exhibit, ...]:
     """The edges of the image that edges of the scan are aligned to."""
-    camera = picture_camera(frame.camera)
+    camera = image_camera(frame.camera)
     grey = np.asarray(cv2.cvtColor(resize_image(frame.image, camera), cv2.COLOR_RGB2GRAY), np.uint8)
-    across, any_way = picture_edges(grey, camera)
+    across, any_way = image_edges(grey, camera)
     return (
         Exhibit("Edges across the rows, to which depth edges are aligned", across.image),
         Exhibit("All edges, to which those of reflectance are aligned", any_way.image),

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from calibnet.alignment import Evidence, align, gather, picture_camera
+from calibnet.alignment import Evidence, align, gather, image_camera
 from calibnet.alignment.evidence import Reflectance
 from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
@@ -54,7 +54,7 @@ class InformationDistance:
         found = [align([evidence], np.zeros(6), self.covariance, [start])[0] for start in starts]
         distances = np.array([evidence(pose_from_vector(vector))[0] for vector in found])
         clock("descent")
-        change, camera = pose_from_vector(found[int(distances.argmin())]), picture_camera(frame.camera)
+        change, camera = pose_from_vector(found[int(distances.argmin())]), image_camera(frame.camera)
         stage = StageTrace(1, self.range, camera, initial, change @ initial, change, clock.parts)
         if detail:
             brightness = Exhibit("Brightness compared with the scan's reflectance", terms[0].brightness.image)

@@ -15,7 +15,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.files import resize_image
 from calibnet.geometry import transform
 from calibnet.training.augmentation_draws import Exposure, Scanner, View, mirrored
-from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe
+from calibnet.training.augmentation_recipe import CameraRecipe, ImageRecipe, ScanRecipe
 from calibnet.training.recipe import Recipe
 
 Generator = np.random.Generator
@@ -79,7 +79,7 @@ def elevation_for_another(points: NDArray[np.float32], scanner: Scanner) -> NDAr
     return elevation
 
 
-def photometric(image: NDArray[np.uint8], generator: Generator, recipe: PictureRecipe) -> NDArray[np.uint8]:
+def photometric(image: NDArray[np.uint8], generator: Generator, recipe: ImageRecipe) -> NDArray[np.uint8]:
     """The image with another exposure, gamma, colours, blur and noise, all drawn at random; sometimes grey."""
     return exposed(image, Exposure.draw(generator, recipe), generator)
 

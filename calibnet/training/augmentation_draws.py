@@ -11,7 +11,7 @@ import numpy as np
 
 from calibnet.geometry import PinholeCamera, rotation_from_euler_xyz
 from calibnet.geometry.types import Rotation, Vector3
-from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe
+from calibnet.training.augmentation_recipe import CameraRecipe, ImageRecipe, ScanRecipe
 
 Generator = np.random.Generator
 
@@ -141,7 +141,7 @@ class Exposure(NamedTuple):
     noise: float = 0.0
 
     @classmethod
-    def draw(cls, generator: Generator, recipe: PictureRecipe) -> Self:
+    def draw(cls, generator: Generator, recipe: ImageRecipe) -> Self:
         """Draw an exposure by the recipe."""
         grey = bool(generator.random() < recipe.grey)
         tinted = not grey and generator.random() < recipe.tinted

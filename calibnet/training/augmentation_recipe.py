@@ -58,7 +58,7 @@ class ScanRecipe:
 
 
 @dataclass(frozen=True)
-class PictureRecipe:
+class ImageRecipe:
     """Exposure, colours and noise of the image, whose values lie in 0..1."""
 
     grey: float = 0.2

@@ -38,7 +38,7 @@ Tracked = Callable[[Iterable[tuple[int, int]]], Iterable[tuple[int, int]]]
 """Passes on the frames to be packed one by one, and may show the progress."""
 
 
-def pack_picture(image: NDArray[np.uint8]) -> bytes:
+def pack_image(image: NDArray[np.uint8]) -> bytes:
     """Encode RGB ``[H, W, 3]`` as JPEG."""
     encoded, data = cv2.imencode(
         ".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
@@ -77,7 +77,7 @@ class Packed:
     """One frame in its packed form."""
 
     source: int
-    picture: bytes
+    image: bytes
     scan: bytes
     matrix: NDArray[np.float64]
     camera_from_lidar: Transform
@@ -87,13 +87,13 @@ class Packed:
         """Pack a frame of the source with this number."""
         frame = smaller(frame)
         return cls(
-            source, pack_picture(frame.image), pack_scan(frame.points), frame.camera.matrix, frame.camera_from_lidar
+            source, pack_image(frame.image), pack_scan(frame.points), frame.camera.matrix, frame.camera_from_lidar
         )
 
     @property
     def size(self) -> int:
         """Approximate size in bytes."""
-        return len(self.picture) + len(self.scan) + 300
+        return len(self.image) + len(self.scan) + 300
 
 
 class Packer:
@@ -135,7 +135,7 @@ class Packer:
         if not self.frames:
             return
         tensors: dict[str, Tensor] = {}
-        for name, packed in (("pictures", [f.picture for f in self.frames]), ("scans", [f.scan for f in self.frames])):
+        for name, packed in (("pictures", [f.image for f in self.frames]), ("scans", [f.scan for f in self.frames])):
             tensors[name] = torch.frombuffer(bytearray(b"".join(packed)), dtype=torch.uint8)
             tensors[f"{name}.ends"] = torch.tensor([len(data) for data in packed]).cumsum(0)
         tensors["sources"] = torch.tensor([frame.source for frame in self.frames])

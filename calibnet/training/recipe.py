@@ -12,7 +12,7 @@ from typing import Any
 from calibnet.geometry import RANGES, MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
 from calibnet.network.config import NetworkConfig
-from calibnet.training.augmentation_recipe import CameraRecipe, PictureRecipe, ScanRecipe
+from calibnet.training.augmentation_recipe import CameraRecipe, ImageRecipe, ScanRecipe
 from calibnet.training.options import TrainingOptions
 
 WIDEST, WIDE, MIDDLE, NARROW, NARROWEST = RANGES
@@ -197,7 +197,7 @@ class Recipe:
 
     camera: CameraRecipe = field(default_factory=CameraRecipe)
     scan: ScanRecipe = field(default_factory=ScanRecipe)
-    picture: PictureRecipe = field(default_factory=PictureRecipe)
+    picture: ImageRecipe = field(default_factory=ImageRecipe)  # the name in records of weights
     sample: SampleRecipe = field(default_factory=SampleRecipe)
     draws: DrawRecipe = field(default_factory=DrawRecipe)
     features: FeatureRecipe = field(default_factory=FeatureRecipe)

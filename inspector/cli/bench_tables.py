@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from calibnet.geometry import MiscalibrationRange
 from inspector.report.bench_rows import KINDS, NOTHING, about, costs, published_results, rows
-from inspector.report.bench_summary import ERRORS, LEGEND, PICTURES, summary
+from inspector.report.bench_summary import ERRORS, IMAGES, LEGEND, summary
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,7 +17,7 @@ def print_bench(content: dict[str, Any], console: Console) -> None:
     """Print a row per method for each range, a row per rig, the costs, and the figures of the papers."""
     console.print(about(content), LEGEND, sep="\n")
     for range_ in content["ranges"]:
-        for title, heads in (("mean errors", ERRORS), ("with images that do not belong to the scan", PICTURES)):
+        for title, heads in (("mean errors", ERRORS), ("with images that do not belong to the scan", IMAGES)):
             table = _summary(content, range_, title, heads)
             if len(table.columns) > 2:
                 console.print(table)

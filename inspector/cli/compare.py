@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from calibnet.geometry import degrees_and_cm
 from inspector.cli.errors import ExitCode
 from inspector.cli.output import say
 from inspector.cli.recordings import RECORDING, open_run
@@ -65,9 +66,9 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
             metrics, off = run.distance(comparison.first), f"from {comparison.first.name}"
         parts = []
         if drive is not None:
-            parts.append(f"{drive.rotation_deg:.2f}° / {drive.translation_cm:.1f} cm off as one drive")
+            parts.append(f"{degrees_and_cm(drive.rotation_deg, drive.translation_cm)} off as one drive")
         if metrics is not None:
-            median = f"{metrics.rotation_deg.median:.2f}° / {metrics.translation_cm.median:.1f} cm {off}"
+            median = f"{degrees_and_cm(metrics.rotation_deg.median, metrics.translation_cm.median)} {off}"
             parts.append(f"{median}, median over {len(run.frames)} frames")
         if parts:
             yield f"{run.name}: {'; '.join(parts)}."

@@ -242,8 +242,8 @@ METHOD_OPTIONS = (
         "--masks",
         type=FOLDER,
         metavar="DIR",
-        help="Masks for calib-anything: one folder per picture, named like it, with one PNG per mask.  "
-        "[default: segments of the picture]",
+        help="Masks for calib-anything: one folder per image, named like it, with one PNG per mask.  "
+        "[default: segments of the image]",
     ),
     click.option("--intrinsics", is_flag=True, help="Let pcba adjust focal length and principal point as well."),
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from calibnet.evaluation.metrics import Metrics
-from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.methods.registry import CASCADE
 from inspector.compare.comparison import ComparedRun, Comparison
 from inspector.markdown import markdown_table
@@ -72,7 +72,7 @@ def _drives(comparison: Comparison) -> list[str]:
         if of_first is not None:
             row.append(_pair(None if drive is None or run is first else pose_error(drive, of_first)))
         sure = None if verdict is None or verdict.covariance is None else verdict
-        row.append(NOTHING if sure is None else f"{sure.sigma_rotation_deg:.2f}° / {sure.sigma_translation_cm:.1f} cm")
+        row.append(NOTHING if sure is None else degrees_and_cm(sure.sigma_rotation_deg, sure.sigma_translation_cm))
         rows.append(row)
     return ["### Whole drive as one", "", *markdown_table(["", "verdict", *off, *away, "uncertainty (1σ)"], rows)]
 

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from calibnet.geometry import degrees_and_cm
 from inspector.live.keys import END, Read
 from inspector.live.pose import Pose
 from inspector.live.session import LiveSession
@@ -184,7 +185,7 @@ def try_lines(made: dict[str, Any]) -> list[str]:
     told = word.upper() if verdict is None else f"{word.upper()} {verdict['within']}".rstrip()
     head = f"Try {made['number']}, frame {made['frame']}: {made['title']}, {made['milliseconds']} ms: {told}."
     reason = [] if verdict is None else [verdict["text"]]
-    sure = [] if sigma is None else [f"±{sigma[0]:.2f}° / {sigma[1]:.1f} cm (1σ)."]
+    sure = [] if sigma is None else [f"±{degrees_and_cm(sigma[0], sigma[1])} (1σ)."]
     rows = []
     for position, step in enumerate(made["steps"]):
         name = f"after {step['name']}" if position else "start"

@@ -83,5 +83,5 @@ def former_verdict(initial: Extrinsic, corrected: Extrinsic, stages: Mapping[int
     """
     arrived = stages[max(stages)] if stages else initial
     applied = np.array_equal(corrected, arrived)
-    reason = "Picture and scan fit together." if applied else "Picture and scan do not fit together."
+    reason = "Image and scan fit together." if applied else "Image and scan do not fit together."
     return Verdict(ACCEPTED if applied else REJECTED, reason, arrived, moved(initial, arrived))

@@ -8,13 +8,13 @@ from typing import Any
 from inspector.report.bench_rows import KINDS, NOTHING, costs, refused, rows
 
 ERRORS = ("rigs trained on", "other rigs", "refused")
-PICTURES = ("grey picture", "other picture")
+IMAGES = ("grey image", "other image")
 COSTS = ("a frame", "parameters")
 NO_CORRECTION = "no correction"
 LEGEND = (
     "Mean errors of rotation and translation. A refused run counts with its initial error; if the time limit was "
     "reached, the number of planned runs is in brackets. For methods without training, the columns have the same rigs "
-    "as for the trained ones. Grey picture, other picture: errors when the image is made grey, or replaced by one of "
+    "as for the trained ones. Grey image, other image: errors when the image is made grey, or replaced by one of "
     "another drive. A method that then refuses, or does not reduce the error, uses the image; one that corrects as "
     "before reads its answer off the scan."
 )
@@ -24,7 +24,7 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
     """Headings and rows of the table for a range."""
     of_range = [row for row in rows(content) if row.range == range_]
     known = {row.rig for row in of_range if row.known == "known"}
-    heads = ["method", "of", *ERRORS, *PICTURES, *COSTS, "its paper"]
+    heads = ["method", "of", *ERRORS, *IMAGES, *COSTS, "its paper"]
     body = []
     initial = [one for one in content.get("initial", ()) if one["range"] == range_]
     if initial:
@@ -32,7 +32,7 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
     for name, entry in content["methods"].items():
         here = entry.get("costs_of", range_) == range_  # the number of networks depends on the range
         told = [costs(entry)[head] if here else NOTHING for head in COSTS]
-        beside = [*_pictures(entry, range_), *told, _claim(entry)]
+        beside = [*_images(entry, range_), *told, _claim(entry)]
         own = [row for row in of_range if row.method == name]
         for of in dict.fromkeys(row.of for row in own):  # figures beside the errors, once
             figures = [row.figures for row in own if row.of == of]
@@ -43,7 +43,7 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
     return [heads[k] for k in used], [[line[k] for k in used] for line in body]
 
 
-def _pictures(entry: dict[str, Any], range_: str) -> list[str]:
+def _images(entry: dict[str, Any], range_: str) -> list[str]:
     audit = entry["audit"] if entry["audit"].get("range") == range_ else {}
     return [_altered(audit.get(name)) for name in ("grey", "swapped")]
 

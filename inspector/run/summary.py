@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from statistics import median
 
 from calibnet.errors import CalibrationError, DatasetError
-from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector.record.observation import Observation
@@ -154,11 +154,11 @@ class Summary:
 
 def _middle(errors: list[PoseError]) -> str:
     rotation = median(error.rotation_deg for error in errors)
-    return f"{rotation:.2f}° / {median(error.translation_cm for error in errors):.1f} cm"
+    return degrees_and_cm(rotation, median(error.translation_cm for error in errors))
 
 
 def _figures(error: PoseError) -> str:
-    return f"{error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm"
+    return degrees_and_cm(error.rotation_deg, error.translation_cm)
 
 
 def _frames(count: int) -> str:

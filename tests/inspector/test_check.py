@@ -127,13 +127,13 @@ def test_without_a_limit_the_verdict_decides(
 def test_json_is_the_verdict_alone_on_stdout(
     record: Callable[..., Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file, causes = tmp_path / "run.rrd", (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
+    file, causes = tmp_path / "run.rrd", (Cause("mirrored", "The image looks mirrored.", "1.2 px, not 7.1 px"),)
     record(file, length=1, detail="overview", strides=(32,), doubted=(0,), causes=causes)
     code, out, err = call(capsys, file, "--json", "-")
     (frame,) = read_run(file).frames
     assert code == 1 and json.loads(out) == frame.verdict.as_dict() | {"limits": []}
     assert json.loads(out)["causes"] == [causes[0].as_dict()]
-    assert err == f"Verdict: rejected. {REASON} The picture looks mirrored.\n"
+    assert err == f"Verdict: rejected. {REASON} The image looks mirrored.\n"
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ def test_its_frames_are_read(recording: Path) -> None:
 def test_its_frames_are_judged_by_what_was_applied(recording: Path) -> None:
     run = read_run(recording)
     assert [frame.verdict.word for frame in run.frames] == ["accepted", "accepted"]
-    assert run.frames[0].verdict.reason == "Picture and scan fit together."
+    assert run.frames[0].verdict.reason == "Image and scan fit together."
     assert run.drive is not None and run.drive_verdict is None
     frame = run.frames[0]
     left = former_verdict(frame.initial, frame.initial, frame.stages)

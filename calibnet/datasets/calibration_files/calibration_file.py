@@ -30,20 +30,20 @@ class Wanted:
     Attributes:
         camera: name of the camera in the file; None if it has only one.
         frames: names of the coordinate frames.
-        picture: an image of the camera, or its width and height, for formats that do not contain the size.
+        image: an image of the camera, or its width and height, for formats that do not contain the size.
     """
 
     camera: str | None = None
     frames: FrameChoice = BY_NAME
-    picture: Path | tuple[int, int] | None = None
+    image: Path | tuple[int, int] | None = None
 
     @property
     def size(self) -> tuple[int, int] | None:
         """Width and height of the image; None if it cannot be read."""
-        if isinstance(self.picture, tuple):
-            return self.picture
+        if isinstance(self.image, tuple):
+            return self.image
         try:
-            height, width = read_image(self.picture).shape[:2] if self.picture is not None else (0, 0)
+            height, width = read_image(self.image).shape[:2] if self.image is not None else (0, 0)
         except DatasetError:
             return None
         return (width, height) if width else None

@@ -55,7 +55,7 @@ def several(points: NDArray[np.float32]) -> Implausible | None:
         return None
     text = (
         "the cloud seems to be several scans put together, of which only what one scan would see is used; "
-        "give the one scan that was taken with the picture"
+        "give the one scan that was taken with the image"
     )
     return Implausible("accumulated", text)
 

@@ -43,9 +43,9 @@ class Development:
     bayer: str | None = None
 
     @classmethod
-    def of(cls, pictures: Iterable[Levels], bayer: str | None = None) -> Development:
+    def of(cls, images: Iterable[Levels], bayer: str | None = None) -> Development:
         """The conversion for a drive, from some of its images."""
-        deep = [picture for picture in pictures if picture.dtype != np.uint8]
+        deep = [image for image in images if image.dtype != np.uint8]
         return cls(white_of(deep) if deep else None, bayer)
 
     def __call__(self, levels: Levels) -> NDArray[np.uint8]:
@@ -69,15 +69,15 @@ class Development:
         return np.minimum(levels.astype(np.uint32) * 256 // int(white), 255).astype(np.uint8)
 
 
-def white_of(pictures: list[Levels]) -> float:
+def white_of(images: list[Levels]) -> float:
     """The level of white in images of more than 8 bits: the largest value of the camera's bit depth.
 
     For floats, 1, 255 or that of a bit depth if all are within; else the level of all but the brightest.
     """
-    if all(picture.dtype != np.float32 for picture in pictures):
-        deepest = max(int(picture.max(initial=0)) for picture in pictures)
+    if all(image.dtype != np.float32 for image in images):
+        deepest = max(int(image.max(initial=0)) for image in images)
         return float(next(1 << bits for bits in BITS if deepest < 1 << bits))
-    levels = np.concatenate([np.nan_to_num(picture[::4, ::4]).ravel() for picture in pictures])
+    levels = np.concatenate([np.nan_to_num(image[::4, ::4]).ravel() for image in images])
     brightest = float(levels.max(initial=0.0))
     for scale in (1.0, 255.0, *(float((1 << bits) - 1) for bits in BITS[1:])):
         if brightest <= scale:

@@ -20,7 +20,7 @@ LOOKED_AT = 3
 """Number of images of a drive from which the part filled by a fisheye is found."""
 
 
-class Picture(NamedTuple):
+class RectifiedImage(NamedTuple):
     """A rectified image ``[H, W, 3]`` RGB, the original image if it was rectified here, and its faces."""
 
     image: NDArray[np.uint8]
@@ -75,9 +75,9 @@ class Lens:
             "across), which are solved as one; the whole image is shown.",
         )
 
-    def __call__(self, taken: NDArray[np.uint8]) -> Picture:
+    def __call__(self, taken: NDArray[np.uint8]) -> RectifiedImage:
         """Rectify an image ``[H, W, 3]`` RGB."""
         seen = tuple(Face(face(taken), face.pinhole, face.pinhole_from_camera) for face in self.faces)
         if self.camera.is_pinhole:
-            return Picture(taken, None, seen)
-        return Picture(self.middle(taken), Original(taken, self.camera), seen)
+            return RectifiedImage(taken, None, seen)
+        return RectifiedImage(self.middle(taken), Original(taken, self.camera), seen)

@@ -1,4 +1,4 @@
-"""Whether a picture can be what it is taken to be; see `calibnet.datasets.plausibility`."""
+"""Whether an image can be what it is taken to be; see `calibnet.datasets.plausibility`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SAME_COLOUR = 0.85
 """Ratio of the difference between neighbouring pixels to that of the next but one: at most 0.61 in images of 13
 cameras, and at least 1.02 in Bayer mosaics made from them."""
 ROW_STEP = 8
-"""Rows of a picture from one to the next that are looked at."""
+"""Rows of an image from one to the next that are looked at."""
 
 
 def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
@@ -27,7 +27,7 @@ def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
     if 0 < rows.max() <= DARK:
         text = (
             f"no pixel is brighter than {rows.max()} of 255; if the camera gives 10 or 12 bits, "
-            "shift the picture's values up before they are cut to eight"
+            "shift the image's values up before they are cut to eight"
         )
         return Implausible("bit-depth", text, certain=bool(rows.max() <= DARKEST))
     jumps = float((np.abs(np.diff(rows, axis=1)) > 128).mean())
@@ -35,7 +35,7 @@ def bit_depth(image: NDArray[np.uint8]) -> Implausible | None:
         return None
     text = (
         "neighbouring pixels jump from black to white as where upper bits were cut off; "
-        "if the camera gives 10 or 12 bits, shift the picture's values down before they are cut to eight"
+        "if the camera gives 10 or 12 bits, shift the image's values down before they are cut to eight"
     )
     return Implausible("bit-depth", text)
 
@@ -54,7 +54,7 @@ def mosaic(image: NDArray[np.uint8]) -> Implausible | None:
         if not next_one > SAME_COLOUR * next_but_one > 0:
             return None
     text = (
-        "the picture seems to be raw, of a sensor with a Bayer pattern; name that in calibration.yaml, for instance "
+        "the image seems to be raw, of a sensor with a Bayer pattern; name that in calibration.yaml, for instance "
         "'bayer: rggb'"
     )
     return Implausible("bayer", text)

@@ -17,7 +17,7 @@ from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.calibration_files import read_calibration
 from calibnet.datasets.folder import sample_images
 from calibnet.datasets.images.files import read_image
-from calibnet.datasets.images.lens import Lens, Picture
+from calibnet.datasets.images.lens import Lens, RectifiedImage
 from calibnet.datasets.kitti.calibration import (
     IMAGE_SUFFIXES,
     frame_files,
@@ -34,7 +34,7 @@ from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic, Floats, Intrinsics, Transform
 
 LAYOUT = "a KITTI-360 root holds calibration/, data_2d_raw/ and data_3d_raw/"
-PICTURES = {0: "data_rect", 1: "data_rect", 2: "data_rgb", 3: "data_rgb"}
+IMAGE_FOLDERS = {0: "data_rect", 1: "data_rect", 2: "data_rgb", 3: "data_rgb"}
 """Folder of each camera's images: rectified for the perspective cameras, original for the fisheyes."""
 
 
@@ -53,12 +53,12 @@ class Kitti360(PairedSequence):
             DatasetError: a folder or file is missing, malformed, or nothing pairs.
         """
         root = require_folder(Path(root), LAYOUT)
-        if camera not in PICTURES:
+        if camera not in IMAGE_FOLDERS:
             raise DatasetError(f"KITTI-360 has no camera {camera}; choose 0 or 1 (perspective), 2 or 3 (fisheye).")
         scans_at = drive_folder(root / "data_3d_raw", drive)
         at = root / "data_2d_raw" / scans_at.name / f"image_0{camera}"
         present = ", ".join(sorted(path.name[-1] for path in at.parent.glob("image_0[0-3]") if path.is_dir()))
-        images_at = require_folder(at / PICTURES[camera], f"cameras there: {present or 'none, unpack the images'}")
+        images_at = require_folder(at / IMAGE_FOLDERS[camera], f"cameras there: {present or 'none, unpack the images'}")
         images = files_by_stem(images_at, IMAGE_SUFFIXES, "images")
         velodyne = require_folder(scans_at / "velodyne_points", LAYOUT)
         scans = files_by_stem(require_folder(velodyne / "data", LAYOUT), (".bin",), "scans")
@@ -86,10 +86,10 @@ class Kitti360(PairedSequence):
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._fixed
 
-    def _picture(self, files: FrameFiles) -> Picture:
+    def _image(self, files: FrameFiles) -> RectifiedImage:
         path = files.needed.image
         if self._lens is None:
-            return Picture(read_image(path))
+            return RectifiedImage(read_image(path))
         camera = self._lens.camera
         return self._lens(read_image(path, (camera.width, camera.height)))
 

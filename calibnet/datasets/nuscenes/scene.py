@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.calibration import Calibration
 from calibnet.datasets.images.files import read_image
-from calibnet.datasets.images.lens import Picture
+from calibnet.datasets.images.lens import RectifiedImage
 from calibnet.datasets.nuscenes.tables import (
     LIDAR,
     Pair,
@@ -82,9 +82,9 @@ class NuScenes(PairedSequence):
     def _calibration(self, files: FrameFiles) -> Calibration:
         return self._calibrations[self._pairs[files.index].image.sensor]
 
-    def _picture(self, files: FrameFiles) -> Picture:
+    def _image(self, files: FrameFiles) -> RectifiedImage:
         size = self._pairs[files.index].image.size
-        return Picture(read_image(files.needed.image, size if all(size) else None))
+        return RectifiedImage(read_image(files.needed.image, size if all(size) else None))
 
     def _points(self, files: FrameFiles) -> NDArray[np.float32]:
         points = super()._points(files)

@@ -198,7 +198,7 @@ KITTI_LIKE = Rig(
 
 
 def sample_robot_rig(generator: Generator, pixels: int = 128_000, maximum_width: int = 520) -> Rig:
-    """Draw a robot's or a slow car's rig: a scanner that looks up as far as down, a squarer and often wider picture.
+    """Draw a robot's or a slow car's rig: a scanner that looks up as far as down, a squarer and often wider image.
 
     One scanner of five is a dome whose rings run around the view, see `DOME_AXES`.
     """

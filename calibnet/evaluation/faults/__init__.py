@@ -2,14 +2,14 @@
 
 from calibnet.evaluation.faults.alteration import NATIVE_WIDTH, Alteration, unaltered
 from calibnet.evaluation.faults.camera import distorted, equidistant, focal, matrix_of_size, principal
-from calibnet.evaluation.faults.picture import (
+from calibnet.evaluation.faults.image import (
     blurred,
     exposed,
     grey,
     high_byte,
+    image_of,
     low_byte,
     mirrored,
-    picture_of,
     rolled,
     shifted,
 )
@@ -47,7 +47,7 @@ __all__ = [
     "matrix_of_size",
     "mirrored",
     "noisy",
-    "picture_of",
+    "image_of",
     "principal",
     "reflecting",
     "remounted",

@@ -11,7 +11,7 @@ from torch import Tensor
 from calibnet.network.batch import Cut, NetworkInputs
 from calibnet.network.target import Target
 from calibnet.training.on_device.draws import DrawnBatch, DrawnSamples
-from calibnet.training.on_device.pictures import exposed, warped
+from calibnet.training.on_device.images import exposed, warped
 from calibnet.training.on_device.scans import Cells, Scans, rescanned, see
 from calibnet.training.on_device.store import FrameStore
 from calibnet.training.samples import SampleNumbers
@@ -73,9 +73,9 @@ class DeviceSamples(SampleNumbers):
         where = drawn.initial, drawn.reference, drawn.correction, drawn.intrinsics, drawn.shift
         seen = see(scans, *where, drawn.size, self.scales, self.recipe)
         count = 2 if drawn.most_shrunk <= 2 else 3
-        some = zip(*(part.split(AT_ONCE) for part in (drawn.frames, drawn.to_picture, drawn.shrinking)), strict=True)
-        pictures = [warped(store.pictures[frames], to, shrinking, drawn.size, count) for frames, to, shrinking in some]
-        image = exposed(torch.cat(pictures), drawn.exposures, generator)
+        some = zip(*(part.split(AT_ONCE) for part in (drawn.frames, drawn.to_image, drawn.shrinking)), strict=True)
+        images = [warped(store.images[frames], to, shrinking, drawn.size, count) for frames, to, shrinking in some]
+        image = exposed(torch.cat(images), drawn.exposures, generator)
         good = seen.visible[0].flatten(1).sum(1) >= self.recipe.fewest_visible_cells
         chosen = good_ones(good)
         seen = Cells(seen.image[chosen], *([scale[chosen] for scale in of] for of in seen[1:]))

@@ -142,7 +142,7 @@ class Draw:
         return cls(number, frame, size, reflected, view, reference, scanner, exposure, delta, shift)
 
     @property
-    def to_picture(self) -> Floats:
+    def to_image(self) -> Floats:
         """``[3, 3]`` homography from pixels of the input to pixels of the stored image."""
         near, camera, turn = self.view
         width, height = self.size
@@ -164,7 +164,7 @@ class DrawnBatch(NamedTuple):
         of_features: whether the batch trains features alone.
         seed: seed of the noise of points and pixels.
         frames: ``[B]`` int64, numbers of the frames in the store.
-        to_picture: ``[B, 3, 3]`` homographies from pixels of the input to pixels of the stored images.
+        to_image: ``[B, 3, 3]`` homographies from pixels of the input to pixels of the stored images.
         shrinking: ``[B]`` pixels of the stored image per pixel of the input.
         reference: ``[B, 4, 4]`` true camera_from_lidar.
         initial: ``[B, 4, 4]`` miscalibrated camera_from_lidar.
@@ -181,7 +181,7 @@ class DrawnBatch(NamedTuple):
     of_features: bool
     seed: int
     frames: Tensor
-    to_picture: Tensor
+    to_image: Tensor
     shrinking: Tensor
     reference: Tensor
     initial: Tensor
@@ -230,7 +230,7 @@ class DrawnSamples(Dataset[Draw]):
             bool(shift.any()),
             int(np.random.SeedSequence([self.samples.frames.seed, 5, draws[0].number]).generate_state(1)[0]),
             torch.from_numpy(frames),
-            single([draw.to_picture for draw in draws]),
+            single([draw.to_image for draw in draws]),
             single(shrinking),
             single(reference),
             single(delta @ reference),

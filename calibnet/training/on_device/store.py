@@ -26,7 +26,7 @@ class FrameStore:
     """Images and scans of F frames on the device; the rest of each frame, which is small, on the host.
 
     Attributes:
-        pictures: ``[F, H, W, 3]`` uint8 RGB at the size of the largest image; smaller ones are padded with black.
+        images: ``[F, H, W, 3]`` uint8 RGB at the size of the largest image; smaller ones are padded with black.
         scans: ``[F, 4, N]`` float32 (x, y, z in metres, intensity), padded to the size of the largest scan.
         points: ``[F]`` number of points of each scan.
         cameras: camera of each frame.
@@ -34,7 +34,7 @@ class FrameStore:
         first: number of the first frame of each source.
     """
 
-    pictures: Tensor
+    images: Tensor
     scans: Tensor
     points: Tensor
     cameras: list[PinholeCamera]
@@ -44,7 +44,7 @@ class FrameStore:
     @property
     def device(self) -> torch.device:
         """The device of images and scans."""
-        return self.pictures.device
+        return self.images.device
 
     @classmethod
     def load(cls, sources: Sequence[Source], device: torch.device) -> FrameStore:
@@ -66,12 +66,12 @@ class FrameStore:
                 require_room(len(places), height, width, most)
         finally:
             threads.shutdown(cancel_futures=True)
-        pictures = torch.zeros(len(frames), height, width, 3, dtype=torch.uint8, device=device)
+        images = torch.zeros(len(frames), height, width, 3, dtype=torch.uint8, device=device)
         scans = torch.zeros(len(frames), 4, most, device=device)
         for number, frame in enumerate(frames):
-            put(pictures[number], scans[number], frame)
+            put(images[number], scans[number], frame)
         return cls(
-            pictures,
+            images,
             scans,
             torch.tensor([len(frame.points) for frame in frames], device=device),
             [frame.camera for frame in frames],
@@ -94,8 +94,8 @@ def require_room(frames: int, height: int, width: int, points: int) -> None:
         )
 
 
-def put(picture: Tensor, scan: Tensor, frame: Frame) -> None:
+def put(image: Tensor, scan: Tensor, frame: Frame) -> None:
     """Copy a frame into its place ``[H, W, 3]`` and ``[4, N]``."""
     height, width = frame.image.shape[:2]
-    picture[:height, :width] = torch.from_numpy(frame.image)
+    image[:height, :width] = torch.from_numpy(frame.image)
     scan[:, : len(frame.points)] = torch.from_numpy(np.ascontiguousarray(frame.points.T))

@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from calibnet.geometry import PoseError, pose_error
+from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import DriveEstimate, Estimate
 from calibnet.verdict import Verdict
@@ -147,7 +147,7 @@ def _lines(
     solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"
     if reference is not None:
         error = pose_error(estimate.camera_from_lidar, reference)
-        lines += [f"**Off the reference by {error.rotation_deg:.2f}° / {error.translation_cm:.1f} cm**, {solved}.", ""]
+        lines += [f"**Off the reference by {degrees_and_cm(error.rotation_deg, error.translation_cm)}**, {solved}.", ""]
     else:
         lines += [f"{solved.capitalize()}.", ""]
     if remarks:
@@ -179,8 +179,8 @@ def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial
         f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
         f"{error.translation_cm:.1f} cm; "
     )
-    sure = f"±{estimate.rotation_deg:.2f}° / {estimate.translation_cm:.1f} cm (1σ)"
+    sure = f"±{degrees_and_cm(estimate.rotation_deg, estimate.translation_cm)} (1σ)"
     if estimate.networks is None:
         return f"{result}{sure} by the frames' scatter, not counting what all of them get wrong."
     alone = pose_error(estimate.networks.camera_from_lidar, initial if reference is None else reference)
-    return f"{result}{sure}. Before its edges were aligned: {alone.rotation_deg:.2f}° / {alone.translation_cm:.1f} cm."
+    return f"{result}{sure}. Before its edges were aligned: {degrees_and_cm(alone.rotation_deg, alone.translation_cm)}."

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from calibnet.geometry import RANGES, MiscalibrationRange, PoseError, pose_error
+from calibnet.geometry import RANGES, MiscalibrationRange, PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.trace import CascadeTrace
 from inspector import entities
@@ -100,7 +100,7 @@ def _stages(observation: Observation, path: Callable[[str], str] | None) -> list
         if number in ran:
             stage = ran[number]
             motion = pose_error(stage.after, stage.before)
-            change = f"{motion.rotation_deg:.2f}° / {motion.translation_cm:.1f} cm"
+            change = degrees_and_cm(motion.rotation_deg, motion.translation_cm)
             name = f"stage {number}"
             if path is not None:
                 name = f"[{name}](recording://{path(entities.overlay_stage(number))})"

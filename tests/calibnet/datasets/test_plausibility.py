@@ -173,7 +173,7 @@ def test_pictures_that_were_shrunk_without_their_matrix_are_refused(write_layout
     layout = write_layout("kitti-odometry")
     for path in layout.images:
         cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), (32, 24)))
-    with pytest.raises(ImplausibleError, match="is the middle of a picture of about 62x45, and this one is 32x24"):
+    with pytest.raises(ImplausibleError, match="is the middle of an image of about 62x45, and this one is 32x24"):
         layout.open()[0]
 
 

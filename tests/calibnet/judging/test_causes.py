@@ -11,7 +11,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.errors import CalibrationError
 from calibnet.evaluation import faults
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.causes import PICTURE_AND_SCAN, Attempt, Search, cause, match_error_of
+from calibnet.judging.causes import IMAGE_AND_SCAN, Attempt, Search, cause, match_error_of
 from tests.support.boxes import boxes
 
 FRAME = boxes()
@@ -42,7 +42,7 @@ def unlike(frame: Frame, guess: Extrinsic) -> float:
     ],
 )
 def test_what_undoes_the_fault_is_the_cause(alter: faults.Alteration, names: tuple[str, ...]) -> None:
-    found = cause(replace(PICTURE_AND_SCAN, share=0.9), alter(FRAME), FRAME.camera_from_lidar, unlike)
+    found = cause(replace(IMAGE_AND_SCAN, share=0.9), alter(FRAME), FRAME.camera_from_lidar, unlike)
     assert tuple(one.name for one in found) == names
 
 

@@ -33,7 +33,7 @@ CLASSIFIER = fitted(Classifier(0.0, {"match_error": 1.0}, accepted_below=0.6, re
 def test_what_fits_is_accepted_with_what_was_found() -> None:
     verdict = judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, match_error=1.2), CLASSIFIER)
     assert verdict.word == ACCEPTED and verdict.causes == ()
-    assert verdict.reason == "Picture and scan fit together."
+    assert verdict.reason == "Image and scan fit together."
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
     away = pose_error(REFERENCE, GUESS)
     assert verdict.moved == (pytest.approx(away.rotation_deg), pytest.approx(away.translation_cm))
@@ -59,7 +59,7 @@ def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
 
 
 def test_what_is_known_beforehand_is_never_rejected_by_the_classifier_alone() -> None:
-    """It was fitted to runs whose axes are all open; what speaks against picture and scan does so as ever."""
+    """It was fitted to runs whose axes are all open; what speaks against image and scan does so as ever."""
     fixed = "x, y, z fixed"
     verdicts = [
         judge(FRAME, GUESS, run(GUESS, REFERENCE, FITS, error), CLASSIFIER, prior=fixed) for error in (1.4, 2.0, 4.2)
@@ -105,7 +105,7 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
         match_error=lambda frame, guess: 8.0 if np.array_equal(frame.image, FRAME.image) else 30.0,
     )
     assert [cause.name for cause in known.causes] == ["mirrored", "left-handed"]
-    assert known.reason.endswith("The picture is mirrored, or the scan's axes are left-handed.")
+    assert known.reason.endswith("The image is mirrored, or the scan's axes are left-handed.")
 
 
 def test_who_goes_beyond_the_range_searched_is_rejected_and_by_how_much_is_said() -> None:
@@ -128,7 +128,7 @@ def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
-    assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The picture is blank."
+    assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The image is blank."
     upper_bits_lost = replace(FRAME, image=FRAME.image >> 6)  # hardly anything is left, and that is why
     assert [one.name for one in judge(upper_bits_lost, GUESS, trace, CLASSIFIER).causes] == ["bit-depth"]
 

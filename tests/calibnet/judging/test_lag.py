@@ -56,7 +56,7 @@ def test_a_lag_is_undone_by_the_motion_to_the_scan_beside(
     assert search is not None
     attempt = next(one for one in search.attempts if f"0.1 s {word}" in one.text)
     assert attempt.names == ("time-offset",)
-    assert attempt.text.startswith(f"Scans seem 0.1 s {word} than their pictures: the car moves ")
+    assert attempt.text.startswith(f"Scans seem 0.1 s {word} than their images: the car moves ")
     index = drive[position].index
     there = transform_points(motion(index + by, index), drive[position].points[:, :3].astype(np.float64))
     undone = attempt.undo(drive[position]).points[:, :3]

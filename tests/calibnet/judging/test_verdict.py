@@ -18,7 +18,7 @@ from tests.support.matches import matches, run
 
 def test_json_of_a_verdict() -> None:
     covariance = np.diag([0.03**2, 0, 0.04**2, 0, np.radians(0.2) ** 2, 0])
-    cause = Cause("roll", "The picture is rolled.", "7 px")
+    cause = Cause("roll", "The image is rolled.", "7 px")
     verdict = Verdict(
         "rejected", "It does not fit.", REFERENCE, (2.0, 5.0), (cause,), covariance, 3, (BadFrame(7, "damaged"),)
     )
@@ -28,7 +28,7 @@ def test_json_of_a_verdict() -> None:
     assert said == {
         "verdict": "rejected",
         "reason": "It does not fit.",
-        "causes": [{"name": "roll", "text": "The picture is rolled.", "evidence": "7 px"}],
+        "causes": [{"name": "roll", "text": "The image is rolled.", "evidence": "7 px"}],
         "camera_from_lidar": REFERENCE.tolist(),
         "moved": {"rotation_deg": 2.0, "translation_cm": 5.0},
         "sigma": {"covariance": covariance.tolist()},

@@ -15,7 +15,7 @@ from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, probabi
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
 
-MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
+MIRRORED = Cause("mirrored", "The image looks mirrored.", "1.2 px, not 7.1 px")
 
 
 TIGHT, WIDE = Standard((Tolerance(0.3, 8.0),)), Standard((Tolerance(1.0, 25.0),))
@@ -103,10 +103,10 @@ def test_a_result_that_is_certain_of_a_coarser_tolerance_judges_by_that_one(
 
 
 def test_what_is_not_accepted_itself_is_no_measure() -> None:
-    rejected = replace(found(), word="rejected", reason="Picture and scan do not fit together.")
+    rejected = replace(found(), word="rejected", reason="Image and scan do not fit together.")
     verdict = verify(off(), rejected, TIGHT)
     assert verdict.word == "cannot tell"
-    assert verdict.reason.endswith("Picture and scan do not fit together.")
+    assert verdict.reason.endswith("Image and scan do not fit together.")
     caused = verify(off(), replace(rejected, causes=(MIRRORED,)), TIGHT)
     assert (caused.word, caused.reason, caused.causes) == ("rejected", rejected.reason, (MIRRORED,))
     unsure = verify(off(), replace(rejected, word="cannot tell", causes=(MIRRORED,)), TIGHT)

@@ -28,7 +28,7 @@ from calibnet.training.packed import (
     read_packed,
     unpack_scan,
 )
-from calibnet.training.packing import FARTHEST_M, LARGEST_WIDTH, pack_picture, pack_scan, pack_training, smaller
+from calibnet.training.packing import FARTHEST_M, LARGEST_WIDTH, pack_image, pack_scan, pack_training, smaller
 from tests.calibnet.training.tiny_run import options, trainer_of
 from tests.support.scene import Scenes, make_frame
 
@@ -79,7 +79,7 @@ def test_a_scan_that_is_cut_or_unpacks_without_end_is_refused(monkeypatch: pytes
 
 def test_a_picture_comes_back_in_its_own_colours() -> None:
     image = make_frame(1).image
-    again = decode_image(pack_picture(image))
+    again = decode_image(pack_image(image))
     assert again.shape == image.shape and again.dtype == np.uint8
     difference = again.astype(float) - image
     assert np.sqrt((difference**2).mean()) < 8, "as JPEG has it; red and blue swapped would differ by 60"

@@ -50,7 +50,7 @@ class KnownCascade:
 
     def explain(self, frame: Frame, initial: Transform, lags: object = None) -> Verdict:
         """Rejects everything, and takes everything for a mirrored picture."""
-        mirrored = Cause("mirrored", "The picture is mirrored.", "so a test wants it")
+        mirrored = Cause("mirrored", "The image is mirrored.", "so a test wants it")
         return Verdict("rejected", "It does not fit.", self.calibrate(frame, initial).arrived, causes=(mirrored,))
 
     def calibrate_drive(

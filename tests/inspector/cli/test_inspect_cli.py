@@ -84,7 +84,7 @@ def test_without_display_and_save_the_recording_goes_to_recordings(invoke: Invok
         f"calib-inspect export {file} --format",
     ):
         assert any(command in line for line in before), command
-    assert last == "Verdict: accepted. Picture and scan fit together."
+    assert last == "Verdict: accepted. Image and scan fit together."
     assert file.is_file()
 
 

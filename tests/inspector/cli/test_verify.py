@@ -22,7 +22,7 @@ from tests.support.folder import write_folder
 
 COVARIANCE = np.diag([*[0.01**2] * 3, *[np.radians(0.05) ** 2] * 3])
 """1 cm and 0.05° on every axis."""
-MIRRORED = Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px")
+MIRRORED = Cause("mirrored", "The image looks mirrored.", "1.2 px, not 7.1 px")
 
 Invoke = Callable[..., tuple[int, str, str]]
 
@@ -132,7 +132,7 @@ def test_what_the_drive_says_of_itself_decides(
 def test_what_does_not_fit_is_a_verdict_with_json(
     invoke: Invoke, own_folder: Path, cascade: Cascade, save: tuple[str, ...]
 ) -> None:
-    cascade.failure = CalibrationError("Picture and scan do not fit together.")
+    cascade.failure = CalibrationError("Image and scan do not fit together.")
     code, out, _ = invoke("folder", str(own_folder), "--json", "-", *save)
     assert (code, json.loads(out)["verdict"]) == (4, "cannot tell")
     cascade.causes_of_frames = (MIRRORED,)

@@ -48,7 +48,7 @@ def test_every_format_has_the_covariance_and_is_taken_back_as_a_guess(form, tmp_
     path = tmp_path / f"found.{suffix_of(form)}"
     path.write_text(export_as(form, JUDGED))
     assert_allclose(covariance_in(form, path), COVARIANCE, rtol=1e-8)
-    found = read_calibration(path, Wanted(picture=(640, 480)))
+    found = read_calibration(path, Wanted(image=(640, 480)))
     assert_allclose(found.camera_from_lidar, example().camera_from_lidar, atol=1e-9)
     assert (found.camera is None) == (form in ("ros", "urdf", "autoware"))
     if found.camera is not None and form != "kitti":  # which has no lens

@@ -63,7 +63,7 @@ def test_extrinsics_come_back_exactly(full_recording: Path, fakes: ModuleType) -
 
 
 def test_verdicts_come_back_and_a_rejected_frame_keeps_its_start(record: Callable[..., Any], tmp_path: Path) -> None:
-    causes = (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
+    causes = (Cause("mirrored", "The image looks mirrored.", "1.2 px, not 7.1 px"),)
     record(tmp_path / "doubted.rrd", detail="overview", strides=(32,), doubted=(1,), unsure=(2,), causes=causes)
     frames = read_run(tmp_path / "doubted.rrd").frames
     assert [frame.verdict.word for frame in frames] == ["accepted", "rejected", "cannot tell"]

@@ -206,7 +206,7 @@ def test_a_rejected_frame_is_shown_as_it_was(
     record: Callable[..., Any], tmp_path: Path, read: Read, fakes: ModuleType
 ) -> None:
     file = tmp_path / "doubted.rrd"
-    causes = (Cause("mirrored", "The picture looks mirrored.", "1.2 px, not 7.1 px"),)
+    causes = (Cause("mirrored", "The image looks mirrored.", "1.2 px, not 7.1 px"),)
     summary = record(file, detail="overview", doubted=(1,), unsure=(2,), causes=causes)
     captions = [row.as_py()[0] for _, row in read(file, "overlay/corrected/caption", "text")]
     told = [caption.partition(":")[0] for caption in captions]
@@ -221,15 +221,15 @@ def test_a_rejected_frame_is_shown_as_it_was(
     assert fit == pytest.approx([2.0 * scale, 6.0 * scale, 2.0 * scale])
     assert read(file, "fit/limit", "Scalars:scalars")[0][1].as_py() == pytest.approx([4.0 * scale])
     texts = [row.as_py()[0] for _, row in read(file, "table", "TextDocument:text")]
-    assert texts[0].startswith("# Accepted\n\nPicture and scan fit together.\n")
+    assert texts[0].startswith("# Accepted\n\nImage and scan fit together.\n")
     assert "Expected match error after stage 5: 1.6 px; results with at most 3.1 px are believed." in texts[0]
     assert texts[1].startswith(
-        f"# Rejected\n\n{REASON}\n\n- **mirrored**: The picture looks mirrored. *(1.2 px, not 7.1 px)*\n"
+        f"# Rejected\n\n{REASON}\n\n- **mirrored**: The image looks mirrored. *(1.2 px, not 7.1 px)*\n"
     )
     assert "### Frame 1: left as it was" in texts[1]
     assert texts[2].startswith(f"# Cannot tell\n\n{UNSURE}\n")
     assert summary.verdict == (
-        f"Verdict: 1 accepted, 1 rejected (frame 1: {REASON} The picture looks mirrored), "
+        f"Verdict: 1 accepted, 1 rejected (frame 1: {REASON} The image looks mirrored), "
         f"1 cannot tell (frame 2: {UNSURE[:-1]})."
     )
 

@@ -52,8 +52,8 @@ def test_means_are_over_runs_and_rigs_stand_where_trained_methods_know_them() ->
     assert cells["no correction"]["rigs trained on"] == "7.00° / 70 cm"
     assert (cells["untrained"]["rigs trained on"], cells["untrained"]["other rigs"]) == ("2.00° / 20 cm", "refused")
     assert (cells["trained"]["refused"], cells["untrained"]["refused"]) == ("1 of 12 (17)", "4 of 6")
-    assert (cells["trained"]["grey picture"], cells["trained"]["other picture"]) == ("refused", "50% refused")
-    assert cells["untrained"]["grey picture"] == "–", "its audit is of another range"
+    assert (cells["trained"]["grey image"], cells["trained"]["other image"]) == ("refused", "50% refused")
+    assert cells["untrained"]["grey image"] == "–", "its audit is of another range"
     assert (cells["trained"]["parameters"], cells["untrained"]["parameters"]) == ("2.00 M", "–")
     assert cells["trained"]["its paper"] == "0.1° / 2 cm from ±1 m"
     assert set(list(cells["absent"].values())[1:6]) == {"–"}

@@ -181,13 +181,13 @@ def test_file_storage_of_opencv(ending, tmp_path):
 
 
 def test_calib_json_of_koide3(write, picture):
-    found = read_calibration(write(json.dumps(KOIDE)), Wanted(picture=picture))
+    found = read_calibration(write(json.dumps(KOIDE)), Wanted(image=picture))
     check_camera(found, "koide3's calib.json", "plumb_bob", [0.1, -0.2, 0, 0, 0])
     assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
     with pytest.raises(DatasetError, match="does not contain the size of the images"):
         read_calibration(write(json.dumps(KOIDE)))
     fisheye = {"camera_model": "fisheye", "distortion_coeffs": [0.1, 0, 0, 0], "intrinsics": [900, 905, 639.5, 359.5]}
-    found = read_calibration(write(json.dumps({"camera": fisheye})), Wanted(picture=picture))
+    found = read_calibration(write(json.dumps({"camera": fisheye})), Wanted(image=picture))
     check_camera(found, "koide3's calib.json", "equidistant", [0.1, 0, 0, 0])
     assert found.camera_from_lidar is None
 
@@ -403,7 +403,7 @@ ODOMETRY = (
 
 
 def test_calibration_of_kitti(write):
-    wanted = Wanted("2", picture=(1280, 720))
+    wanted = Wanted("2", image=(1280, 720))
     found = read_calibration(write(ODOMETRY), wanted)
     matrix = np.array([[700.0, 0, 640], [0, 700, 360], [0, 0, 1]])
     assert found.camera is not None and found.camera.same(CameraModel(1280, 720, matrix))

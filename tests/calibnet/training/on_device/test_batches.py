@@ -92,7 +92,7 @@ def test_points_stay_on_the_picture(zoom: tuple[float, float]) -> None:
         whole = samples.make(drawn.collate([draw]))
         image = whole.image[0].permute(1, 2, 0).double().numpy()
         rows, columns = np.mgrid[: image.shape[0], : image.shape[1]]
-        u, v, scale = draw.to_picture @ np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
+        u, v, scale = draw.to_image @ np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
         place = np.stack([u / scale, v / scale], axis=1)
         smooth = (np.abs((place / STEP + 0.5) % 1 - 0.5) > 0.08).all(axis=1)
         inner = (place > 6).all(axis=1) & (place < [WIDTH - 7, HEIGHT - 7]).all(axis=1) & smooth

@@ -51,7 +51,7 @@ def test_the_host_never_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = samples.drawn.collate([samples.drawn[number] for number in range(4)])
     store = samples.store
     scans, points = store.scans.to(META), store.points.to(META)
-    samples.store = replace(store, pictures=store.pictures.to(META), scans=scans, points=points)
+    samples.store = replace(store, images=store.images.to(META), scans=scans, points=points)
     samples.generator = Unseeded()
     inputs, target = samples.finished(samples.make(without_numbers(drawn)))
     assert {part.device for part in (inputs.image, inputs.lidar, *inputs.cells, *target.visible)} == {META}

@@ -82,13 +82,13 @@ def test_the_verdict_is_recorded_and_shown_with_what_was_skipped(
     tmp_path: Path, record: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = estimate(aligned=True)
-    cause = Cause("time-offset", "Scans seem 0.1 s later than their pictures.", "best at 0.09 s")
+    cause = Cause("time-offset", "Scans seem 0.1 s later than their images.", "best at 0.09 s")
     verdict = Verdict(
         "cannot tell", "Edges disagree.", one.camera_from_lidar, (1.0, 9.0), (cause,), one.covariance, 3, one.skipped
     )
     monkeypatch.setattr(FakeCascade, "calibrate_drive", lambda *_: replace(one, verdict=verdict), raising=False)
     summary = record(tmp_path / "drive.rrd", detail="overview", strides=(32,), drive=True)
-    assert summary.verdict == "Verdict: cannot tell. Edges disagree. Scans seem 0.1 s later than their pictures."
+    assert summary.verdict == "Verdict: cannot tell. Edges disagree. Scans seem 0.1 s later than their images."
     recorded = read_run(tmp_path / "drive.rrd")
     assert recorded.drive_verdict is not None and recorded.verdict is recorded.drive_verdict
     assert recorded.drive_verdict.as_dict() == verdict.as_dict()

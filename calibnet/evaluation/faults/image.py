@@ -18,7 +18,7 @@ def grey(frame: Frame) -> Frame:
     return replace(frame, image=np.full_like(frame.image, 128))
 
 
-def picture_of(donor: Frame) -> Alteration:
+def image_of(donor: Frame) -> Alteration:
     """The image of another frame, resized to fit."""
     return lambda frame: replace(frame, image=resize_image(donor.image, frame.camera))
 

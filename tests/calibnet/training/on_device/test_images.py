@@ -1,4 +1,4 @@
-"""Pictures of a batch look as OpenCV makes them."""
+"""Images of a batch look as OpenCV makes them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import torch
 from calibnet.training.augmentation import exposed as exposed_by_opencv
 from calibnet.training.augmentation_draws import Exposure
 from calibnet.training.on_device.draws import Exposures
-from calibnet.training.on_device.pictures import exposed, sampled_at
+from calibnet.training.on_device.images import exposed, sampled_at
 
 EXPOSURES = [
     Exposure(),
@@ -46,7 +46,7 @@ def test_noise_is_as_strong_as_it_was_drawn() -> None:
 @pytest.mark.parametrize("count", [2, 3])
 def test_samples_of_a_pixel_spread_as_averaging_and_interpolating_do(count: int) -> None:
     places = sampled_at(torch.tensor([0.8, 1.0, 2.0, 2.5]), count)
-    assert places[0].square().mean() == pytest.approx(1 / 6), "made larger, a picture is interpolated twice"
+    assert places[0].square().mean() == pytest.approx(1 / 6), "made larger, an image is interpolated twice"
     assert not places[1].any(), "and once where it keeps its size"
     np.testing.assert_allclose(places.mean(1), 0, atol=1e-6)
     variance = places.square().mean(1)[2:] + 1 / 6 / torch.tensor([2.0, 2.5]) ** 2

@@ -33,12 +33,12 @@ def sampled_at(shrinking: Tensor, count: int) -> Tensor:
     return variance.sqrt()[:, None] * even
 
 
-def warped(pictures: Tensor, to_picture: Tensor, shrinking: Tensor, size: tuple[int, int], count: int = 2) -> Tensor:
+def warped(images: Tensor, to_image: Tensor, shrinking: Tensor, size: tuple[int, int], count: int = 2) -> Tensor:
     """Images as other cameras see them.
 
     Args:
-        pictures: ``[B, H, W, 3]`` uint8.
-        to_picture: ``[B, 3, 3]`` homography from pixels of the result to pixels of the image.
+        images: ``[B, H, W, 3]`` uint8.
+        to_image: ``[B, 3, 3]`` homography from pixels of the result to pixels of the image.
         shrinking: ``[B]`` pixels of the image per pixel of the result.
         size: height and width of the result.
         count: samples of the image for each pixel of the result, along either axis.
@@ -46,7 +46,7 @@ def warped(pictures: Tensor, to_picture: Tensor, shrinking: Tensor, size: tuple[
     Returns:
         ``[B, 3, h, w]`` float32, whole numbers 0..255; black outside the image.
     """
-    (height, width), device = size, pictures.device
+    (height, width), device = size, images.device
     within = sampled_at(shrinking, count)
 
     def places(pixels: int) -> Tensor:
@@ -55,24 +55,24 @@ def warped(pictures: Tensor, to_picture: Tensor, shrinking: Tensor, size: tuple[
     u, v = places(width)[:, None, :], places(height)[:, :, None]
 
     def row(number: int) -> Tensor:
-        a, b, c = to_picture[:, number, :, None, None].unbind(1)
+        a, b, c = to_image[:, number, :, None, None].unbind(1)
         return a * u + b * v + c
 
     across, down, scale = row(0), row(1), row(2)
     grid = torch.stack(
-        [(2 * across / scale + 1) / pictures.shape[2] - 1, (2 * down / scale + 1) / pictures.shape[1] - 1], dim=-1
+        [(2 * across / scale + 1) / images.shape[2] - 1, (2 * down / scale + 1) / images.shape[1] - 1], dim=-1
     )
-    sampled = F.grid_sample(pictures.permute(0, 3, 1, 2).float(), grid, align_corners=False)
+    sampled = F.grid_sample(images.permute(0, 3, 1, 2).float(), grid, align_corners=False)
     return F.avg_pool2d(sampled, count).round()
 
 
-def exposed(pictures: Tensor, exposures: Exposures, generator: torch.Generator) -> Tensor:
+def exposed(images: Tensor, exposures: Exposures, generator: torch.Generator) -> Tensor:
     """`calibnet.training.augmentation.exposed` for a batch ``[B, 3, h, w]`` of values 0..255; returns uint8."""
 
     def of(values: Tensor) -> Tensor:
-        return values.view(len(pictures), -1, 1, 1)
+        return values.view(len(images), -1, 1, 1)
 
-    pixels = pictures / 255
+    pixels = images / 255
     grey = sum(share * pixels[:, channel : channel + 1] for channel, share in enumerate(GREY))
     pixels = torch.where(of(exposures.grey), grey, pixels)
     pixels = (pixels * of(exposures.tint)).clamp(0, 1) ** of(exposures.gamma)
