@@ -78,12 +78,10 @@ class CameraResult:
     def row(self) -> list[str]:
         """The cells of its row, by `COLUMNS`; empty where a value is missing."""
         turned, shifted = self.verdict.moved
-        residual, sure, off = self.residual, "", ""
-        if self.verdict.covariance is not None:
-            sure = degrees_and_cm(self.verdict.sigma_rotation_deg, self.verdict.sigma_translation_cm)
-        if self.error is not None:
-            off = degrees_and_cm(self.error.rotation_deg, self.error.translation_cm)
-        alone = "" if residual.rotation_deg is None else degrees_and_cm(residual.rotation_deg, residual.translation_cm)
+        residual = self.residual
+        sure = degrees_and_cm(self.verdict.sigma_rotation_deg, self.verdict.sigma_translation_cm)
+        off = "" if self.error is None else degrees_and_cm(self.error.rotation_deg, self.error.translation_cm)
+        alone = degrees_and_cm(residual.rotation_deg, residual.translation_cm)
         px = "" if math.isnan(residual.match_error_px) else f"{residual.match_error_px:.1f} px"
         return [self.name, self.verdict.word, off, sure, alone, degrees_and_cm(turned, shifted), px]
 

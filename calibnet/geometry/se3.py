@@ -176,8 +176,10 @@ class PoseError:
     z_cm: float
 
 
-def degrees_and_cm(rotation_deg: float, translation_cm: float) -> str:
-    """The size of an error, a motion or a standard deviation for the reader: ``0.27° / 11.0 cm``."""
+def degrees_and_cm(rotation_deg: float | None, translation_cm: float | None) -> str:
+    """The size of an error, a motion or a standard deviation for the reader: ``0.27° / 11.0 cm``; empty if unknown."""
+    if rotation_deg is None or translation_cm is None:
+        return ""
     return f"{rotation_deg:.2f}° / {translation_cm:.1f} cm"
 
 

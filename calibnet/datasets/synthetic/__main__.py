@@ -1,4 +1,4 @@
-"""``python -m calibnet.datasets.synthetic [FRAMES]``: how long a training frame takes, in CPU time."""
+"""``python -m calibnet.datasets.synthetic [FRAMES]``: measures the CPU time of a training frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from calibnet.datasets.synthetic.render import sample_frame
 
 
 def main(frames: int = 40) -> None:
-    """Draw training frames and write their cost."""
+    """Render training frames and print the time per frame."""
     sample_frame(0)  # the atlas and the prototypes are built once a process
     spent = []
     for seed in range(1, frames + 1):

@@ -1,4 +1,4 @@
-"""What all vehicles are built of: a hull of cross-sections, wheels, lamps, number plates, a contact shadow."""
+"""Parts of all vehicles: a hull of cross-sections, wheels, lamps, number plates, a contact shadow."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from calibnet.datasets.synthetic.textures import Atlas
 
 
 class Rib(NamedTuple):
-    """An octagonal cross-section of a hull, measured from lengths and heights that the vehicle names.
+    """An octagonal cross-section of a hull, relative to named positions and heights (marks) of the vehicle.
 
     Attributes:
-        mark: name of the length it stands at.
-        ahead: metres it stands ahead of that.
-        width: share of the vehicle's half width.
-        bottom: metres its lower side lies above the vehicle's clearance.
-        top: name of the height its upper side lies at.
-        above: metres it lies above that.
-        taper: share of its width that is left at the upper side.
+        mark: name of the mark that gives its position along the vehicle.
+        ahead: distance ahead of that mark, metres.
+        width: half width, as a share of the vehicle's half width.
+        bottom: height of its lower side above the vehicle's clearance, metres.
+        top: name of the mark that gives the height of its upper side.
+        above: height above that mark, metres.
+        taper: width of the upper side, as a share of the width.
     """
 
     mark: str
@@ -41,10 +41,10 @@ def hull(
 
     Args:
         ribs: the cross-sections in order.
-        marks: lengths (metres ahead of the vehicle's middle) and heights that the ribs name.
-        half_width: of the vehicle, metres.
-        clearance: metres between the ground and the lowest rib.
-        material: of the skin.
+        marks: positions (metres ahead of the vehicle's middle) and heights, by the names that ribs use.
+        half_width: half the width of the vehicle, metres.
+        clearance: height of the lowest rib above the ground, metres.
+        material: material of the skin.
     """
     rings = []
     for rib in ribs:
@@ -91,7 +91,7 @@ def wheels(atlas: Atlas, axles: tuple[float, ...], half_width: float, radius: fl
 
 
 def contact_shadow(atlas: Atlas, length: float, half_width: float) -> Mesh:
-    """The dark ground under a vehicle, where no skylight reaches."""
+    """The dark ground under a vehicle, which no skylight reaches."""
     dark = Material(atlas.groups["asphalt"][0], (0.25, 0.25, 0.25))
     origin = (-0.49 * length, -0.97 * half_width, 0.035)
     return rectangle(origin, (0.98 * length, 0, 0), (0, 1.94 * half_width, 0), dark)
@@ -104,7 +104,7 @@ class _End(NamedTuple):
         direction: 1 for the front, -1 for the rear.
         lamp: tint of the lamps; ``lamp_height`` the range of their height, metres; ``lamp_retro`` their reflectance.
         plate: tint of the number plate.
-        grille: dark panels: half width, metres above the lamps' lower edge, height.
+        grille: dark panels: half width, height above the lamps' lower edge, and height of each, metres.
     """
 
     direction: float

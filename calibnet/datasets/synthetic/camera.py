@@ -1,4 +1,4 @@
-"""The camera: pixels to rays to radiance, then exposure, noise, blur and gamma as a real one has."""
+"""The camera: rays through pixels, their radiance, then exposure, noise, blur and gamma like a real camera's."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from calibnet.geometry.types import Transform
 
 @dataclass(frozen=True)
 class Exposure:
-    """How the camera turns radiance into bytes.
+    """The conversion of radiance into 8-bit values.
 
     Attributes:
-        level: mean brightness of the lower half that it aims at, linear, 0..1.
+        level: target of the mean linear brightness of the lower half of the image, 0..1.
         white: RGB factors of the white balance.
         gamma: exponent ``1 / gamma`` of the tone curve.
-        contrast: factor about mid-grey; 1 leaves it.
-        saturation: factor about grey; 1 leaves it, 0 removes all colour.
-        vignetting: share of the light lost in the corners.
-        noise: standard deviation on a scale of 0..1.
+        contrast: factor on the distance from mid-grey.
+        saturation: factor on the distance from grey; 0 removes all colour.
+        vignetting: share of the light that is lost in the corners.
+        noise: standard deviation, for values 0..1.
         blur: standard deviation of the lens blur, pixels.
         quality: JPEG quality, 0 for none.
     """
@@ -44,7 +44,7 @@ class Exposure:
 
 
 def sample_exposure(generator: Generator) -> Exposure:
-    """Draw how a camera exposes and develops."""
+    """Draw the exposure of a camera outdoors."""
     red, blue = np.exp(generator.normal(0.0, 0.06, 2))
     return Exposure(
         level=float(np.exp(generator.uniform(np.log(0.08), np.log(0.30)))),
@@ -60,7 +60,7 @@ def sample_exposure(generator: Generator) -> Exposure:
 
 
 def sample_indoor_exposure(generator: Generator) -> Exposure:
-    """Draw how a camera exposes lamps and dark corners: far too dark or washed out, and with more noise."""
+    """Draw the exposure of a camera indoors: often far too dark or washed out, with more noise."""
     usual = sample_exposure(generator)
     level, noise = float(np.exp(generator.uniform(np.log(0.025), np.log(0.5)))), float(generator.uniform(0.0, 0.05))
     return replace(usual, level=level, noise=noise, contrast=float(generator.uniform(0.8, 1.7)))
@@ -94,7 +94,7 @@ def photograph(
         weather: its light.
         camera: the intrinsics.
         world_from_camera: its pose, 4x4.
-        exposure: how it develops.
+        exposure: the conversion to 8 bits.
         generator: draws the noise.
     """
     rays = pixel_rays(camera) @ world_from_camera[:3, :3].T.astype(np.float32)
@@ -109,14 +109,14 @@ def photograph(
 
 
 def develop(linear: NDArray[np.float32], exposure: Exposure, generator: Generator) -> NDArray[np.uint8]:
-    """An 8-bit image ``[H, W, 3]`` of linear radiance ``[H, W, 3]``."""
+    """Convert linear radiance ``[H, W, 3]`` to an 8-bit image ``[H, W, 3]``."""
     import cv2
 
     height, width = linear.shape[:2]
     image: NDArray[np.float32] = cv2.GaussianBlur(np.minimum(linear, 8.0), (0, 0), exposure.blur).astype(
         np.float32, copy=False
     )
-    metered = float(np.minimum(image[height // 2 :], 2.0).mean())  # by the road, as cars do, not by the sky
+    metered = float(np.minimum(image[height // 2 :], 2.0).mean())  # metered on the road, as in cars, not on the sky
     image *= np.float32(exposure.level / max(metered, 1e-3)) * np.asarray(exposure.white, dtype=np.float32)
     y, x = np.linspace(-1, 1, height, dtype=np.float32), np.linspace(-1, 1, width, dtype=np.float32)
     image *= (1.0 - exposure.vignetting * 0.5 * (y[:, None] ** 2 + x**2))[..., None]

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 TILE = 256
-"""Pixels a side of a tile."""
+"""Side of a tile in pixels."""
 Image = NDArray[np.float32]
 Colour = tuple[float, float, float]
 
@@ -44,7 +44,7 @@ def flat(rgb: Colour, reflectance: float) -> Image:
 
 
 def speckled(generator: Generator, rgb: Colour, reflectance: float, amount: float, cells: int = 4) -> Image:
-    """A colour modulated by noise, as asphalt, plaster, soil are."""
+    """A tile of a colour modulated by noise, like asphalt, plaster or soil."""
     image = flat(rgb, reflectance)
     image *= (1.0 + amount * noise(generator, cells))[..., None]
     return image
@@ -57,7 +57,7 @@ def rectangle(image: Image, x0: float, y0: float, x1: float, y1: float, rgb: Col
 
 
 def scribble(image: Image, generator: Generator, x0: float, y0: float, x1: float, y1: float) -> None:
-    """Letters, or what looks like them from the road."""
+    """Scribble that looks like lettering from the road."""
     ink = colour(generator, 0.05, 0.95, 0.3)
     x = x0
     while x < x1 - 0.02:

@@ -1,4 +1,4 @@
-"""The ground of a stretch of road and what is painted on it."""
+"""The ground of a stretch of road, with its markings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from calibnet.datasets.synthetic.style import Style
 from calibnet.geometry.types import Floats
 
 CAMBER = 0.04
-"""Metres by which the edge of the carriageway lies below its centre."""
+"""Height of the centre of the carriageway above its edge, metres."""
 
 
 def cross_section(scene: Scene, start: float, stop: float) -> list[Mesh]:
@@ -82,7 +82,7 @@ def _lane_lines(scene: Scene, start: float, stop: float) -> list[Floats]:
 
 
 def _junction(scene: Scene, generator: Generator, start: float, stop: float) -> list[Floats]:
-    """Areas, each ``[N, 4]``, of a zebra crossing, and of a stop line with an arrow, each now and then."""
+    """Areas, each ``[N, 4]``, of an occasional zebra crossing, and of an occasional stop line with an arrow."""
     style = scene.style
     areas = []
     if generator.random() < 0.10:

@@ -1,7 +1,7 @@
 """Indoors: rooms, garages and warehouses, low or high, lit by lamps, with walls, pillars and a ceiling all around.
 
-Almost all that a scanner on a car meets lies below it or far away; one indoors has returns above its horizon, within
-metres.
+Almost all returns of a scanner on a car are below it or far away; indoors it has returns above its horizon, a few
+metres away.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from calibnet.geometry.types import Floats, Transform
 
 ROOM, GARAGE, WAREHOUSE = "room", "garage", "warehouse"
 _PANEL = 1.5
-"""Side of the panels of walls, floor and ceiling, metres; each has its own light."""
+"""Side of the panels of walls, floor and ceiling, metres; each is lit on its own."""
 _BULB_HEIGHT = 0.08
-"""Metres by which lamps hang below the ceiling."""
+"""Distance of lamps from the ceiling, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hall:
-    """One hall: what stands in it, its light, and where a vehicle stands.
+    """A hall with its contents, its light, and the pose of a vehicle in it.
 
     Attributes:
         kind: `ROOM`, `GARAGE` or `WAREHOUSE`.
-        weather: its light; no sun, and nobody sees the sky.
+        weather: its light, without sun; the sky is not visible.
         place: ``world_from_vehicle``, 4x4.
         everything: its triangles.
     """
@@ -44,12 +44,12 @@ class Hall:
     everything: Mesh
 
     def mesh(self, world_from_vehicle: Transform, time: float, behind: float = 100.0, ahead: float = 120.0) -> Mesh:
-        """All of it, wherever the vehicle is; nothing moves."""
+        """The whole hall, wherever the vehicle is; nothing moves."""
         return self.everything
 
 
 def sample_hall(generator: Generator) -> Hall:
-    """Draw a hall with all that stands in it."""
+    """Draw a hall with its contents."""
     kind = str(generator.choice([ROOM, GARAGE, WAREHOUSE], p=[0.3, 0.45, 0.25]))
     height = generator.uniform(4.0, 9.0) if kind == WAREHOUSE else generator.uniform(2.3, 3.6)
     aisle = generator.uniform(5.0, 7.5)
@@ -76,7 +76,7 @@ def sample_hall(generator: Generator) -> Hall:
 
 
 def _sheet(corner: Floats, along: Floats, up: Floats, material: Material) -> Mesh:
-    """A rectangle in panels of `_PANEL`, so that light may fall off over it."""
+    """A rectangle divided into panels of `_PANEL`, so that its light can vary."""
     counts = [max(2, round(float(np.linalg.norm(edge)) / _PANEL)) for edge in (along, up)]
     share = [np.linspace(0.0, 1.0, count + 1) for count in counts]
     grid = corner + share[0][:, None, None] * along + share[1][None, :, None] * up
@@ -86,7 +86,7 @@ def _sheet(corner: Floats, along: Floats, up: Floats, material: Material) -> Mes
 
 
 def _shell(generator: Generator, size: Floats) -> Iterator[Mesh]:
-    """Floor, ceiling and walls, these painted to breast height at times, with doors and signs on them."""
+    """Floor, ceiling and walls with doors and signs; walls are sometimes painted to breast height."""
     height = size[2]
     x, y, z = np.diag(size)
     corner = -0.5 * (x + y)
@@ -128,7 +128,7 @@ def _on_wall(generator: Generator, foot: Floats, run: Floats, height: float) -> 
 
 
 def _lamps(generator: Generator, size: Floats) -> Floats:
-    """Where lamps hang, ``[L, 3]``: in rows along x, some of them dead."""
+    """Positions ``[L, 3]`` of the lamps that are on, in rows along x; some are missing."""
     length, width, height = size
     x = np.arange(-0.5 * length + 2.0, 0.5 * length - 1.0, generator.uniform(3.0, 8.0))
     y = np.arange(-0.5 * width + 2.5, 0.5 * width - 1.0, generator.uniform(4.0, 8.0))
@@ -158,7 +158,7 @@ def _overhead(generator: Generator, size: Floats, lamps: Floats) -> Iterator[Mes
 
 
 def _pillars(generator: Generator, size: Floats, edge: float) -> Iterator[Mesh]:
-    """A row of pillars along an aisle, banded at times."""
+    """A row of pillars along an aisle, sometimes with bands."""
     if generator.random() < 0.15:
         return
     body, thick = material(generator, "concrete", "plaster", "metal"), generator.uniform(0.25, 0.7)
@@ -186,7 +186,7 @@ def _place(generator: Generator, size: Floats, aisles: list[tuple[float, float]]
 
 
 def _lit(mesh: Mesh, lamps: Floats, generator: Generator) -> Mesh:
-    """Tints by the light that falls on each triangle: of the lamps, by distance, beside what comes from all sides."""
+    """Tint every triangle by its light: that of the lamps, by distance, and ambient light."""
     middle = mesh.corners.mean(axis=1)
     light: NDArray[np.float32] = np.zeros(len(middle), np.float32)
     for lamp in lamps.astype(np.float32):
@@ -199,7 +199,7 @@ def _lit(mesh: Mesh, lamps: Floats, generator: Generator) -> Mesh:
 
 
 def _light(generator: Generator) -> Weather:
-    """Light from all sides, warm or cold."""
+    """Ambient light, warm or cold."""
     warm = np.exp(generator.normal(0.0, 0.12))
     tone = np.array([warm, 1.0, 1.0 / warm], dtype=np.float32)
     ambient = (tone * generator.uniform(0.5, 1.0)).astype(np.float32)

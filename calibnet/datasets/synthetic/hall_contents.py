@@ -1,4 +1,4 @@
-"""What stands in the halls of the synthetic world: vehicles in bays, shelves, boards to calibrate by, people."""
+"""Contents of the halls: vehicles in parking bays, shelves, calibration boards, people."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from calibnet.datasets.synthetic.textures import atlas
 from calibnet.geometry.types import Floats, Transform
 
 BAY = (2.5, 5.0)
-"""Width and depth of a place to park, metres."""
+"""Width and depth of a parking bay, metres."""
 
 
 def material(generator: Generator, *groups: str, dark: float = 0.35, bright: float = 1.1) -> Material:
-    """A tile of one of these groups of the atlas, as dark and as bright as that, a little tinted."""
+    """A random tile of these groups of the atlas, slightly tinted, as bright as ``dark`` to ``bright``."""
     value = float(generator.uniform(dark, bright))
     tint = value * np.exp(generator.normal(0.0, 0.05, 3))
     return Material(atlas().pick(str(generator.choice(groups)), generator), (tint[0], tint[1], tint[2]))
 
 
 def parked(generator: Generator, size: Floats, edge: float, side: float) -> Iterator[Mesh]:
-    """Lines of places to park at right angles to the aisle, and vehicles in some of them."""
+    """Markings of parking bays at right angles to the aisle, and vehicles in some of them."""
     width, depth = BAY
     paint = replace(material(generator, "paint", dark=0.6), reflectance=1.0)
     share = generator.uniform(0.1, 0.9)
@@ -65,7 +65,7 @@ def racks(generator: Generator, size: Floats, edge: float, side: float) -> Itera
 
 
 def boards(generator: Generator, place: Transform) -> Iterator[Mesh]:
-    """Boards to calibrate by and plain panels, up to five metres before the vehicle, on a stand or held by someone."""
+    """Calibration boards and plain panels up to 5 m in front of the vehicle, on a stand or held by a person."""
     up = np.array([0.0, 0.0, 1.0])
     for _ in range(int(generator.choice([0, 1, 1, 2]))):
         away = np.array([generator.uniform(1.3, 5.0), generator.uniform(-1.5, 1.5), 0.0])
@@ -96,7 +96,7 @@ def boards(generator: Generator, place: Transform) -> Iterator[Mesh]:
 
 
 def _squares(generator: Generator, corner: Floats, along: Floats, up: Floats) -> Mesh:
-    """The black squares of a checkerboard that leaves a margin."""
+    """The black squares of a checkerboard with a margin."""
     columns, rows = int(generator.integers(5, 12)), int(generator.integers(4, 9))
     black = Material(atlas().pick("black", generator), (0.25, 0.25, 0.25))
     margin, step_x, step_y = 0.08, 0.84 / columns, 0.84 / rows

@@ -1,4 +1,4 @@
-"""Prototypes of everything that is placed many times, built once per process and then instanced."""
+"""Prototypes of objects that are placed many times, built once per process and then instanced."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from calibnet.datasets.synthetic.textures import Atlas, atlas
 from calibnet.geometry.types import Floats
 
 _FAR = 0.2
-"""Share of the leaves that plants keep where they are seen from afar."""
+"""Share of their leaves that distant plants keep."""
 _PLANTS: dict[str, tuple[int, Callable[[Atlas, Generator, float], Mesh]]] = {
     "broadleaf": (14, vegetation.broadleaf),
     "conifer": (6, vegetation.conifer),
@@ -68,7 +68,7 @@ _CAR_COLOURS = (
 
 @lru_cache(maxsize=1)
 def library() -> dict[str, tuple[tuple[Mesh, Mesh], ...]]:
-    """All prototypes by name, each as seen from near and from afar; the same in every process."""
+    """All prototypes by name, each in a near and a distant version; the same in every process."""
     tiles = atlas()
     shelves: dict[str, tuple[tuple[Mesh, Mesh], ...]] = {}
     for name, (count, grow) in _PLANTS.items():

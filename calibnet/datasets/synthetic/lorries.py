@@ -11,7 +11,7 @@ from calibnet.datasets.synthetic.mesh import Material, Mesh, box, concatenate, c
 from calibnet.datasets.synthetic.textures import Atlas
 
 _HALF = 1.25
-"""Half the width of all of them, metres."""
+"""Half the width of all lorries and buses, metres."""
 _BUS_BODY = (
     Rib("front", 0.00, 0.92, 0.40, "roof", -0.1, 0.95),
     Rib("front", -0.30, 1.00, 0.35, "roof", 0.0, 0.96),

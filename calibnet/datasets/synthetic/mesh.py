@@ -1,4 +1,4 @@
-"""Triangle soups: every object of the synthetic world is one, and a scene is their concatenation."""
+"""Triangle soups, of which all objects of the synthetic world are made; a scene is their concatenation."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Mesh:
         uv: ``[T, 3, 2]`` float32, texture coordinates in metres (the atlas knows how large a tile is).
         texture: ``[T]`` int32, layer of the texture atlas.
         tint: ``[T, 3]`` float32, linear RGB factor on the texture.
-        gloss: ``[T]`` float32, 0 matte to 1 mirror-like (car paint, glass); below 0 foliage, which
-            scatters light whatever its normal.
+        gloss: ``[T]`` float32, 0 (matte) to 1 (mirror-like: car paint, glass); below 0 for foliage, which
+            scatters light independently of its normal.
         reflectance: ``[T]`` float32, LiDAR factor on the texture's own; above 1 is retro-reflective.
         paint: ``[T]`` bool, triangles that take the colour given to ``placed``.
     """
@@ -48,7 +48,7 @@ class Mesh:
         colour: ArrayLike | None = None,
         lean: float = 0.0,
     ) -> Mesh:
-        """Scale, turn about z by ``heading`` (and lean about x), move; recolour the painted triangles."""
+        """Scale, rotate about z by ``heading`` (and about x by ``lean``), and move; recolour the painted triangles."""
         c, s = np.cos(heading), np.sin(heading)
         rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         if lean:
@@ -64,7 +64,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Material:
-    """What a primitive is made of; fields as in ``Mesh``."""
+    """The material of a primitive; fields as in `Mesh`."""
 
     texture: int
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -141,7 +141,7 @@ def box(base: ArrayLike, size: Sequence[float], material: Material, top: Materia
 
 
 def loft(rings: ArrayLike, material: Material, closed: bool = True, caps: bool = True) -> Mesh:
-    """Skin through rings ``[R, P, 3]`` of points; caps fill the first and last ring."""
+    """A skin through rings ``[R, P, 3]`` of points; caps close the first and last ring."""
     ring = np.asarray(rings, dtype=np.float64)
     if closed:
         ring = np.concatenate([ring, ring[:, :1]], axis=1)

@@ -1,4 +1,4 @@
-"""What grows along a road: trees, bushes, thickets, tall grass, and the rocks between them."""
+"""Plants along a road: trees, bushes, thickets, tall grass; and rocks between them."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Belt:
     """A belt along the road over which one kind is scattered, more densely towards the road.
 
     Attributes:
-        kind: name of the prototypes; "tree" for one of the place's own.
-        count: how many grow on a side of a chunk, on average.
-        inner, outer: metres from the centre line.
-        sizes: smallest and largest factor of the prototype's size.
-        probability: that a side of a chunk has the belt at all.
+        kind: name of the prototypes; "tree" for one of the trees of the place.
+        count: average number on a side of a chunk.
+        inner, outer: distances of its edges from the centre line, metres.
+        sizes: smallest and largest factor on the size of the prototype.
+        probability: probability that a side of a chunk has the belt.
     """
 
     kind: str
@@ -46,7 +46,7 @@ def plants(stretch: Stretch) -> list[Mesh]:
 
 
 def _trees_and_bushes(style: Style) -> list[Belt]:
-    """A row along the road, trees behind the plots (a street has few, elsewhere it is a wood), and bushes."""
+    """Belts of trees along the road, of trees behind the plots (few in a street, else a wood), and of bushes."""
     verge, street, built = _verge(style), style.kind == "street", style.buildings > 0.4
     row = 0.3 if street else max(style.setback - 1.0, 1.0)
     far = style.front + (18.0 if built else 2.0)
@@ -70,12 +70,12 @@ def _undergrowth(style: Style) -> list[Belt]:
 
 
 def _verge(style: Style) -> float:
-    """Where plants may start, metres from the centre line: in a street already on the pavement."""
+    """Smallest distance of plants from the centre line, metres; in a street they may stand on the pavement."""
     return style.edge + (0.8 if style.kind == "street" else style.pavement)
 
 
 def _scatter(stretch: Stretch, belt: Belt) -> list[Mesh]:
-    """Place what a belt has on this side of this chunk."""
+    """Place the plants of a belt on one side of a chunk."""
     generator, style = stretch.generator, stretch.scene.style
     if belt.probability < 1.0 and generator.random() >= belt.probability:
         return []
@@ -104,7 +104,7 @@ def _thicket(stretch: Stretch) -> list[Mesh]:
 
 
 def _grow(stretch: Stretch, kind: str, station: float, lateral: float, turn: float, size: float | np.ndarray) -> Mesh:
-    """Place one plant, its leaves in the season's colour or near it."""
+    """Place one plant, with leaves of about the season's colour."""
     generator = stretch.generator
     colour = stretch.scene.leaf_colour * generator.uniform(0.7, 1.3) * generator.uniform(0.88, 1.12, 3)
     shape = library.pick(kind, generator, stretch.near)

@@ -1,4 +1,4 @@
-"""The plots along a road: houses and what fences them off."""
+"""The plots along a road: buildings and fences."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _fence(stretch: Stretch, station: float, width: float) -> list[Mesh]:
 
 
 def _building(stretch: Stretch, station: float, width: float) -> Mesh:
-    """A building that leaves a gap to its neighbours, its front towards the road."""
+    """A building with its front towards the road and a gap to its neighbours."""
     style, generator = stretch.scene.style, stretch.generator
     gap = 0.0 if style.building == "town_house" and generator.random() < 0.8 else generator.uniform(1.0, 5.0)
     if style.building == "detached_house":

@@ -15,16 +15,16 @@ from calibnet.datasets.synthetic.scene import Scene
 from calibnet.datasets.synthetic.stretch import Stretch
 
 CHUNK = 20.0
-"""Metres of road that are populated together."""
+"""Length of a chunk, metres."""
 
 
 def populate(scene: Scene, index: int, near: bool) -> Mesh:
-    """Everything that stands still in a chunk; the same for the same scene and index.
+    """All static objects of a chunk; they depend only on the scene and the index.
 
     Args:
         scene: the place.
         index: number of the chunk, counted from station 0.
-        near: whether plants have all their leaves; they stand in the same places if not.
+        near: whether plants have all their leaves; their places do not depend on it.
     """
     generator = np.random.default_rng([scene.seed, index + 10_000])
     start, stop = index * CHUNK, (index + 1) * CHUNK
@@ -38,7 +38,7 @@ def populate(scene: Scene, index: int, near: bool) -> Mesh:
 
 
 def _motorway(scene: Scene, generator: Generator, start: float, stop: float) -> list[Mesh]:
-    """Crash barriers and, now and then, a sign gantry or a bridge."""
+    """Crash barriers and sometimes a sign gantry or a bridge."""
     edge = scene.style.edge + 1.0
     rails = (0.0, -edge, edge) if scene.outer_rails else (0.0,)
     parts = [scene.stand(scene.rail, s, lateral) for s in np.arange(start + 2.0, stop, 4.0) for lateral in rails]

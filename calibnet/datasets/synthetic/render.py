@@ -27,7 +27,7 @@ INDOORS = 2 / 3
 
 
 class Surroundings(Protocol):
-    """What a frame is taken of: a `World` along a road, or a `Hall`."""
+    """The surroundings that a frame shows: a `World` along a road, or a `Hall`."""
 
     @property
     def weather(self) -> Weather:
@@ -50,18 +50,18 @@ def render_frame(
     exposure: Exposure | None = None,
     source: str = "synthetic",
 ) -> Frame:
-    """Photograph and scan a world from one pose.
+    """Render the image and the scan of a world from one pose.
 
     Args:
-        world: what is seen.
+        world: the surroundings.
         rig: sensors and mount.
         world_from_vehicle: pose of the vehicle, 4x4, for instance from ``world.scene.pose(station)``.
         generator: draws the noise, the lost returns and, unless given, the exposure.
         index: number of the frame.
-        timestamp: seconds; where the moving traffic is.
-        sector: half the azimuth that is scanned around the camera's axis, radians; pi for all of it.
-        exposure: how the camera develops; drawn if not given.
-        source: names the frame in messages.
+        timestamp: time in seconds, which moves the traffic.
+        sector: half the azimuth that is scanned around the camera's axis, radians; pi for a full revolution.
+        exposure: exposure of the camera; drawn if not given.
+        source: name of the frame in messages.
     """
     world_from_lidar = world_from_vehicle @ rig.vehicle_from_lidar
     world_from_camera = world_from_lidar @ invert(rig.camera_from_lidar)
@@ -78,7 +78,7 @@ def render_frame(
 
 
 def _reach(facing: float, sector: float) -> tuple[float, float]:
-    """Metres of road behind and ahead that a camera and a sector of the scan can see, or cast shadows into."""
+    """Metres of road behind and ahead that are visible to the camera and the scan's sector, or cast shadows there."""
     if sector > 0.6 * np.pi:
         return 100.0, 120.0
     if abs(np.sin(facing)) > 0.7:
@@ -87,7 +87,7 @@ def _reach(facing: float, sector: float) -> tuple[float, float]:
 
 
 def sample_frame(seed: int) -> Frame:
-    """One random scene seen by one random rig, small enough to be drawn during training."""
+    """A random scene seen by a random rig, small enough to be rendered during training."""
     generator = np.random.default_rng(seed)
     scene = sample_scene(generator)
     rig = sample_rig(generator)
@@ -96,7 +96,7 @@ def sample_frame(seed: int) -> Frame:
 
 
 def sample_robot_frame(seed: int) -> Frame:
-    """One random hall, or one time in three a road, seen by a random `sample_robot_rig`; small, as for training."""
+    """A random hall, or one time in three a road, seen by a random `sample_robot_rig`; small, for training."""
     generator = np.random.default_rng([seed, 1])
     rig, exposure = sample_robot_rig(generator), sample_indoor_exposure(generator)
     world: Surroundings

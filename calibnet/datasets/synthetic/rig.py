@@ -13,7 +13,7 @@ from calibnet.geometry.types import Extrinsic, Floats, Transform, Vector3
 CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Rotation from a LiDAR's axes (x forward, y left, z up) to a camera's (x right, y down, z forward)."""
 DOME_AXES = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""Rotation from a dome LiDAR's axes, of which z points forward and x down, to those of one that stands upright."""
+"""Rotation from a dome LiDAR's axes, whose z points forward and whose x points down, to those of an upright LiDAR."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,11 +25,11 @@ class Lidar:
         elevation: ``[B]`` angle of each beam above the horizontal, radians.
         azimuth_shift: ``[B]`` angle by which each beam is turned about the vertical, radians.
         azimuth_step: angle between firings, radians.
-        minimum_range, maximum_range: metres; the latter holds for a bright surface seen head-on.
+        minimum_range, maximum_range: metres; the largest range is that of a bright surface seen head-on.
         range_noise: standard deviation, metres.
         dropout: share of returns lost at random.
         gain, gamma: factor and exponent of the intensity.
-        falloff: share of the intensity that is lost at ``maximum_range``; less in proportion nearer.
+        falloff: share of the intensity that is lost at ``maximum_range``; proportionally less at shorter range.
     """
 
     name: str
@@ -50,10 +50,10 @@ class Rig:
     """A camera and a LiDAR on one vehicle.
 
     Attributes:
-        name: what titles show.
+        name: name to show in titles.
         camera: intrinsics of the rectified image.
         camera_from_lidar: the exact extrinsic, 4x4.
-        vehicle_from_lidar: the LiDAR above the vehicle's origin on the ground (x forward, z up), 4x4.
+        vehicle_from_lidar: pose of the LiDAR in the vehicle's frame (x forward, z up, origin on the ground), 4x4.
         lidar: the scanner.
     """
 
@@ -125,7 +125,7 @@ def sample_lidar(generator: Generator) -> Lidar:
 
 
 def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Vector3) -> Extrinsic:
-    """``camera_from_lidar`` of a camera at ``position`` (LiDAR frame) that looks ``forward_yaw`` left.
+    """``camera_from_lidar`` of a camera at ``position`` (LiDAR frame) that is turned left by ``forward_yaw``.
 
     Angles in radians; positive pitch looks down, positive roll tilts the camera clockwise.
     """
@@ -136,7 +136,7 @@ def camera_pose(forward_yaw: float, pitch: float, roll: float, position: Vector3
 
 
 def sample_camera(generator: Generator, pixels: int, maximum_width: int) -> PinholeCamera:
-    """Draw an image shape and a lens, at most ``maximum_width`` wide and about ``pixels`` in all."""
+    """Draw an image shape and a lens, at most ``maximum_width`` wide and with about ``pixels`` pixels."""
     aspect = float(
         generator.choice([3.31, 3.31, 3.31, 2.6, 2.6, 2.0, 2.0, 1.78, 1.78, 1.6, 1.333]) * generator.uniform(0.95, 1.05)
     )

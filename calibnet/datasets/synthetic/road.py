@@ -23,7 +23,7 @@ class CentreLine:
     Attributes:
         bends: ``[B, 3]`` amplitude (radians), wavelength (metres), phase of the heading.
         hills: ``[H, 3]`` amplitude (metres), wavelength (metres), phase of the height.
-        length: metres that are tabulated.
+        length: length that is tabulated, metres.
     """
 
     bends: Floats
@@ -58,7 +58,7 @@ class CentreLine:
         return np.stack(parts, axis=-1)
 
     def stand(self, station: float, lateral: float, lift: float) -> tuple[Vector3, float]:
-        """One world position ``[3]`` and the heading there: ``place`` for single objects, much quicker."""
+        """World position ``[3]`` and heading at one place: like `place` for a single object, but much faster."""
         row = station - _FIRST
         index = int(row)
         first, share = self._table[index], row - index
@@ -83,9 +83,9 @@ class Strip:
     """One strip of the ground's cross-section.
 
     Attributes:
-        inner, outer: its edges, metres left of the centre line.
-        inner_lift, outer_lift: their heights above the centre line, metres.
-        material: of its surface.
+        inner, outer: positions of its edges, metres left of the centre line.
+        inner_lift, outer_lift: heights of its edges above the centre line, metres.
+        material: material of its surface.
     """
 
     inner: float
@@ -97,11 +97,11 @@ class Strip:
 
 @dataclass(frozen=True)
 class Relief:
-    """Bumps of the open land, which rise over 4 m from ``start`` metres beside the centre line on.
+    """Bumps of the open land, which begin at ``start`` and reach their full height 4 m farther from the road.
 
     Attributes:
-        amplitude: their height, metres.
-        start: where the road, with its pavements, ends.
+        amplitude: height of the bumps, metres.
+        start: edge of the road with its pavements, metres from the centre line.
     """
 
     amplitude: float
@@ -137,9 +137,9 @@ def sweep(line: CentreLine, strips: list[Strip], relief: Relief, start: float, s
 
 
 def decals(line: CentreLine, areas: ArrayLike, material: Material, lift: float, camber: float) -> Mesh:
-    """Markings on the road: ``[N, 4]`` start and stop station, right and left lateral bound.
+    """Markings on the road, from areas ``[N, 4]``: start and stop station, right and left lateral bound.
 
-    ``lift`` is their height over the road, ``camber`` the road's fall per metre from its centre.
+    ``lift`` is their height above the road, ``camber`` the slope of the road across, from its centre.
     """
     start, stop, right, left = np.asarray(areas, dtype=np.float64).reshape(-1, 4).T
     station = np.stack([start, stop, stop, start], axis=1)

@@ -1,4 +1,4 @@
-"""What stands between the carriageway and the plots: parked cars, street furniture, people."""
+"""Objects between the carriageway and the plots: parked cars, street furniture, people."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Furniture:
     """A kind of street furniture and how it is placed.
 
     Attributes:
-        name: of the prototypes.
-        probability: that a side of a chunk has one where ``Style.furniture`` is 1.
+        name: name of the prototypes.
+        probability: probability that a side of a chunk has one if ``Style.furniture`` is 1.
         distance: metres outwards from the line where furniture starts, times a random 0.5 to 1.2.
         facing: along the traffic, towards the road, or any way.
-        row: fewest and most that stand in a row.
+        row: smallest and largest number in a row.
     """
 
     name: str
@@ -44,11 +44,11 @@ _FURNITURE = (
     Furniture("bench", 0.08, 1.2, facing="any"),
     Furniture("bicycle", 0.20, 1.0, facing="any"),
 )
-"""What a side of a chunk may have. Scenes drawn from a seed depend on the order of the rows."""
+"""Kinds of furniture. The scene of a seed depends on their order."""
 _SPACING = 1.6
-"""Metres between the pieces of a row."""
+"""Distance between the pieces of a row, metres."""
 _SLOT = 6.2
-"""Metres of road that a parked vehicle takes."""
+"""Length of road that a parked vehicle takes, metres."""
 
 
 def roadside(stretch: Stretch) -> list[Mesh]:
@@ -61,7 +61,7 @@ def roadside(stretch: Stretch) -> list[Mesh]:
 
 
 def _parked(stretch: Stretch) -> list[Mesh]:
-    """Vehicles in the parking strip or, where there is none, with two wheels on the pavement."""
+    """Vehicles in the parking strip or, without one, with two wheels on the pavement."""
     scene, style, generator = stretch.scene, stretch.scene.style, stretch.generator
     strip = style.parking > 1.0
     parts: list[Mesh] = []
@@ -112,7 +112,7 @@ def _pedestrians(stretch: Stretch) -> list[Mesh]:
 
 
 def _cyclist(stretch: Stretch) -> list[Mesh]:
-    """At times somebody cycling at the edge of the carriageway."""
+    """Sometimes a cyclist at the edge of the carriageway."""
     style, generator = stretch.scene.style, stretch.generator
     if generator.random() >= 0.4 * style.people:
         return []

@@ -1,4 +1,4 @@
-"""A scene: one place of the synthetic world, its road, its light and the choices that hold all over it."""
+"""A scene: one place of the synthetic world, with its road, its light and choices that hold everywhere in it."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from calibnet.geometry.types import Floats, Transform
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """One place, its road and its light: what is drawn once and holds for all that stands and drives there.
+    """One place with its road and its light: everything that is drawn once for all its objects and traffic.
 
     Attributes:
-        seed: with the number of a chunk or a vehicle, seeds that one's own generator.
+        seed: seeds the generators of chunks and vehicles, together with their numbers.
         style: the kind of place, its widths, densities and materials.
         weather: its light.
         line: the centre line of its road.
         paint: material of the road markings.
         kerb_texture: layer of the texture atlas.
-        dash: length of a dash of a lane line and of the gap behind it, metres.
+        dash: lengths of the dashes of a lane line and of the gaps between them, metres.
         center_line: "dashed", "double" or "none".
         edge_lines: whether solid lines bound the carriageway.
-        banks: metres by which the land rises over the 74 m beyond the plots, right and left.
-        leaf_colour: ``[3]`` linear RGB factor on all foliage, of the season.
-        fence_kind: "fence" or "hedge", what bounds the plots.
+        banks: rise of the land over the 74 m beyond the plots, right and left, metres.
+        leaf_colour: ``[3]`` linear RGB factor on all foliage, by the season.
+        fence_kind: "fence" or "hedge" around the plots.
         fences: the fence of the right and of the left side.
         rail: a segment of the crash barrier.
         outer_rails: whether a motorway has barriers at its edges too.
-        park_on_pavement: whether cars park where there is no parking strip.
+        park_on_pavement: whether cars park on the pavement if there is no parking strip.
     """
 
     seed: int
@@ -79,7 +79,7 @@ class Scene:
         return self.fences[0 if side < 0 else 1]
 
     def pose(self, station: float, lateral: float | None = None, yaw: float = 0.0) -> Transform:
-        """``world_from_vehicle`` of a vehicle that drives at a station, in the own lane by default."""
+        """``world_from_vehicle`` of a vehicle driving at a station, by default in the ego lane."""
         lateral = self.style.lane_center(0, own=True) if lateral is None else lateral
         slope = float(self.line.height(station + 1.0) - self.line.height(station - 1.0)) / 2.0
         heading = float(self.line.heading(station)) + yaw

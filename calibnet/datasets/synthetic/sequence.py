@@ -1,4 +1,4 @@
-"""A drive through one synthetic scene, rendered frame by frame as it is asked for."""
+"""A drive through one synthetic scene; each frame is rendered when it is read."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from calibnet.errors import ConfigError
 from calibnet.geometry.types import Transform
 
 FRAME_INTERVAL = 0.1
-"""Seconds between frames, as KITTI's scanner turns."""
+"""Seconds between frames, as for KITTI's scanner."""
 _NATIVE_PIXELS, _NATIVE_WIDTH = 1242 * 375, 1242
 
 
 class SyntheticSequence:
-    """A `Sequence` of a car that drives about a metre a frame among moving traffic.
+    """A `Sequence` from a car that drives about a metre per frame among moving traffic.
 
-    A frame depends on the seed and its position only, whatever was read before it.
+    A frame depends only on the seed and its position, not on what was read before.
     """
 
     def __init__(self, seed: int, length: int, rig: Rig | None = None) -> None:
         """Build the scene.
 
         Args:
-            seed: of the scene, its traffic, the noise and, without ``rig``, the sensors.
+            seed: seed of the scene, its traffic, the noise and, without ``rig``, the sensors.
             length: number of frames.
             rig: sensors and mount; drawn from the seed if not given.
 
         Raises:
-            ConfigError: the seed is negative or there is no frame.
+            ConfigError: the seed is negative, or the length is not positive.
         """
         if seed < 0 or length < 1:
             raise ConfigError(
@@ -61,7 +61,7 @@ class SyntheticSequence:
         return (self[position] for position in range(self.length))
 
     def world_from_vehicle(self, position: int) -> Transform:
-        """Where the car is at a frame, 4x4: x forward, y left, z up on the road below the LiDAR."""
+        """Pose of the car at a frame, 4x4; its frame is on the road below the LiDAR, x forward, y left, z up."""
         return self.world.scene.pose(position * EGO_SPEED * FRAME_INTERVAL)
 
     def __getitem__(self, position: int) -> Frame:

@@ -1,4 +1,4 @@
-"""Ray hits to surface points to colours: shared by the camera and the LiDAR."""
+"""Ray casting and shading, shared by the camera and the LiDAR."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from calibnet.datasets.synthetic.weather import Weather
 
 Array = NDArray[np.float32]
 _THREADS = 1
-"""Frames are rendered side by side by the trainer's workers; within a frame one core is used."""
+"""Threads per frame: the workers of training render frames in parallel."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Rays that met the scene.
+    """Hits of rays on the scene.
 
     Attributes:
         rays: ``[N]`` int64, indices of the rays.
@@ -74,7 +74,7 @@ def cast(scene: Any, origin: ArrayLike, directions: Array) -> Hits:
 
 
 def occluded(scene: Any, origins: Array, direction: Array) -> NDArray[np.bool_]:
-    """Whether something stands before points ``[N, 3]`` in a direction ``[3]``."""
+    """Whether points ``[N, 3]`` are occluded in a direction ``[3]``."""
     rays = _rays(origins, np.broadcast_to(direction, origins.shape))
     return np.asarray(scene.test_occlusions(rays, nthreads=_THREADS).numpy())
 
@@ -96,7 +96,7 @@ def radiance(
         scene: the ``RaycastingScene`` of ``mesh``.
         mesh: the world.
         weather: its light.
-        hits: what the camera's rays met.
+        hits: hits of the camera's rays.
         origin: ``[3]`` the camera's position.
         rays: ``[N, 3]`` unit directions of the hits.
         pixel_angle: angle that a pixel spans, radians.

@@ -149,6 +149,6 @@ def rock(atlas: Atlas, generator: Generator) -> Mesh:
 
 
 def cyclist(atlas: Atlas, generator: Generator) -> Mesh:
-    """Somebody riding a bicycle along x."""
+    """A person riding a bicycle along x."""
     rider = person(atlas, generator).placed((-0.1, 0.0, 0.35), scale=(1.0, 1.0, 0.85))
     return concatenate([bicycle(atlas, generator), rider])

@@ -16,7 +16,7 @@ class Stretch:
 
     Attributes:
         scene: the place.
-        generator: of the chunk; whatever is placed draws from it in turn.
+        generator: generator of the chunk, shared by everything that is placed.
         start, stop: stations, metres.
         side: -1 right, 1 left of the centre line.
         near: whether plants are seen from nearby and have all their leaves.
@@ -31,7 +31,7 @@ class Stretch:
 
     @property
     def facing(self) -> float:
-        """Direction in which this side's traffic drives, radians from the road's."""
+        """Direction of the traffic on this side, radians from the road's direction."""
         return 0.0 if self.side == self.scene.style.side else np.pi
 
     def anywhere(self) -> float:

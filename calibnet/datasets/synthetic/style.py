@@ -1,4 +1,4 @@
-"""What kind of place a scene is: widths, densities and materials, drawn once a scene."""
+"""The style of a scene: widths, densities and materials, drawn once per scene."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ class Style:
     Attributes:
         kind: one of ``KINDS``.
         side: -1 where traffic keeps right, 1 where it keeps left.
-        lanes: lanes a direction.
-        lane: their width.
+        lanes: number of lanes per direction.
+        lane: width of a lane.
         median: half the width between the two directions.
         parking: width of a parking strip, 0 for none.
         pavement: width of the pavement, 0 for none.
-        kerb: its height.
-        setback: between pavement and building fronts.
+        kerb: height of the kerb.
+        setback: distance between pavement and building fronts.
         buildings: share of plots built on.
-        storeys: range of their number, the upper bound excluded.
+        storeys: range of the number of storeys, the upper bound excluded.
         building: type of building.
         parked: share of parking slots taken.
-        trees, bushes, furniture, people: how dense they are, from 0 for none to 1.
+        trees, bushes, furniture, people: densities, 0 (none) to 1.
         thickets: probability of a thicket along a side of a chunk.
         fences: share of plots fenced off.
-        trees_set: names of the trees that grow here, the frequent ones more than once.
+        trees_set: names of the trees that grow here; frequent ones occur more than once.
         traffic: mean gap between moving vehicles in a lane, 0 for none.
-        speed: of the other lanes' traffic, metres a second.
+        speed: speed of the traffic in other lanes, metres per second.
         heavy: share of lorries and vans.
         rough: height of the bumps beside the road.
         road, walk, verge, field: materials.
@@ -124,7 +124,7 @@ _RANGES: dict[str, dict[str, tuple[float, float] | float]] = {
     "fences": {"suburb": (0.2, 0.9), "industrial": (0.3, 0.9), "park": 0.2, _OTHER: 0.08},
     "rough": {"off-road": (0.15, 0.7), "park": (0.1, 0.4), _OTHER: (0.0, 0.25)},
 }
-"""By parameter and kind of place: a value, or the range that it is drawn from."""
+"""Parameters by kind of place: a value, or the range that it is drawn from."""
 _STOREYS = {"street": (2, 7), "suburb": (1, 3), "highway": (2, 8), "industrial": (2, 7)}
 _BUILDING = {"street": "town_house", "suburb": "detached_house", "park": "detached_house"}
 

@@ -1,4 +1,4 @@
-"""What is not part of a chunk: moving traffic, and the land and skyline beyond the populated road."""
+"""Surroundings outside the chunks: moving traffic, and the land and skyline beyond the populated road."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from calibnet.datasets.synthetic.textures import atlas
 from calibnet.geometry.types import Vector3
 
 EGO_SPEED = 10.0
-"""Speed of the own vehicle, metres a second: one metre a frame at 10 Hz."""
+"""Speed of the ego vehicle, metres per second: one metre per frame at 10 Hz."""
 
 
 def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahead: float, ego: Vector3) -> list[Mesh]:
@@ -19,11 +19,11 @@ def moving_traffic(scene: Scene, station: float, time: float, behind: float, ahe
 
     Args:
         scene: the place.
-        station: of the own vehicle, metres.
-        time: seconds.
-        behind: metres of road behind it that are looked at.
-        ahead: metres of road ahead of it.
-        ego: ``[3]`` position of the own vehicle, around which no other stands.
+        station: station of the ego vehicle, metres.
+        time: time in seconds.
+        behind: length of road behind the ego vehicle, metres.
+        ahead: length of road ahead of it, metres.
+        ego: ``[3]`` position of the ego vehicle, which other vehicles keep away from.
     """
     style = scene.style
     parts: list[Mesh] = []

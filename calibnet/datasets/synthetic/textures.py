@@ -13,7 +13,7 @@ from calibnet.datasets.synthetic import tiles
 from calibnet.datasets.synthetic.drawing import TILE, noise
 
 LEVELS = 9
-"""Mip levels: 256, 128, … 1 pixels a side."""
+"""Number of mip levels: sides of 256, 128, … 1 pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,8 @@ class Atlas:
     Attributes:
         texels: ``[N, 4]`` uint8: sRGB-like colour and LiDAR reflectance, all levels and tiles.
         level_offset: ``[LEVELS]`` int32, where each level starts.
-        tile_metres: ``[M]`` float32, metres that a tile covers.
-        groups: numbers of the tiles of a kind of surface, for instance ``groups["brick"]``.
+        tile_metres: ``[M]`` float32, side of the surface that a tile covers, metres.
+        groups: numbers of the tiles of each kind of surface, for instance ``groups["brick"]``.
     """
 
     texels: NDArray[np.uint8]

@@ -1,4 +1,4 @@
-"""The plan of the atlas: which tiles there are, how many of each and how large."""
+"""The plan of the atlas: its tiles, their numbers and their sizes."""
 
 from __future__ import annotations
 

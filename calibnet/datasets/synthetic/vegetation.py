@@ -1,4 +1,4 @@
-"""Trees, bushes and hedges: lumpy hulls wrapped in a shell of loose leaves that rays pass between."""
+"""Trees, bushes and hedges: lumpy hulls wrapped in shells of loose leaves, with gaps that rays pass through."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def leaf_cloud(
 ) -> Mesh:
     """Leaves: ``count`` triangles of about ``size`` metres scattered in the shells of ellipsoids ``[E, 3]``.
 
-    A ``detail`` below 1 takes that share of them and makes them larger, for plants that are seen from afar.
+    A ``detail`` below 1 keeps this share of the leaves and makes them larger, for distant plants.
     """
     count, size = int(count * detail), size * min(detail**-0.4, 1.7)
     which = generator.integers(len(centers), size=count)

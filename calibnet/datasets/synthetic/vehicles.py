@@ -15,14 +15,14 @@ from calibnet.datasets.synthetic.textures import Atlas
 
 @dataclass(frozen=True)
 class _CarKind:
-    """What sets a kind of car apart.
+    """Dimensions of a kind of car.
 
     Attributes:
-        shorter: metres off the length.
-        taller: metres on the height.
-        clearance: metres between the ground and the body.
+        shorter: metres subtracted from the length.
+        taller: metres added to the height.
+        clearance: height of the body above the ground, metres.
         boot: share of the length behind the rear window.
-        tail_drop: metres by which the boot's lid or the tailgate falls to the rear.
+        tail_drop: drop of the boot lid or tailgate towards the rear, metres.
         rear_slope: range of the rear window's horizontal run, metres.
     """
 
@@ -49,7 +49,7 @@ _CAR_BODY = (
     Rib("rear", 0.00, 0.88, 0.20, "tail", -0.15, 0.95),
 )
 _CAR_POSTS = ((1.0, 0.0, 0.07), (0.45, 0.55, 0.10), (0.0, 1.0, 0.16))
-"""Posts of a car's roof: weights of the windscreen's and the rear window's place, width in metres."""
+"""Posts of a car's roof: weights of the positions of windscreen and rear window, and width in metres."""
 _VAN_BODY = (
     Rib("front", 0.00, 0.90, 0.30, "ground", 0.95, 0.95),
     Rib("front", -0.55, 1.00, 0.22, "ground", 1.15, 0.92),

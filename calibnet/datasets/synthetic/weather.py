@@ -25,8 +25,8 @@ class Weather:
         ambient: ``[3]`` light from the whole sky on a level surface.
         bounce: ``[3]`` light from the ground.
         clouds: 0 clear to 1 overcast.
-        cloud_shift: ``[2]`` where in the cloud texture the sky is.
-        visibility: metres at which haze takes over.
+        cloud_shift: ``[2]`` position of the sky in the cloud texture.
+        visibility: distance at which haze dominates, metres.
     """
 
     sun_direction: Array = field(repr=False)

@@ -12,11 +12,11 @@ from calibnet.datasets.synthetic.weather import Weather
 from calibnet.geometry.types import Transform
 
 _KEPT = 24
-"""Chunks in memory at most, so that a drive of any length fits."""
+"""Largest number of chunks in memory, so that a drive of any length fits."""
 
 
 class World:
-    """All that stands and moves in a scene. Chunks of road are populated when first looked at."""
+    """Everything in a scene, static and moving. Chunks of road are populated when they are first needed."""
 
     def __init__(self, scene: Scene) -> None:
         """Start with nothing populated."""
@@ -33,9 +33,9 @@ class World:
 
         Args:
             world_from_vehicle: pose of the vehicle, 4x4.
-            time: seconds; where the moving traffic is.
-            behind: metres of road behind the vehicle.
-            ahead: metres of road ahead of it.
+            time: time in seconds, which moves the traffic.
+            behind: length of road behind the vehicle, metres.
+            ahead: length of road ahead of it, metres.
         """
         position = world_from_vehicle[:3, 3]
         station = self.scene.line.nearest_station(position)

@@ -10,6 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from calibnet.geometry import (
+    degrees_and_cm,
     euler_xyz,
     invert,
     pose_error,
@@ -123,3 +124,8 @@ def test_pose_error_against_arccos_and_the_norm():
         offset = [100.0 * (estimate[k, 3] - reference[k, 3]) for k in range(3)]
         assert [error.x_cm, error.y_cm, error.z_cm] == pytest.approx(offset)
         assert error.translation_cm == pytest.approx(math.dist(offset, [0, 0, 0]))
+
+
+def test_the_size_of_a_pose_is_written_with_its_units() -> None:
+    assert degrees_and_cm(0.274, 11.02) == "0.27° / 11.0 cm"
+    assert degrees_and_cm(None, 1.0) == ""
