@@ -102,7 +102,7 @@ def test_junit_has_a_case_for_the_verdict_and_every_limit(
     [
         ((), (), 0, "accepted. Of 3 frames 3 accepted, 0 rejected, 0 cannot tell."),
         ((1,), (), 0, f"accepted. Of 3 frames 2 accepted, 1 rejected (frame 1: {REASON[:-1]}), 0 cannot tell."),
-        ((), (0, 2), 4, "cannot tell. Of 3 frames 1 accepted, 0 rejected, 2 cannot tell (frames 0, 2; frame 0: Pic"),
+        ((), (0, 2), 4, "cannot tell. Of 3 frames 1 accepted, 0 rejected, 2 cannot tell (frames 0, 2; frame 0: Image"),
         ((1, 2), (), 1, f"rejected. Of 3 frames 1 accepted, 2 rejected (frames 1, 2; frame 1: {REASON[:-1]}), "),
         ((1,), (0,), 4, "cannot tell. Of 3 frames 1 accepted, 1 rejected"),
     ],
