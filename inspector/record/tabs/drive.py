@@ -176,8 +176,8 @@ def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial
     what = "changed the calibration by" if reference is None else "off by"
     skipped = f", {len(estimate.skipped)} more could not be used" if estimate.skipped else ""
     result = (
-        f"Whole drive as one ({estimate.frames} frames{skipped}): {what} {error.rotation_deg:.2f}° / "
-        f"{error.translation_cm:.1f} cm; "
+        f"Whole drive as one ({estimate.frames} frames{skipped}): {what} "
+        f"{degrees_and_cm(error.rotation_deg, error.translation_cm)}; "
     )
     sure = f"±{degrees_and_cm(estimate.rotation_deg, estimate.translation_cm)} (1σ)"
     if estimate.networks is None:
