@@ -11,15 +11,9 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
-import numpy as np
-
 from calibnet.datasets import Frame, Sequence
 from calibnet.datasets.images.files import resize_image
-
-RING_DEG = 0.8
-"""Degrees of elevation of a kept and a dropped band together: of 64 beams about 32 are left."""
-
-Alteration = Callable[[Frame], Frame]
+from calibnet.evaluation.faults import Alteration, grey, thinned
 
 
 class Altered:
@@ -40,17 +34,6 @@ class Altered:
         return (self[position] for position in range(len(self)))
 
 
-def grey(frame: Frame) -> Frame:
-    """The frame with nothing to see."""
-    return replace(frame, image=np.full_like(frame.image, 128))
-
-
-def thinned(frame: Frame) -> Frame:
-    """The frame with every other band of elevation, as a scanner with half the beams would see it."""
-    elevation = np.degrees(np.arctan2(frame.points[:, 2], np.hypot(frame.points[:, 0], frame.points[:, 1])))
-    return replace(frame, points=frame.points[elevation % RING_DEG < RING_DEG / 2])
-
-
 def swapped_with(donors: Sequence) -> Alteration:
     """Replace images by those of another drive in turn, resized to fit."""
 
@@ -62,7 +45,7 @@ def swapped_with(donors: Sequence) -> Alteration:
 
 def alterations(donors: Sequence) -> dict[str, Alteration]:
     """The alterations by the names that tables and JSON use."""
-    return {"swapped": swapped_with(donors), "grey": grey, "thinned": thinned}
+    return {"swapped": swapped_with(donors), "grey": grey, "thinned": thinned(2)}
 
 
 def other_drive(sequence: Sequence, opened: list[Sequence], beside: Callable[[], Iterable[Sequence]]) -> Sequence:

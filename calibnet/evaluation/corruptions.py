@@ -116,7 +116,7 @@ def scan_faults() -> Iterator[Corruption]:
         yield Corruption("noise", f"{metres:g} m", None, faults.noisy(metres), metres == 0.1)
     for name, factor in (("feet", 1 / 0.3048), ("millimetres", 1000.0), ("kilometres", 0.001)):
         yield Corruption("units", name, "units", faults.scaled_scan(factor), name == "millimetres")
-    for name, order in faults.AXES.items():
+    for name, order in faults.AXIS_CONVENTIONS.items():
         yield Corruption("axes", name, "axes", faults.turned(order), name == "x right, y down, z forward")
     for name, axis in (("y to the right", 1), ("x backward", 0), ("z down", 2)):
         yield Corruption("left-handed", name, "left-handed", faults.flipped(axis), axis == 1)

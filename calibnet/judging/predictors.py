@@ -18,7 +18,7 @@ from calibnet.judging.correlated_errors import correlated_covariance
 from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
-AXES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
+AXIS_NAMES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
 """Names of a correction's axes for users: rotations about the camera's x, y and z, then translations along them."""
 LEAST = 1e-6
 """Lower limit of values whose logarithm is taken."""
@@ -30,7 +30,7 @@ class Reach:
 
     Attributes:
         share: distance relative to the range; 1 is its border.
-        axis: index into `AXES`.
+        axis: index into `AXIS_NAMES`.
         moved: distance on that axis, in degrees or metres.
         searched: half width of the range on that axis, in degrees or metres.
     """
@@ -44,7 +44,7 @@ class Reach:
         unit, verb = ("°", "turned") if self.axis < 3 else (" m", "moved")
         prefix = "in " if self.axis < 3 else ""
         return (
-            f"{verb} {abs(self.moved):.2g}{unit} {prefix}{AXES[self.axis]}, "
+            f"{verb} {abs(self.moved):.2g}{unit} {prefix}{AXIS_NAMES[self.axis]}, "
             f"farther than the ±{self.searched:g}{unit} searched"
         )
 

@@ -14,7 +14,7 @@ from inspector.live.session import LiveSession
 from inspector.live.window import WindowRecording
 from inspector.markdown import markdown_table
 
-AXES = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z"}
+AXIS_KEYS = {"qa": "roll", "ws": "pitch", "ed": "yaw", "rf": "x", "tg": "y", "yh": "z"}
 """Pairs of keys that increase and decrease a number of the pose, as in OpenCalib's manual tool."""
 STEPS = {"coarse": (0.25, 0.02), "fine": (0.02, 0.002)}
 """Degrees and metres per key press; with Shift, a tenth of it."""
@@ -126,7 +126,7 @@ class Terminal:
 
     def _turned(self, key: str) -> Pose | None:
         """The pose after a key that changes it; None for other keys."""
-        for keys, axis in AXES.items():
+        for keys, axis in AXIS_KEYS.items():
             if key.lower() in (*keys,):
                 step = STEPS[self._steps][axis in ("x", "y", "z")] * (0.1 if key.isupper() else 1.0)
                 value = getattr(self._workspace.pose, axis) + (step if key.lower() == keys[0] else -step)

@@ -14,7 +14,7 @@ from calibnet.evaluation.faults.image import (
     shifted,
 )
 from calibnet.evaluation.faults.scan import (
-    AXES,
+    AXIS_CONVENTIONS,
     accumulated,
     flipped,
     glint,
@@ -29,7 +29,7 @@ from calibnet.evaluation.faults.scan import (
 )
 
 __all__ = [
-    "AXES",
+    "AXIS_CONVENTIONS",
     "Alteration",
     "NATIVE_WIDTH",
     "accumulated",

@@ -17,7 +17,7 @@ from calibnet.geometry.types import Transform
 
 BAND_DEG = 0.4
 """Height of the bands of elevation that are kept or dropped when a scan is thinned: about one ring of 64."""
-AXES = {
+AXIS_CONVENTIONS = {
     "x right, y forward, z up": np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     "x right, y down, z forward": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
     "x backward, y right, z up": np.diag([-1.0, -1.0, 1.0]),

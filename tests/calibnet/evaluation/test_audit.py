@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibnet.evaluation.audit import Altered, alterations, grey, other_drive, thinned
+from calibnet.evaluation.audit import Altered, alterations, other_drive
+from calibnet.evaluation.faults import grey, thinned
 from tests.support.drive import Drive
 
 
@@ -27,7 +28,7 @@ def test_thinning_drops_whole_rings_and_about_half_of_the_points() -> None:
     azimuth = np.linspace(-1, 1, 200)
     e, a = np.meshgrid(elevation, azimuth, indexing="ij")
     points = np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e), 0 * e], axis=-1) * 10
-    left = thinned(replace(Drive([0])[0], points=points.reshape(-1, 4).astype(np.float32))).points
+    left = thinned(2)(replace(Drive([0])[0], points=points.reshape(-1, 4).astype(np.float32))).points
     assert 0.35 < len(left) / points[..., 0].size < 0.65
     rings, counts = np.unique(np.round(np.degrees(np.arcsin(left[:, 2] / 10)), 1), return_counts=True)
     assert (counts == 200).all() and len(rings) < len(elevation)

@@ -96,11 +96,13 @@ def test_scans_in_other_units_axes_and_hands() -> None:
     points = np.array([[10.0, 2.0, -1.0, 0.5]], np.float32)
     frame = replace(FRAME, points=points)
     assert faults.scaled_scan(1000.0)(frame).points[0] == pytest.approx([10000, 2000, -1000, 0.5])
-    camera_axes = faults.AXES["x right, y down, z forward"]
+    camera_axes = faults.AXIS_CONVENTIONS["x right, y down, z forward"]
     assert faults.turned(camera_axes)(frame).points[0] == pytest.approx([-2, 1, 10, 0.5])
-    assert faults.turned(faults.AXES["x right, y forward, z up"])(frame).points[0] == pytest.approx([-2, 10, -1, 0.5])
+    assert faults.turned(faults.AXIS_CONVENTIONS["x right, y forward, z up"])(frame).points[0] == pytest.approx(
+        [-2, 10, -1, 0.5]
+    )
     assert faults.flipped(1)(frame).points[0] == pytest.approx([10, -2, -1, 0.5])
-    assert all(np.linalg.det(axes) == pytest.approx(1.0) for axes in faults.AXES.values())
+    assert all(np.linalg.det(axes) == pytest.approx(1.0) for axes in faults.AXIS_CONVENTIONS.values())
 
 
 def test_a_thinned_scan_keeps_one_band_of_so_many() -> None:
