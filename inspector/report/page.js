@@ -2,7 +2,7 @@ document.documentElement.classList.add("live");
 
 for (const compare of document.querySelectorAll(".compare")) {
   const slider = compare.querySelector("input[type=range]");
-  const place = () => compare.style.setProperty("--at", slider.value + "%");
+  const place = () => compare.style.setProperty("--at", `${slider.value}%`);
   slider.addEventListener("input", place);
   place();
   for (const choice of compare.parentElement.querySelectorAll("input[type=radio]")) {
@@ -32,7 +32,7 @@ button.addEventListener("click", async () => {
     return;
   }
   const recording = new URL(button.dataset.recording, location.href).href;
-  const address = "viewer/index.html?hide_welcome_screen=1&persist=0&renderer=webgl&url=" + encodeURIComponent(recording);
+  const address = `viewer/index.html?hide_welcome_screen=1&persist=0&renderer=webgl&url=${encodeURIComponent(recording)}`;
   viewer.querySelector("iframe").src = address;
   viewer.querySelector("a").href = address;
   viewer.hidden = false;

@@ -8,11 +8,11 @@ export function colours({ turbo, viridis, near, far, edge, rest, worst }, kind, 
   if (kind === "intensity") return (i) => viridises[scan.intensity[i]];
   if (kind === "edge") return (i) => (scan.edge[i] ? rgba(...edge) : rgba(...rest));
   if (kind === "error" && scan.truth)
-    return (i, z, u, v) => {
+    return (i, _z, u, v) => {
       const distance = Math.hypot(u - scan.truth[2 * i], v - scan.truth[2 * i + 1]);
       return turbos[Math.round(25 + 215 * Math.min(1, (Number.isFinite(distance) ? distance : worst) / worst))];
     };
-  return (i, z) => turbos[Math.round(245 - 235 * Math.min(1, Math.max(0, Math.log(z / near) / span)))];
+  return (_i, z) => turbos[Math.round(245 - 235 * Math.min(1, Math.max(0, Math.log(z / near) / span)))];
 }
 
 // As HTML.

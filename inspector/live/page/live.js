@@ -55,7 +55,7 @@ const heard = {
 
 function setState(state) {
   live.state = state;
-  if (live.held && live.held.every((value, i) => value === state.pose[i])) live.held = null;
+  if (live.held?.every((value, i) => value === state.pose[i])) live.held = null;
   live.pose = live.held ?? state.pose;
   showPose();
   at("frame").textContent = `frame ${state.frame.index} (${state.frame.position + 1} of ${state.frame.count})`;
@@ -76,7 +76,9 @@ function stageButton(number) {
   return button;
 }
 
-const showLegend = () => (at("legend").innerHTML = legend(live.hello.palettes, at("color").value));
+const showLegend = () => {
+  at("legend").innerHTML = legend(live.hello.palettes, at("color").value);
+};
 
 // ---- requests -----------------------------------------------------------------------------------------------------
 

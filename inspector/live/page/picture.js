@@ -38,7 +38,9 @@ export async function showFrame() {
   redraw();
 }
 
-export const forgetFrame = () => (loaded = -1);
+export const forgetFrame = () => {
+  loaded = -1;
+};
 
 async function fetched(path) {
   const answer = await fetch(path);

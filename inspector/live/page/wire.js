@@ -50,5 +50,8 @@ export function say(text, problem = false) {
   at("said").textContent = text;
   at("said").className = problem ? "problem" : "";
   clearTimeout(shown);
-  shown = setTimeout(() => (at("said").textContent = ""), problem ? 12000 : 5000);
+  const forget = () => {
+    at("said").textContent = "";
+  };
+  shown = setTimeout(forget, problem ? 12000 : 5000);
 }
