@@ -23,16 +23,21 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from calibnet.weights.manifest import PACKAGE
 from tests.hostile import inputs, recordings
 from tests.hostile.rows import Row
 from tests.hostile.table import prepared
 from tests.hostile.tried import Outcome, try_row
+from tests.support.bags import write_bag
+from tests.support.fakes import make_frame
 from tests.support.folder import write_folder
 
 COMMANDS = {
     "folder": "folder car --frames 0 --headless --detail overview --save {out}/run.rrd --report {out}/report",
     "all": "folder car --frames 0 --headless --detail full --save {out}/run.rrd",
     "verify": "verify folder car --save {out}/v.rrd --report {out}/report --json {out}/v.json",
+    "bag": "bag drive --headless --detail overview --save {out}/bag.rrd --report {out}/report",
+    "watch": "watch folder car --save {out}/watch.rrd --json {out}/watch.json",
     "rig": "rig rig --headless --save {out}/rig.rrd --json {out}/rig.json --output {out}/found",
     "check": "check run.rrd --json {out}/check.json --junit {out}/check.xml",
     "report": "report run.rrd --output {out}/report",
@@ -47,6 +52,8 @@ COMMANDS = {
     " --save {out}/training.rrd",
     "bench": "bench --threads 1 --method edge-alignment --data folder:car --range 5/0.5 --no-audit"
     " --json {out}/b.json --csv {out}/b.csv --html {out}/b.html --markdown {out}/b.md",
+    "evaluate": "evaluate --dataset folder --root car --range 5/0.5 --no-classical --json {out}/e.json",
+    "benchmark": f"benchmark --threads 1 --repeats 1 --stages 5 --weights {PACKAGE} --json {{out}}/benchmark.json",
     "ablate": "ablate --threads 1 --json {out}/ablate.json --markdown {out}/ablate.md",
     "info": "info --json {out}/info.json",
 }
@@ -55,20 +62,28 @@ COMMANDS = {
 
 @contextlib.contextmanager
 def quick(name: str) -> Iterator[None]:
-    """A rig whose answer is known, and training of a tiny network."""
+    """A rig whose answer is known, a mount that moved, and training of a tiny one."""
     from calibnet.cascade.cascade import Cascade
+    from calibnet.drive import watching
     from tests.inspector.cli.test_rig import RigCascade
+    from tests.inspector.cli.test_watch import STEP
     from tests.kills_training import tiny_world
 
     load = staticmethod((lambda *_, **__: RigCascade()) if name == "rig" else Cascade.load)
-    with tiny_world(), mock.patch.object(Cascade, "load", load):  # type: ignore[attr-defined]
+    watched = (lambda *_: STEP) if name == "watch" else watching.watch_drive
+    with (
+        tiny_world(),
+        mock.patch.object(Cascade, "load", load),  # type: ignore[attr-defined]
+        mock.patch.object(watching, "watch_drive", watched),
+    ):
         yield
 
 
 def make_inputs(root: Path) -> None:
-    """A car, a rig and two recordings."""
+    """A car, a bag, a rig and two recordings."""
     recordings.whole("check")(root)
     inputs.put("car", root)
+    write_bag(root / "drive", "mcap", [make_frame(0), make_frame(1)])
     for name in ("c0", "c1"):
         write_folder(root / "rig/cameras" / name, 2)
     shutil.move(root / "rig/cameras/c0/clouds", root / "rig/clouds")
@@ -96,11 +111,13 @@ def in_child(function: Callable[[], Any]) -> Any:
 def tried(command: list[str], root: Path, reserve: int | None = None) -> Outcome | str:
     """Run it, with the usual reserve of disk space below which nothing is recorded, or another."""
     from inspector.record import flushing, outputs
+    from tests.hostile import tried as limits
 
     def run() -> Outcome:
         with (
             mock.patch.object(outputs, "RESERVE_BYTES", outputs.RESERVE_BYTES if reserve is None else reserve),
             mock.patch.object(flushing, "FLUSH_TIMEOUT_S", 5.0),
+            mock.patch.object(limits, "GIGABYTES", 6.0),  # for the real networks of `benchmark`
         ):
             outcome = try_row(Row("full disk", lambda _: command), root)
         return replace(outcome, said=outcome.said[-2000:])

@@ -20,6 +20,9 @@ from calibnet.runtime.reading import protecting_inputs
 from calibnet.runtime.text import one_line, quoted_lines
 from calibnet.runtime.writing import keeping_others
 
+TOO_LITTLE_MEMORY = "There is not enough memory for this; free some, or use fewer or smaller files."
+TORCH_HAS_NO_MEMORY = re.compile(r"DefaultCPUAllocator: can't allocate|CUDA out of memory")
+"""Pattern of PyTorch's errors for a lack of memory, which are no `MemoryError`."""
 SYSTEM_PACKAGES = {
     "libusb-1.0.so.0": "libusb-1.0-0",
     "libGL.so.1": "libgl1",
@@ -86,13 +89,13 @@ def run(command: click.Command, arguments: list[str] | None = None) -> int:
         discard_stdout()
         return ExitCode.BROKEN_PIPE if leaving.code == 1 else int(leaving.code or 0)
     except MemoryError:
-        return fail("There is not enough memory for this; free some, or use fewer or smaller files.")
+        return fail(TOO_LITTLE_MEMORY)
     except (OSError, ImportError) as error:
         sentence = environment_sentence(error)
         discard_stdout()
         return fail(sentence) if sentence else unforeseen(error)
     except Exception as error:  # the last net: nobody sees a traceback
-        return unforeseen(error)
+        return fail(TOO_LITTLE_MEMORY) if TORCH_HAS_NO_MEMORY.search(str(error)) else unforeseen(error)
     except BaseException as error:
         if type(error).__name__ != "PanicException":  # a panic of Rust code is not an Exception
             raise

@@ -97,7 +97,7 @@ def rig(
     from inspector.record.recording import RunDescription
     from inspector.record.rig import record_rig
     from inspector.run.progress import drive_observer, frame_progress
-    from inspector.run.rig import open_rig, solve
+    from inspector.run.rig import notes_of, open_rig, solve
     from inspector.run.session import STOPPING
 
     if rigid and tolerance is not None:
@@ -114,9 +114,8 @@ def rig(
     with recording_to(outputs):
         prior = Prior.of(fix or (), prior_translation, prior_rotation)
         cascade = Cascade.load(preset, stages, weights, False, prior)
-        for camera, folder in cameras.items():
-            for note in folder.notes:
-                say(f"{camera}: {note}", err=True)
+        for note in notes_of(cameras, rigid or tolerance is not None):
+            say(note, err=True)
         with StopRequest(STOPPING) as stop, frame_progress(make_console()) as progress:
             observer = partial(drive_observer, progress, stop)
             solved = solve(cascade, cameras, rigid, miscalibration, observer, tolerance)

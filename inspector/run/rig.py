@@ -14,7 +14,7 @@ from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
 from calibnet.errors import CalibrationError, DatasetError
-from calibnet.geometry import CameraModel, invert, pose_error
+from calibnet.geometry import CameraModel, PoseError, invert, pose_error
 from calibnet.geometry.prior import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 CAMERAS = "cameras"
 """Folder of a rig that holds one folder per camera."""
+NOTED, FARTHEST = (0.1, 1.0), (10.0, 50.0)
+"""Deviations between ``rig_from_camera`` and the extrinsic, in degrees and cm, that are noted, and that are refused."""
 
 
 class RigCalibrator(DriveCalibrator, Protocol):
@@ -74,7 +76,7 @@ def poses(cameras: dict[str, Folder], rigid: bool) -> tuple[dict[str, Transform]
     """Each ``camera_from_rig``, and the initial ``rig_from_lidar``; the rig's frame is that of the first camera.
 
     Raises:
-        DatasetError: only some calibrations have ``rig_from_camera``.
+        DatasetError: only some calibrations have ``rig_from_camera``, or it contradicts the extrinsic.
     """
     given = {name: camera.calibration.rig_from_camera for name, camera in cameras.items()}
     extrinsics = {name: extrinsic_of(camera) for name, camera in cameras.items()}
@@ -87,9 +89,45 @@ def poses(cameras: dict[str, Folder], rigid: bool) -> tuple[dict[str, Transform]
         )
     if rigid and known:
         first_from_rig = invert(known[first])
-        return {name: invert(first_from_rig @ pose) for name, pose in known.items()}, extrinsics[first]
+        places = {name: invert(first_from_rig @ pose) for name, pose in known.items()}
+        for name, off in deviations(cameras, places).items():
+            if _is_beyond(off, FARTHEST):
+                raise DatasetError(
+                    f"Camera {name}: rig_from_camera and the extrinsics put it {off.rotation_deg:.0f}° / "
+                    f"{off.translation_cm:.0f} cm apart; rig_from_camera is the camera's pose on the rig, so "
+                    "correct or invert it, or correct the extrinsics."
+                )
+        return places, extrinsics[first]
     start = extrinsics[first]
     return {name: extrinsic @ invert(start) for name, extrinsic in extrinsics.items()}, start
+
+
+def deviations(cameras: dict[str, Folder], places: dict[str, Transform]) -> dict[str, PoseError]:
+    """How far each camera's extrinsic is from its place on the rig, ``camera_from_rig``, by the first one's."""
+    start = extrinsic_of(next(iter(cameras.values())))
+    return {name: pose_error(places[name] @ start, extrinsic_of(camera)) for name, camera in cameras.items()}
+
+
+def notes_of(cameras: dict[str, Folder], together: bool) -> list[str]:
+    """Sentences on the cameras' folders and, if they are solved as one, on extrinsics that are not used.
+
+    Raises:
+        DatasetError: as `poses` does.
+    """
+    notes = [f"{name}: {note}" for name, folder in cameras.items() for note in folder.notes]
+    if together:
+        places, _ = poses(cameras, together)
+        notes += [
+            f"{name}: its extrinsic is {off.rotation_deg:.2f}° / {off.translation_cm:.1f} cm from its place by "
+            "rig_from_camera, which is used."
+            for name, off in deviations(cameras, places).items()
+            if _is_beyond(off, NOTED)
+        ]
+    return notes
+
+
+def _is_beyond(off: PoseError, limit: tuple[float, float]) -> bool:
+    return off.rotation_deg > limit[0] or off.translation_cm > limit[1]
 
 
 def extrinsic_of(camera: Folder) -> Extrinsic:

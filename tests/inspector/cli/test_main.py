@@ -45,6 +45,20 @@ def start(code: str, **streams: int) -> subprocess.Popen[str]:
     return subprocess.Popen([sys.executable, "-c", preamble + code], cwd=ROOT, text=True, **streams)
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        RuntimeError("[enforce fail at alloc_cpu.cpp:127] err == 0. DefaultCPUAllocator: can't allocate memory: you"),
+        RuntimeError("CUDA out of memory. Tried to allocate 2.00 GiB."),
+    ],
+)
+def test_a_lack_of_memory_is_one_sentence(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
+    assert errors.run(failing(error), []) == 3
+    said = capsys.readouterr().err
+    assert said == "calib-inspect: There is not enough memory for this; free some, or use fewer or smaller files.\n"
+
+
 def test_help_lists_every_command_with_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert errors.run(cli, ["--help"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -135,6 +135,23 @@ def test_rig_from_camera_goes_before_the_extrinsics(rig: Path) -> None:
     assert_allclose(start, REFERENCE)
 
 
+def test_an_extrinsic_that_is_not_used_is_told_and_one_that_contradicts_refused(rig: Path, invoke: Invoke) -> None:
+    off = transform(np.eye(3), [0.03, 0.0, 0.0])
+    left, right = rig / "cameras" / "left", rig / "cameras" / "right"
+    change(left, rig_from_camera=np.eye(4).tolist())
+    change(right, rig_from_camera=invert(off @ RIGHT_FROM_LEFT).tolist())
+    assert "rig_from_camera" not in invoke(str(rig))[2], "one by one, each starts from its own extrinsic"
+    told = "right: its extrinsic is 0.00° / 3.0 cm from its place by rig_from_camera, which is used."
+    assert told in invoke(str(rig), "--rigid")[2]
+    body = transform(rotation_from_vector([0.0, np.pi / 2, 0.0]), [1.0, 0.0, 1.0])
+    change(left, rig_from_camera=invert(body).tolist())
+    change(right, rig_from_camera=invert(body @ invert(RIGHT_FROM_LEFT)).tolist())
+    code, _, error = invoke(str(rig), "--rigid")
+    assert code == 3
+    assert "Camera right: rig_from_camera and the extrinsics put it" in error
+    assert "correct or invert it" in error
+
+
 @pytest.mark.parametrize("rigid", [True, False])
 def test_what_is_found_is_told_of_every_camera(rig: Path, invoke: Invoke, rigid: bool) -> None:
     flags = ["--rigid"] if rigid else []
