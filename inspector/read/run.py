@@ -22,7 +22,7 @@ from inspector.read.file import RecordingFile
 from inspector.read.pictures import OverlayPoints, RecordedPictures
 from inspector.read.tables import PROPERTIES, matrices, rows, static_row
 from inspector.read.understood import RecordingError, camera_of, understood
-from inspector.read.verdict import former_verdict, read_verdict
+from inspector.read.verdict import inferred_verdict, read_verdict
 from inspector.record.contents import Coloring
 from inspector.verdicts import of_frames
 
@@ -270,7 +270,7 @@ def _frames(
                 reference=reference.get(index),
                 verdict=read_verdict(verdicts[index], path)
                 if index in verdicts
-                else former_verdict(initial[index], corrected[index], of_stages),
+                else inferred_verdict(initial[index], corrected[index], of_stages),
             )
         )
     return tuple(frames)

@@ -73,8 +73,8 @@ def read_verdict(text: str, path: Path) -> Verdict:
     )
 
 
-def former_verdict(initial: Extrinsic, corrected: Extrinsic, stages: Mapping[int, Extrinsic]) -> Verdict:
-    """The verdict on a frame of a recording without verdicts: whether the last stage's result was applied.
+def inferred_verdict(initial: Extrinsic, corrected: Extrinsic, stages: Mapping[int, Extrinsic]) -> Verdict:
+    """The verdict on a frame of a recording without verdicts, inferred from whether the last result was applied.
 
     Args:
         initial: the frame's initial ``camera_from_lidar``.

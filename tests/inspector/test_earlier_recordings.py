@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from inspector.cli.main import cli
 from inspector.read.run import read_run
-from inspector.read.verdict import former_verdict
+from inspector.read.verdict import inferred_verdict
 
 KEPT = Path(__file__).parents[1] / "data" / "recording-of-version-0.1.0.rrd.xz"
 """Two frames of the fake car (`tests.support.fakes`), 5/0.5, seed 1, its drive solved as 2 cm off to the right."""
@@ -38,7 +38,7 @@ def test_its_frames_are_judged_by_what_was_applied(recording: Path) -> None:
     assert run.frames[0].verdict.reason == "Image and scan fit together."
     assert run.drive is not None and run.drive_verdict is None
     frame = run.frames[0]
-    left = former_verdict(frame.initial, frame.initial, frame.stages)
+    left = inferred_verdict(frame.initial, frame.initial, frame.stages)
     assert left.word == "rejected"
 
 
