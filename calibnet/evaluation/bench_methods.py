@@ -20,14 +20,14 @@ from calibnet.weights import read_record, weights_path
 
 
 def bench_methods(
-    names: tuple[str, ...], ours: dict[str, Path], told: dict[str, Any], preset: str = "compact"
+    names: tuple[str, ...], ours: dict[str, Path], options: dict[str, Any], preset: str = "compact"
 ) -> list[BenchMethod]:
     """The rows of the table, by name.
 
     Args:
         names: names of methods; ``all`` for every method.
         ours: further rows of the cascade: names, and folders of weights.
-        told: options of other methods; each is given those that it accepts.
+        options: options of other methods; each is given those that it accepts.
         preset: preset of the cascade.
 
     Raises:
@@ -36,14 +36,15 @@ def bench_methods(
     chosen = (CASCADE, *METHODS.names()) if "all" in names else names
     cascade = partial(MeasuredCascade.within, preset)
     found = [
-        BenchMethod(name, partial(cascade, None) if name == CASCADE else partial(_open, name, told)) for name in chosen
+        BenchMethod(name, partial(cascade, None) if name == CASCADE else partial(_open, name, options))
+        for name in chosen
     ]
     return found + [BenchMethod(label, partial(cascade, folder)) for label, folder in ours.items()]
 
 
-def _open(name: str, told: dict[str, Any], range_: MiscalibrationRange) -> Calibrator:
+def _open(name: str, options: dict[str, Any], range_: MiscalibrationRange) -> Calibrator:
     maker = METHODS.load(name)
-    return open_method(name, range_, **{option: value for option, value in told.items() if accepts(maker, option)})
+    return open_method(name, range_, **{option: value for option, value in options.items() if accepts(maker, option)})
 
 
 class MeasuredCascade(Cascade):

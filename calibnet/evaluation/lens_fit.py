@@ -41,7 +41,7 @@ FEWEST = 10
 class LensStream(RunStream):
     """A `RunStream` whose faults are all of the lens."""
 
-    def told(self, trace: CascadeTrace) -> dict[str, float] | None:
+    def predictors_of(self, trace: CascadeTrace) -> dict[str, float] | None:
         """The predictors from two looks, whatever the verdict."""
         looks = lens_fits(trace)
         return None if looks is None else asdict(lens_predictors(looks))
@@ -82,10 +82,10 @@ def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
     kinds = np.array([1 + FAULTS.index(CLASSES[run.fault]) if run.fault in CLASSES else 0 for run in asked], np.intp)
     counts = np.bincount(kinds, minlength=len(FAULTS) + 1)
     if counts.min() < FEWEST:
-        told = ", ".join(f"{count} {name}" for name, count in zip(("none", *FAULTS), counts, strict=True))
+        counted = ", ".join(f"{count} {name}" for name, count in zip(("none", *FAULTS), counts, strict=True))
         raise CalibrationError(
-            f"There are too few runs with faults of the lens ({told}); at least {FEWEST} of each are needed. Make more "
-            "runs."
+            f"There are too few runs with faults of the lens ({counted}); at least {FEWEST} of each are needed. Make "
+            "more runs."
         )
     names = list(asked[0].predictors or {})
     values = np.array([[run.predictors[name] for name in names] for run in asked if run.predictors is not None])

@@ -16,7 +16,7 @@ from calibnet.evaluation.battery import PLAIN
 from calibnet.evaluation.corruptions import Corruption, corruptions, two_mounts
 from calibnet.evaluation.drives import shares_mount
 from calibnet.evaluation.faulty import Faulty, farthest, readable
-from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, asking
+from calibnet.evaluation.verdict_runs import PLAIN_SHARE, VerdictRun, accepting
 from calibnet.evaluation.virtual import Virtual
 from calibnet.geometry import invert, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
@@ -41,7 +41,7 @@ class DriveStream:
         Sequences that are not drives or too short to be judged are left out. Sequences with the same name (cameras of
         one recording) count as one.
         """
-        self.cascade, self.seed = asking(cascade), seed
+        self.cascade, self.seed = accepting(cascade), seed
         self.sequences = [one for one in sequences if len(one) >= FEWEST_JUDGED and shares_mount(one)]
         named = Counter(sequence.name for sequence in self.sequences)
         odds = np.array([min(len(one), ENOUGH) / named[one.name] for one in self.sequences], np.float64)

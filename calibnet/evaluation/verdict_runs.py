@@ -98,21 +98,21 @@ class RunStream:
         """A run is a random frame of a random sequence; all sequences are equally probable.
 
         Args:
-            cascade: the cascade; its verdict is replaced as in `asking`.
+            cascade: the cascade; its verdict is replaced as in `accepting`.
             sequences: at least one; images of other places come from other sequences.
             seed: seed of all random numbers.
         """
-        self.cascade, self.sequences, self.seed = asking(cascade), list(sequences), seed
+        self.cascade, self.sequences, self.seed = accepting(cascade), list(sequences), seed
         self.read = lru_cache(KEPT)(lambda sequence, position: self.sequences[sequence][position])
 
     def run(self, number: int) -> VerdictRun | None:
         """The run with this number; None if its frame cannot be read or has too few points in the image."""
         try:
-            return measured(self.cascade, self.drawn(number), number, self.told)
+            return measured(self.cascade, self.drawn(number), number, self.predictors_of)
         except CalibnetError:
             return None
 
-    def told(self, trace: CascadeTrace) -> dict[str, float] | None:
+    def predictors_of(self, trace: CascadeTrace) -> dict[str, float] | None:
         """The predictors of a run; None if the verdict needs none."""
         asked = trace.verdict is not None and trace.verdict.word == ACCEPTED
         return asdict(predictors(trace)) if asked else None
@@ -149,7 +149,7 @@ class RunStream:
 
 
 def measured(
-    cascade: Cascade, drawn: Drawn, number: int, told: Callable[[CascadeTrace], dict[str, float] | None]
+    cascade: Cascade, drawn: Drawn, number: int, predictors_of: Callable[[CascadeTrace], dict[str, float] | None]
 ) -> VerdictRun:
     """Calibrate a frame, and compute the error and the predictors of the result.
 
@@ -157,7 +157,7 @@ def measured(
         cascade: the cascade.
         drawn: the input of the run.
         number: number of the run in the stream.
-        told: computes the predictors from the trace.
+        predictors_of: computes the predictors from the trace.
 
     Raises:
         CalibrationError: too few points fall into the image.
@@ -176,14 +176,14 @@ def measured(
         error.rotation_deg,
         error.translation_cm,
         FRAME_LIMITS.holds(error),
-        told(trace),
+        predictors_of(trace),
         pose_vector(last.after @ invert(truth)).tolist(),
         None if last.information is None else last.information.tolist(),
         last.match_error_px,
     )
 
 
-def asking(cascade: Cascade) -> Cascade:
+def accepting(cascade: Cascade) -> Cascade:
     """The cascade with a verdict that accepts every result for which it needs the classifier's predictors."""
     everything = Classifier(0.0, {}, accepted_below=1.0, rejected_above=1.0)
     finest = cascade.stages[-1].range

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
-from calibnet.methods.learned.losses import angles, smooth_offset, told
+from calibnet.methods.learned.losses import angles, method_losses, smooth_offset
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer, scaled_pose
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
@@ -112,7 +112,7 @@ class CalibFormer(MethodNetwork):
     def losses(self, output: MethodOutput, inputs: NetworkInputs, target: Target) -> MethodLosses:
         """Weighted errors of translation and rotation."""
         estimate, truth = output.correction, target.correction
-        return told(
+        return method_losses(
             estimate,
             truth,
             translation=TRANSLATION * smooth_offset(estimate, truth),

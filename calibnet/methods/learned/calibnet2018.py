@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
-from calibnet.methods.learned.losses import chamfer_distance, photometric_error, told
+from calibnet.methods.learned.losses import chamfer_distance, method_losses, photometric_error
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
@@ -68,7 +68,7 @@ class CalibNet2018(MethodNetwork):
         """Differences of depth maps and clouds under the estimate and under the truth."""
         estimate, truth = output.correction, target.correction
         stride = self.config.scales[0]
-        return told(
+        return method_losses(
             estimate,
             truth,
             points=POINTS * chamfer_distance(estimate, truth, inputs.cells[1]),

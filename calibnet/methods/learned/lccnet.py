@@ -17,7 +17,7 @@ from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
-from calibnet.methods.learned.losses import angles, point_distance, smooth_offset, told
+from calibnet.methods.learned.losses import angles, method_losses, point_distance, smooth_offset
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer, scaled_pose
 from calibnet.methods.learned.resnet import ResNet18
 from calibnet.network.batch import NetworkInputs
@@ -73,7 +73,7 @@ class LCCNet(MethodNetwork):
         """The paper's loss: the error of the pose and the distance of the points, half each."""
         estimate, truth = output.correction, target.correction
         share = 1 - POINTS
-        return told(
+        return method_losses(
             estimate,
             truth,
             translation=share * TRANSLATION * smooth_offset(estimate, truth),

@@ -99,7 +99,7 @@ def photometric_error(estimate: Tensor, truth: Tensor, inputs: NetworkInputs, st
     return ((maps[0] - maps[1]).square() * occupied).sum() / occupied.sum().clamp(min=1)
 
 
-def told(
+def method_losses(
     estimate: Tensor,
     truth: Tensor,
     translation: Tensor | None = None,

@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.methods.learned.config import MethodConfig
-from calibnet.methods.learned.losses import told
+from calibnet.methods.learned.losses import method_losses
 from calibnet.methods.learned.network import MethodLosses, MethodNetwork, MethodOutput, output_layer
 from calibnet.network.batch import NetworkInputs
 from calibnet.network.pose import rigid, rotation_from_quaternion
@@ -88,7 +88,7 @@ class RegNet(MethodNetwork):
         """Half the squared distance of the dual quaternions, in units of the range."""
         error = 0.5 * (output.regressed - self.in_units(target.correction)).square()
         rotation, translation = error[:, :4].sum(-1).mean(), error[:, 4:].sum(-1).mean()
-        return told(output.correction, target.correction, translation, rotation)
+        return method_losses(output.correction, target.correction, translation, rotation)
 
     def in_units(self, correction: Tensor) -> Tensor:
         """The target ``[B, 8]`` of the regression for ``[B, 4, 4]``: real part minus the identity, and dual part."""
