@@ -97,7 +97,7 @@ def rows() -> Iterator[Row]:
             yield Row(f"Foxglove's {encoding}: {what}", said(encoding, topic, change), BAD, ("bag.mcap",))
         for what, (topic, change) in TIMES.items():
             yield Row(
-                f"Foxglove's {encoding}: {what}", said(encoding, topic, change), BAD, ("/lidar", "check the clocks")
+                f"Foxglove's {encoding}: {what}", said(encoding, topic, change), BAD, ("/lidar", "different clocks")
             )
     for what, (topic, change) in JSON.items():
         yield Row(f"Foxglove's json: {what}", said("json", topic, change), BAD, ("bag.mcap",))
