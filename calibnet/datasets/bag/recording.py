@@ -6,6 +6,7 @@ import weakref
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +18,7 @@ from calibnet.runtime.reading import MEGABYTE, require_file
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
+    from rosbags.interfaces.typing import Typesdict
     from rosbags.typesys.store import Typestore
 
 KINDS = (".bag", ".db3", ".mcap")
@@ -104,8 +106,7 @@ class BagRecording:
                     if channel.store is not None:
                         self._check_definitions(channel.store, channel.old)
             else:
-                standard = _standard(old)
-                self._reader = AnyReader(self.paths, default_typestore=standard)
+                self._reader = AnyReader(self.paths, default_typestore=_standard(old))
                 self._reader.open()
                 self._check_definitions(self._reader.typestore, old)
         weakref.finalize(self, _close, self._reader)
@@ -181,9 +182,7 @@ class BagRecording:
         Raises:
             DatasetError: a field is missing or has another type.
         """
-        standard = dict(_standard(False).fielddefs)
-        if old:  # ROS 1's stored types lack TFMessage, which is the same in both
-            standard |= _standard(True).fielddefs
+        standard = _fields(old)
         for name in sorted(store.fielddefs.keys() & DEFINED):
             fields = dict(store.fielddefs[name][1])
             wrong = [field for field, kind in standard[name][1] if fields.get(field) != kind]
@@ -229,6 +228,13 @@ def _standard(old: bool) -> Typestore:
         store.register(get_types_from_msg(LIVOX_SCAN, scan))
         store.register(get_types_from_msg(LIVOX_POINT, scan.replace("CustomMsg", "CustomPoint")))
     return store
+
+
+@cache
+def _fields(old: bool) -> Typesdict:
+    """The definitions of ROS's message types and Livox's."""
+    fields = dict(_standard(False).fielddefs)
+    return fields | _standard(True).fielddefs if old else fields  # ROS 1's stored types lack TFMessage
 
 
 def _parts(path: Path) -> list[Path]:
