@@ -1,6 +1,6 @@
 # make demo   install what is missing, run the main job on the synthetic world
 # make test   install what is missing, run the tests (PYTEST_ARGS=... to choose some)
-# make lint   ruff, mypy and, for JavaScript, biome
+# make lint   ruff and mypy
 # make pictures  retake the pictures of README.md and docs/, in the real viewer
 # make clean  remove what these made
 #
@@ -28,7 +28,6 @@ lint: $(VENV)/installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/biome lint --error-on-warnings inspector
 
 pictures: viewer-libraries $(VENV)/installed-dev
 	$(BIN)/calib-inspect demo --drive --headless --save recordings/pictures.rrd
