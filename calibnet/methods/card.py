@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -19,6 +20,8 @@ _AS_DATASETS_SAY = {
     "folder/nuscenes-n015a-back-right": "nuScenes, CAM_BACK_RIGHT",
 }
 """Rigs by the sequences in such records, as the datasets of these frames name them."""
+_RAW_DRIVE = re.compile(r"kitti-raw/(\d{4}_\d\d_\d\d)_drive_\d+")
+"""A drive of KITTI raw in such records; all drives of a day are of one rig."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,8 @@ class MethodCard:
 
 def _rigs(said: str) -> list[str]:
     """The names of a rig in a record: for a folder, its own name and that of the dataset it was made from."""
+    if drive := _RAW_DRIVE.fullmatch(said):
+        return [f"KITTI {drive[1]}"]
     folder, dataset = said.removeprefix(_FOLDER), _AS_DATASETS_SAY.get(said)
     if dataset is None:
         return [folder]

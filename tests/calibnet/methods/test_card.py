@@ -36,3 +36,8 @@ def test_a_rig_that_a_record_names_whole_is_known_by_its_name() -> None:
     card = MethodCard.trained(0, 0, [{"rigs": ["KITTI 2011_09_30, camera 2", "robot"]}])
     assert card.knows("KITTI 2011_09_30, camera 2") and card.knows("robot")
     assert not card.knows("KITTI 2011_09_30, camera 3") and not card.knows("robot-b")
+
+
+def test_drives_of_kitti_raw_are_of_their_days_rig() -> None:
+    card = MethodCard.trained(0, 0, [{"rigs": ["kitti-raw/2011_09_26_drive_0002", "kitti-raw/2011_09_26_drive_0051"]}])
+    assert card.trained_on == ("KITTI 2011_09_26",)
