@@ -14,7 +14,7 @@ from calibnet.calibrator import DriveCalibrator
 from calibnet.datasets.folder import Folder
 from calibnet.datasets.rig import RigCamera
 from calibnet.errors import CalibrationError, DatasetError
-from calibnet.geometry import CameraModel, PoseError, invert, pose_error
+from calibnet.geometry import CameraModel, PoseError, degrees_and_cm, invert, pose_error
 from calibnet.geometry.prior import Tolerance
 from calibnet.geometry.se3 import pose_from_vector
 from calibnet.geometry.types import Extrinsic, Matrix6, Transform
@@ -118,7 +118,7 @@ def notes_of(cameras: dict[str, Folder], together: bool) -> list[str]:
     if together:
         places, _ = poses(cameras, together)
         notes += [
-            f"{name}: its extrinsic is {off.rotation_deg:.2f}° / {off.translation_cm:.1f} cm from its place by "
+            f"{name}: its extrinsic is {degrees_and_cm(off.rotation_deg, off.translation_cm)} from its place by "
             "rig_from_camera, which is used."
             for name, off in deviations(cameras, places).items()
             if _is_beyond(off, NOTED)

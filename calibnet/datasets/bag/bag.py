@@ -197,22 +197,25 @@ class Bag:
                 "have different clocks, --by-recording-time."
             )
 
-        def moved(position: int, other: int | None = None) -> float:
-            if other is None:
-                other = position + 1 if position + 1 < len(scans) else position - 1
-            return motion(self._raw(scans[position]), self._raw(scans[other])) if other >= 0 else np.inf
+        def between(one: int, other: int) -> float:
+            return motion(self._raw(scans[one]), self._raw(scans[other]))
 
-        moments, farthest, moving = list[Moment](), [0.0], [0.0]
+        def moved(position: int) -> float:
+            other = position + 1 if position + 1 < len(scans) else position - 1
+            return between(position, other) if other >= 0 else np.inf
+
+        moments, apart_still, apart_moving = list[Moment](), list[float](), list[float]()
         for period in periods(swept[paired], self._options.every):
             position, motion_there = stillest(paired[period].tolist(), moved)
             is_still = motion_there <= STILL_M
-            (farthest if is_still else moving).append(float(apart[position]))
+            (apart_still if is_still else apart_moving).append(float(apart[position]))
             together = self._options.accumulate if is_still else 1
-            chosen = [scans[one] for one in standing(position, together, len(scans), moved)]
+            chosen = [scans[one] for one in standing(position, together, len(scans), between)]
             moments.append(Moment(images[image_of[position]], tuple(chosen)))
         notes = [
             f"{self.image} ({len(images)}) and {self.points} ({len(scans)}): {len(moments)} frames, "
-            f"{len(farthest) - 1} of them at a standstill, image and scan up to {max(farthest + moving):.0f} ms apart."
+            f"{len(apart_still)} of them at a standstill, image and scan up to "
+            f"{max(apart_still + apart_moving, default=0.0):.0f} ms apart."
         ]
         if self._options.accumulate > 1:
             counts = sorted(len(one.scans) for one in moments)
@@ -221,8 +224,8 @@ class Bag:
             notes.append(
                 "Paired by when they were recorded, up to 0.1 s after they were taken; trust standstills only."
             )
-        elif max(moving) > WORTH_A_WARNING_MS:
-            away = max(moving) / 1000 * 50 / 3.6 * 100
+        elif (longest := max(apart_moving, default=0.0)) > WORTH_A_WARNING_MS:
+            away = longest / 1000 * 50 / 3.6 * 100
             notes.append(f"At 50 km/h that is {away:.0f} cm; record at a standstill if possible.")
         return moments, tuple(notes)
 
