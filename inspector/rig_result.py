@@ -23,7 +23,8 @@ class Residual(NamedTuple):
     """Residuals of a camera.
 
     Attributes:
-        match_error_px: median error that its last look expects of its matches, in pixels; NaN where unknown.
+        match_error_px: median error that its last look expects of its matches, in pixels of the camera's images; NaN
+            where unknown.
         rotation_deg: angle between the rig's result and that of this camera's own frames; None if solved alone.
         translation_cm: distance between the two, likewise.
     """

@@ -53,7 +53,8 @@ class CameraEstimate:
         camera_from_lidar: 4x4.
         covariance: covariance ``[6, 6]``, in the camera's frame.
         frames: number of frames used; with none, the camera's pose is that of the rig.
-        match_error_px: median match error that the last look expects; NaN without frames.
+        match_error_px: median match error that the last look expects, in pixels of the camera's images; NaN
+            without frames.
         alone: ``[6]``, offset from there to the result of its own frames; None without frames.
         alone_covariance: covariance ``[6, 6]`` of the result of its own frames.
     """
@@ -249,7 +250,7 @@ def _of_cameras(
             there,
             one.spread(rig.covariance, tolerance),
             len(looks[camera.name]),
-            float(np.median([look.match_error_px for look in looks[camera.name]])),
+            float(np.median([look.image_error_px for look in looks[camera.name]])),
             pose_vector(one.camera_from_lidar @ invert(there)),
             one.covariance,
         )

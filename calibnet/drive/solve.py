@@ -125,7 +125,9 @@ def solve_drive(
 def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
     """The result of one look at one frame, as kept for the drive."""
     lens = lens_gain(*misfits(look))
-    return DriveLook(frame.index, position, pose_vector(look.correction), look.information, look.match_error_px, lens)
+    offset, error_px = pose_vector(look.correction), look.match_error_px
+    in_image = look.in_image(error_px, frame.camera)
+    return DriveLook(frame.index, position, offset, look.information, error_px, lens, in_image)
 
 
 class FrameLook(NamedTuple):
@@ -195,7 +197,8 @@ def require_match(look: StageTrace, limit_px: float, frame: Frame) -> StageTrace
         usual = "check that they belong together and that the start is within the range of the first stage"
         raise CalibrationError(
             f"Image and scan of frame {frame.index} ({frame.source}) do not fit together after stage {look.number}, "
-            f"which expects its matches to be {look.match_error_px:.1f} px off (at most {limit_px:g}): "
+            f"which expects its matches to be {look.in_image(look.match_error_px, frame.camera):.1f} px off "
+            f"(at most {look.in_image(limit_px, frame.camera):.1f}): "
             f"{suspicion(frame.remarks, usual)}."
         )
     return look

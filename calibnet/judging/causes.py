@@ -169,7 +169,9 @@ def _image_and_scan() -> Iterator[Attempt]:
         yield Attempt(("left-handed",), text, scan(np.diag(signs)))
 
 
-IMAGE_AND_SCAN = Search(tuple(_image_and_scan()), share=0.6, most=18.0, unit="px of expected match error")
+IMAGE_AND_SCAN = Search(
+    tuple(_image_and_scan()), share=0.6, most=18.0, unit="px of match error in the first stage's image"
+)
 """Compared by the match error of a coarse stage. On 4 frames of 4 rigs, undoing a mirrored image or other axes cut
 it to 0.13 to 0.5 of its value, undoing a rolled image to 0.3 to 0.6. For an image of another place the best attempt
 reached 0.5 once, and otherwise 0.8 and more. Without the fault it is 8 to 12 px; for an image of another place 23."""

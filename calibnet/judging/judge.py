@@ -31,7 +31,7 @@ from calibnet.verdict import (
 FARTHEST_REACH = 1.6
 """Reach beyond which a run is certainly wrong; between `MARGIN` and this it may have started outside the range."""
 UNRELATED_PX = 8.0
-"""Expected match error beyond which image and scan have nothing in common."""
+"""Match error, in pixels of the stage's image, beyond which image and scan have nothing in common."""
 BLANK = 2.0
 """Standard deviation of every colour channel below which an image counts as blank."""
 
@@ -93,9 +93,10 @@ def judge(
     if float(frame.image[::ROW_STEP].std(axis=(0, 1)).max()) < BLANK:
         return verdict(REJECTED, "The image is blank.")
     if not trace.fits:
+        error, limit = (last.in_image(px, frame.camera) for px in (last.match_error_px, trace.match_error_limit_px))
         reason = (
-            f"Image and scan do not fit together: the expected match error is {last.match_error_px:.1f} px, where at "
-            f"most {trace.match_error_limit_px:g} px is usual."
+            f"Image and scan do not fit together: the expected match error is {error:.1f} px, where at most "
+            f"{limit:.1f} px is usual."
         )
         causes = why(IMAGE_AND_SCAN, match_error)
         if not causes and match_error is not None:
@@ -105,7 +106,7 @@ def judge(
                     Cause(
                         "other-picture",
                         text,
-                        f"{last.match_error_px:.1f} px, and no correction that was tried makes them fit",
+                        f"{error:.1f} px, and no correction that was tried makes them fit",
                     ),
                 )
             else:

@@ -58,6 +58,7 @@ class DriveLook:
         information: inverse covariance ``[6, 6]`` of the offset as the network states it, or None.
         match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
         lens: logarithm of how much another lens lowers the cost of its matches, see `calibnet.judging.predictors`.
+        image_error_px: that error in pixels of the frame's image, as results state it.
     """
 
     frame: int
@@ -66,6 +67,7 @@ class DriveLook:
     information: Matrix6 | None = field(default=None, repr=False)
     match_error_px: float = math.nan
     lens: float = math.nan
+    image_error_px: float = math.nan
 
     def rotated(self, rotation: Rotation) -> DriveLook:
         """The estimate for a camera turned by ``rotation [3, 3]``."""

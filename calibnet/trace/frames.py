@@ -121,6 +121,12 @@ class StageTrace:
         """Initial ``camera_from_lidar`` of its last look, 4x4."""
         return self.before if self.last_before is None else self.last_before
 
+    def in_image(self, pixels: float, camera: PinholeCamera) -> float:
+        """A length in pixels of this stage's image, in pixels of the frame's own, whose camera is given."""
+        if self.upright is None:
+            return pixels * camera.width / self.camera.width
+        return pixels * camera.focal[0] / self.camera.focal[0]  # the image may be cropped as well
+
     def rotated(self, rotation: Rotation) -> StageTrace:
         """The trace for a camera turned by ``rotation [3, 3]``; `camera`, `detail` and `matches` are kept."""
         turn = transform(rotation, np.zeros(3))

@@ -12,6 +12,7 @@ import click
 from inspector.cli.options import FRAMES, RANGE, SEED, THREADS, USUAL_THREADS
 from inspector.cli.output import (
     JSON_FILE,
+    OUTPUT_FILE,
     console_beside,
     make_console,
     overwrite_option,
@@ -63,7 +64,7 @@ FILE = click.Path(dir_okay=False, path_type=Path)
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing; print the tables of this earlier JSON file."
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
-@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
+@click.option("--markdown", "markdown_file", type=OUTPUT_FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def ablate(
     presets: tuple[str, ...],

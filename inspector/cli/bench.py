@@ -11,6 +11,7 @@ import click
 from inspector.cli.options import FOLDER, FRAMES, RANGE, SEED, THREADS, USUAL_THREADS, NumberRange
 from inspector.cli.output import (
     JSON_FILE,
+    OUTPUT_FILE,
     console_beside,
     keep_json,
     overwrite_option,
@@ -85,9 +86,9 @@ class NamedFolder(click.ParamType[tuple[str, Path]]):
     "--from", "source", type=FILE, metavar="FILE", help="Measure nothing; print the tables of this earlier JSON file."
 )
 @click.option("--json", "json_file", type=JSON_FILE, metavar="FILE|-", help="Also as JSON; - for stdout.")
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Also as CSV, one line per row.")
-@click.option("--html", "html_file", type=FILE, metavar="FILE", help="Also as an HTML page.")
-@click.option("--markdown", "markdown_file", type=FILE, metavar="FILE", help="Also as Markdown.")
+@click.option("--csv", "csv_file", type=OUTPUT_FILE, metavar="FILE", help="Also as CSV, one line per row.")
+@click.option("--html", "html_file", type=OUTPUT_FILE, metavar="FILE", help="Also as an HTML page.")
+@click.option("--markdown", "markdown_file", type=OUTPUT_FILE, metavar="FILE", help="Also as Markdown.")
 @overwrite_option
 def bench(
     methods: tuple[str, ...],

@@ -9,8 +9,17 @@ import click
 from calibnet.runtime.writing import Kind
 from inspector.cli.errors import VERDICT_CODES, ExitCode
 from inspector.cli.options import NumberRange
-from inspector.cli.output import JSON_FILE, overwrite_option, prepare, prepare_json, say, write, write_json
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
+from inspector.cli.output import (
+    JSON_FILE,
+    OUTPUT_FILE,
+    overwrite_option,
+    prepare,
+    prepare_json,
+    say,
+    write,
+    write_json,
+)
+from inspector.cli.recordings import RECORDING, open_run
 
 LIMIT = NumberRange(min=0.0)
 

@@ -12,7 +12,7 @@ import click
 from calibnet.runtime.text import file_name
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
-from inspector.cli.output import overwrite_option, say, write
+from inspector.cli.output import OUTPUT_FILE, overwrite_option, say, write
 from inspector.cli.recordings import RECORDING, open_run
 from inspector.export.registry import FORMATS, export_as, kind_of_export, suffix_of
 
@@ -33,7 +33,7 @@ ROS_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_/]*")
 @click.option("--camera", metavar="NAME", help="The camera of a rig.  [default: all, into the folder --output]")
 @click.option(
     "--output",
-    type=click.Path(path_type=Path),
+    type=click.Path(),
     metavar="FILE",
     help="File to write; for all cameras of a rig, a folder.  [default: stdout]",
 )
@@ -56,7 +56,7 @@ def export(
     drive: bool,
     force: bool,
     camera: str | None,
-    output: Path | None,
+    output: str | None,
     camera_frame: str,
     lidar_frame: str,
     parent: str,
@@ -98,23 +98,22 @@ def export(
     return put_out(exported, form, force, output)
 
 
-def put_out(exported: Exported, form: str, force: bool, output: Path | None) -> int:
+def put_out(exported: Exported, form: str, force: bool, output: str | Path | None) -> int:
     """Write a calibration to a file or to stdout, unless it is rejected; returns the exit code."""
+    file: Path | None = None if output is None else OUTPUT_FILE.convert(output, None, None)
     if not may_be_written(exported, force):
         return ExitCode.CHECK_FAILED
     text = export_as(form, exported)
-    if output is None:
+    if file is None:
         click.echo(text, nl=False)
-    elif output.is_dir():
-        raise click.UsageError(f"--output {output} is a folder; give a file.")
     else:
-        write(output, text.encode(), kind_of_export(text))
-        say(f"Saved {output}: {exported.origin.removesuffix('.')}.", err=True)
+        write(file, text.encode(), kind_of_export(text))
+        say(f"Saved {file}: {exported.origin.removesuffix('.')}.", err=True)
     return ExitCode.OK
 
 
 def export_rig(
-    recording: Path, camera: str | None, form: str, force: bool, output: Path | None, frames: FrameNames
+    recording: Path, camera: str | None, form: str, force: bool, output: str | None, frames: FrameNames
 ) -> int:
     """Write one camera of a rig, or all into a folder, with frames named after the cameras; returns the exit code."""
     from inspector.export.exported import exported_camera
@@ -127,15 +126,16 @@ def export_rig(
     if output is None:
         names = ", ".join(one.name for one in rig.solved.cameras)
         raise click.UsageError(f"Give a folder with --output for all cameras, or one with --camera: {names}.")
-    if output.exists() and not output.is_dir():
+    folder = Path(output)
+    if folder.exists() and not folder.is_dir():
         raise click.UsageError(
             f"--output {output} is not a folder; give a folder for all cameras, or choose one with --camera."
         )
-    output.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     codes = []
     for solved, said in zip(rig.solved.cameras, ros_names([one.name for one in rig.solved.cameras]), strict=True):
         named = replace(exported_camera(solved), frames=frames._replace(camera=f"{said}_{frames.camera}"))
-        codes.append(put_out(named, form, force, output / f"{file_name(solved.name)}.{suffix_of(form)}"))
+        codes.append(put_out(named, form, force, folder / f"{file_name(solved.name)}.{suffix_of(form)}"))
     return max(codes)
 
 

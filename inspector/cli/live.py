@@ -18,9 +18,8 @@ from calibnet.methods.registry import CASCADE
 from inspector.cli.errors import ExitCode
 from inspector.cli.inspect import length_option
 from inspector.cli.options import FOLDER, FRAMES, KNOWN_OPTIONS, METHOD_OPTIONS, MISCALIBRATION, RANGE, SEED, STAGES
-from inspector.cli.output import make_console, overwrite_option, say
+from inspector.cli.output import OUTPUT_FILE, make_console, overwrite_option, say
 from inspector.cli.preparing import UNJUDGED, announce, open_other
-from inspector.cli.recordings import OUTPUT_FILE
 from inspector.cli.run import checked_options
 from inspector.cli.subcommands import Opening, over_sequences
 from inspector.export.registry import FORMATS, suffix_of

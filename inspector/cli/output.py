@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +29,22 @@ overwrite_option = click.option(
     help="Let outputs replace files of any kind; by default they replace only files of their own kind.",
 )
 """Option of every command that writes files named by its user."""
-JSON_FILE = click.Path(dir_okay=False, writable=True, allow_dash=True)
+
+
+class OutputFile(click.Path):
+    """A file to write, whose name is not that of a folder: `Path` would make the file ``out`` of ``out/``."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse a folder, whether it exists or not."""
+        name = os.fspath(value)
+        last = name.rpartition(os.sep)[2]
+        if last in ("", os.curdir, os.pardir) or os.path.isdir(name):  # noqa: PTH112 - false for names too long
+            self.fail(f"{name!r} names a folder; give the name of a file.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+OUTPUT_FILE = OutputFile(path_type=Path)
+JSON_FILE = OutputFile(allow_dash=True)
 """Type of a ``--json FILE|-`` option."""
 
 

@@ -9,8 +9,8 @@ import click
 
 from inspector import entities
 from inspector.cli.options import FOLDER
-from inspector.cli.output import overwrite_option, say
-from inspector.cli.recordings import OUTPUT_FILE, RECORDING, open_run
+from inspector.cli.output import OUTPUT_FILE, overwrite_option, say
+from inspector.cli.recordings import RECORDING, open_run
 
 
 class SizeType(click.ParamType[tuple[int, int]]):

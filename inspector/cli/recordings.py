@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 RECORDING = click.Path(path_type=Path)
 """An ``.rrd`` file, which `open_run` checks."""
-OUTPUT_FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 def open_run(path: Path) -> RecordedRun:

@@ -15,7 +15,7 @@ from calibnet.training.ablations import ABLATIONS, ablation_folder
 from calibnet.training.options import TrainingOptions
 from calibnet.training.recipe import RECIPE
 from inspector.cli.options import FOLDER, RANGE, SEED, NumberRange
-from inspector.cli.output import make_console, overwrite_option
+from inspector.cli.output import OUTPUT_FILE, make_console, overwrite_option
 from inspector.cli.training_console import ConsoleObserver, Observers
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ if TYPE_CHECKING:
 @click.option("--resume", is_flag=True, help="Continue from the checkpoint in --output.")
 @click.option(
     "--save",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=OUTPUT_FILE,
     metavar="FILE.rrd",
     help="Also log losses and figures to a recording.",
 )

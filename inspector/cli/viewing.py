@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from inspector.cli.output import overwrite_option
+from inspector.cli.output import OUTPUT_FILE, overwrite_option
 
 if TYPE_CHECKING:
     from inspector.record.outputs import Outputs
@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 RECORDINGS = Path("recordings")
 
 _OPTIONS: Mapping[str, Callable[..., Any]] = {
-    "save": click.option(
-        "--save", type=click.Path(path_type=Path), metavar="FILE.rrd", help="Write the recording to this file."
-    ),
+    "save": click.option("--save", type=OUTPUT_FILE, metavar="FILE.rrd", help="Write the recording to this file."),
     "headless": click.option("--headless", is_flag=True, help="Open no window."),
     "serve": click.option("--serve", is_flag=True, help="Show the viewer as a web page, on this machine only."),
     "bind": click.option("--bind", metavar="ADDRESS", help="Address on which --serve listens.  [default: 127.0.0.1]"),

@@ -32,7 +32,6 @@ class Try:
         verdict: verdict on the result.
         milliseconds: computing time.
         trace: trace of the cascade, where it ran on one frame.
-        fit_px: match error that the last stage expects, in pixels of its image; None for a drive.
     """
 
     number: int
@@ -42,7 +41,6 @@ class Try:
     verdict: Verdict | None
     milliseconds: float
     trace: CascadeTrace | None = field(default=None, repr=False)
-    fit_px: float | None = None
 
     @property
     def found(self) -> Extrinsic:
@@ -56,8 +54,7 @@ class Try:
         steps += [Step(f"stage {stage.number}", stage.after) for stage in trace.stages]
         ran = [stage.number for stage in trace.stages]
         title = f"stage {ran[0]}" if len(ran) == 1 else f"stages {ran[0]} to {ran[-1]}" if ran else "no stage"
-        fit = trace.stages[-1].match_error_px if trace.stages else None
-        return cls(number, frame, title, tuple(steps), trace.verdict, milliseconds, trace, fit)
+        return cls(number, frame, title, tuple(steps), trace.verdict, milliseconds, trace)
 
     @classmethod
     def of_drive(cls, number: int, frame: int, mine: Extrinsic, estimate: DriveEstimate, milliseconds: float) -> Try:

@@ -88,9 +88,7 @@ class Observation:
 
     def image_px(self, stage: StageTrace, pixels: float) -> float:
         """A length in a stage's input image as one in the frame's own."""
-        if stage.upright is None:
-            return pixels * self.frame.camera.width / stage.camera.width
-        return pixels * self.frame.camera.focal[0] / stage.camera.focal[0]  # the image may be cropped as well
+        return stage.in_image(pixels, self.frame.camera)
 
     def error(self, camera_from_lidar: Extrinsic) -> PoseError | None:
         """Error of an extrinsic against the reference; None without one."""

@@ -177,7 +177,7 @@ def solve(
             try:
                 alone = method.calibrate_drive(camera, initial, watch(name))
                 verdict = alone.verdict
-                errors = [look.match_error_px for look in alone.looks]
+                errors = [look.image_error_px for look in alone.looks]
                 residual = Residual(float(np.median(errors)) if errors else math.nan)
             except (CalibrationError, DatasetError) as error:
                 verdict = Verdict(REJECTED, str(error), initial, used=0)

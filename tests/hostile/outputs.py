@@ -105,8 +105,11 @@ def rows() -> Iterator[Row]:
     yield Row("a device as --junit", check("--junit", "/dev/full"), BAD, ("/dev/full",))
     yield Row("stdout's path as --json", check("--json", "/dev/stdout"), BAD, ("/dev/stdout",))
     yield Row("a file as the folder of --save", run("--save", f"{CAR}/calibration.yaml/run.rrd"), BAD, ("run.rrd",))
-    yield Row("a folder as --save", run("--save", CAR), BAD, (CAR,))
-    yield Row("a folder as --junit", check("--junit", "."), USAGE)
+    for option, build in OUTPUTS.items():
+        for what, name in (("a folder", "taken"), ("this folder", "."), ("a folder that is not there", "out/")):
+            if "animate" not in option:
+                command = there(build(name), Path.mkdir, "taken")
+                yield Row(f"{option}: {what}", command, USAGE, ("names a folder",))
     yield Row("a name of 300 characters as --save", run("--save", "x" * 300), BAD)
     yield Row("no place below /proc as --save", run("--save", "/proc/nothing/run.rrd"), BAD, ("/proc/nothing",))
     yield Row(

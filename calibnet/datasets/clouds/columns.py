@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +25,11 @@ Columns = dict[str, NDArray[np.generic]]
 """Values ``[N]`` by name in lower case; of two columns with the same name the first counts."""
 
 
-INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "scalar_intensity", "scalar_reflectance", "i")
+INTENSITY_NAMES = ("intensity", "reflectance", "reflectivity", "remission", "i")
 """Names under which clouds store intensity, best first, in lower case."""
+SCALAR, UNNAMED_SCALAR = "scalar_", "scalar_field"
+"""What CloudCompare puts before the names of a ``.ply``, and calls a column without a name: ``Scalar_field`` or
+``scalar_Scalar_field``, and ``Scalar_field_#2`` for a second one."""
 
 
 class CloudError(ValueError):
@@ -175,8 +178,19 @@ def points_of(columns: Columns) -> NDArray[np.float32]:
     """
     if missing := [axis for axis in "xyz" if axis not in columns]:
         raise CloudError(f"it has no column {', '.join(missing)} (its columns: {', '.join(columns) or 'none'})")
-    intensity = next((columns[name] for name in INTENSITY_NAMES if name in columns), None)
-    return joined(columns["x"], columns["y"], columns["z"], intensity)
+    intensity = intensity_name(columns)
+    return joined(columns["x"], columns["y"], columns["z"], None if intensity is None else columns[intensity])
+
+
+def intensity_name(names: Iterable[str]) -> str | None:
+    """The name in lower case of the column that holds intensity; None if there is none.
+
+    If CloudCompare wrote a single column without a name, it is intensity, as that of a text file without names is.
+    """
+    names = list(names)
+    known = (f"{prefix}{name}" for name in INTENSITY_NAMES for prefix in ("", SCALAR))
+    unnamed = [name for name in names if name.startswith((UNNAMED_SCALAR, SCALAR + UNNAMED_SCALAR))]
+    return next((name for name in known if name in names), unnamed[0] if len(unnamed) == 1 else None)
 
 
 def joined(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from calibnet.datasets.clouds.bin import DECLARE as SAY
-from calibnet.datasets.clouds.columns import INTENSITY_NAMES, LONGEST_LINE, LONGEST_WORD, CloudError, Columns
+from calibnet.datasets.clouds.columns import LONGEST_LINE, LONGEST_WORD, CloudError, Columns, intensity_name
 from calibnet.datasets.clouds.tables import read_table
 from calibnet.runtime.text import one_line
 
@@ -65,7 +65,7 @@ def read_text(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
     if names is None:
         raise CloudError(f"its {head.width} columns have no names; {DECLARE}")
     places = {name.lower(): place for place, name in reversed(list(enumerate(names)))}
-    intensity = next((name for name in INTENSITY_NAMES if name in places), None)
+    intensity = intensity_name(places)
     wanted = {name: str(places[name]) for name in (*"xyz", intensity) if name in places}
     body = data[head.start :]
     if head.separator is None:

@@ -51,6 +51,8 @@ CLOUDS = {
     "binary ply": (".ply", ply("binary_little_endian")),
     "ascii ply": (".ply", ply("ascii")),
     "CloudCompare ply": (".ply", ply("binary_little_endian", "scalar_Intensity")),
+    "CloudCompare ply without a name": (".ply", ply("binary_little_endian", "scalar_Scalar_field")),
+    "ply of another tool": (".ply", ply("ascii", "Remission")),
     "npy": (".npy", npy(np.column_stack([XYZ, BYTES]))),
     "npy of doubles with a ring": (".npy", npy(np.column_stack([XYZ, BYTES, BYTES]).astype(np.float64))),
     "bin": (".bin", np.column_stack([XYZ, BYTES]).astype(np.float32).tobytes()),

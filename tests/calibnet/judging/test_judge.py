@@ -92,6 +92,15 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
     verdict = judge(FRAME, GUESS, trace, CLASSIFIER)
     assert verdict.word == REJECTED and verdict.causes == ()
     assert verdict.reason.endswith("the expected match error is 9.0 px, where at most 5.5 px is usual.")
+    last = trace.stages[-1]
+    small = replace(
+        trace,
+        stages=(
+            *trace.stages[:-1],
+            replace(last, camera=last.camera.resized(FRAME.camera.width // 2, FRAME.camera.height // 2)),
+        ),
+    )
+    assert "error is 18.0 px, where at most 11.0 px" in judge(FRAME, GUESS, small, CLASSIFIER).reason, "of the image"
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
 
     upright = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 
 from calibnet.datasets.clouds.bin import KITTI, LAYOUTS, read_bin, recognised
-from calibnet.datasets.clouds.columns import CloudError, points_of
+from calibnet.datasets.clouds.columns import CloudError, intensity_name, points_of
 from calibnet.datasets.clouds.pcd import read_pcd
 from calibnet.datasets.clouds.scans import clean_points
 from calibnet.datasets.clouds.text import read_text
@@ -287,6 +287,7 @@ def test_points_of_a_map_are_no_scan():
 NAMED = {
     "comma": "x,y,z,intensity\n{,}",
     "CloudCompare's comment": "//X Y Z Intensity\n{ }",
+    "CloudCompare's name for none": "//X Y Z Scalar_field\n{ }",
     "another comment": "# made today\n\n# x  y  z  i\n{ }",
     "units, semicolons, a mark of order": "\ufeffX (m);Y [m];z_m;Reflectivity\n{;}",
     "VeloView's": '"Points_m_XYZ:0","Points_m_XYZ:1","Points_m_XYZ:2","intensity"\n{,}',
@@ -317,6 +318,20 @@ def test_columns_of_text_are_found_by_name_among_words_and_dropouts():
     assert_array_equal(points_of(columns), [[1.5, 2.5, 3.5, 1], [np.nan, np.nan, np.nan, 2]])
     assert_array_equal(points_of(read_text(b"x;y;z\n1,5;2,5;-3,5\n")), [[1.5, 2.5, -3.5, 0]])
     assert_array_equal(points_of(read_text(b"7 1.5 2.5 3.5\n", ("ring", "x", "y", "z"))), [[1.5, 2.5, 3.5, 0]])
+
+
+@pytest.mark.parametrize(
+    ("names", "found"),
+    [
+        (["x", "scalar_field", "intensity"], "intensity"),
+        (["scalar_scalar_field", "scalar_reflectivity"], "scalar_reflectivity"),
+        (["scalar_scalar_field"], "scalar_scalar_field"),
+        (["scalar_field", "scalar_field_#2"], None),  # which of them is it?
+        (["scalar_gpstime", "field"], None),
+    ],
+)
+def test_intensity_among_the_columns_of_cloudcompare(names, found):
+    assert intensity_name(names) == found
 
 
 @pytest.mark.parametrize(
