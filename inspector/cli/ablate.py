@@ -168,7 +168,7 @@ def print_ablation(content: dict[str, Any], console: Console) -> None:
 
     from inspector.report.ablation_tables import COSTS, ERRORS, tables, title, untrained
 
-    console.print(title(content), soft_wrap=True)
+    console.print(title(content))
     for preset, heads, lines in tables(content):
         for chosen in (COSTS, ERRORS):
             kept = [k for k in range(1, len(heads)) if heads[k] in chosen]

@@ -23,22 +23,20 @@ def print_bench(content: dict[str, Any], console: Console) -> None:
                 console.print(table)
     letters = {rig: chr(ord("A") + number % 26) for number, rig in enumerate(_rigs(content))}
     for rig, letter in letters.items():
-        console.print(f"Rig {letter}: {rig}", soft_wrap=True)
+        console.print(f"Rig {letter}: {rig}")
     console.print("* The method was trained on this rig.")
     for range_ in content["ranges"]:
         console.print(_errors(content, range_, letters))
     for row in rows(content):
         if row.why:
-            console.print(f"{row.method}, {row.label}: {row.why}", soft_wrap=True, style="yellow")
+            console.print(f"{row.method}, {row.label}: {row.why}", style="yellow")
     console.print(_costs(content))
     published = list(published_results(content))
     if published:
         console.print("Published elsewhere, on other frames:")
     for name, result in published:
         errors = f"{result['rotation_deg']:g}° / {result['translation_cm']:g} cm"
-        console.print(
-            f"{name}: {errors} from {result['range']} on {result['rig']} ({result['source']}).", soft_wrap=True
-        )
+        console.print(f"{name}: {errors} from {result['range']} on {result['rig']} ({result['source']}).")
 
 
 def _rigs(content: dict[str, Any]) -> list[str]:

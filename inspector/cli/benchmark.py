@@ -81,7 +81,6 @@ def report(result: Benchmark, console: Console) -> None:
         f"{machine['device']}, {machine['threads']} threads on {machine['cores']} cores, {machine['instructions']}, "
         f"{machine['precision']}, torch {machine['torch']}; median of {result.frames} frames",
         highlight=False,
-        soft_wrap=True,
     )
     table = Table(title="Milliseconds per frame", title_justify="left", box=box.SIMPLE_HEAD)
     table.add_column("")

@@ -45,7 +45,7 @@ def print_evaluation(evaluation: Evaluation, console: Console) -> None:
     if sum(evaluation.verdicts.values()):
         console.print(verdict_sentence(evaluation))
     for line in coverage_sentences(evaluation):
-        console.print(line, soft_wrap=True)
+        console.print(line)
     if evaluation.failed:
         console.print(
             f"{evaluation.failed} of {runs} runs could not be calibrated and count with their initial error.",

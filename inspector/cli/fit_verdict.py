@@ -145,27 +145,27 @@ def fit_verdict(
     }
     coefficients = Coefficients(classifier, covariance, weights=marks, missing="", fitted=fitted)
     for line in figure_lines(figures):
-        console.print(line, soft_wrap=True)
+        console.print(line)
     of_lenses = made(replace(source, kind="lenses"), lenses, "lenses") if lenses else []
     try:
         lens, lens_figures = fit_lens(of_lenses)
     except CalibrationError as error:
-        console.print(f"Faults of the lens will not be named. {error}", style="yellow", soft_wrap=True)
+        console.print(f"Faults of the lens will not be named. {error}", style="yellow")
     else:
         fitted = {**fitted, "lenses": asdict(lens_figures)}
         coefficients = replace(coefficients, lens=lens, fitted=fitted)
         for line in lens_figure_lines(lens_figures):
-            console.print(line, soft_wrap=True)
+            console.print(line)
     of_drives = made(of_drive, drives, "drives") if drives else []
     try:
         drive, inflation, figures = fit_drives(of_drives)
     except CalibrationError as error:
-        console.print(f"Drives will not be accepted. {error}", style="yellow", soft_wrap=True)
+        console.print(f"Drives will not be accepted. {error}", style="yellow")
     else:
         fitted = {**fitted, "drives": figures.as_dict()}
         coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)
         for line in figure_lines(figures, "drives"):
-            console.print(line, soft_wrap=True)
+            console.print(line)
     coefficients.write(path)
     say(path)
 

@@ -29,7 +29,7 @@ class FleetProgress:
         self._progress.update(self._task, advance=1, said=said)
         if row.verdict == "failed":
             text = f"Failed: {row.name}: {row.reason}"
-            self._progress.console.print(text, style="yellow", soft_wrap=True)
+            self._progress.console.print(text, style="yellow")
 
 
 @contextmanager

@@ -58,12 +58,14 @@ NARROWEST = 60
 
 
 def make_console(stderr: bool = True) -> Console:
-    """A console that quotes the foreign text in what it prints, as `say` does."""
+    """A console that quotes the foreign text in what it prints and does not break sentences, as `say` does."""
     from rich.console import Console
 
     class Quoting(Console):
         def print(self, *objects: Any, **options: Any) -> None:
-            super().print(*(quoted_lines(one) if isinstance(one, str) else one for one in objects), **options)
+            sentences = all(isinstance(one, str) for one in objects)  # rich would break "8 cm" in two, also in files
+            said = (quoted_lines(one) if isinstance(one, str) else one for one in objects)
+            super().print(*said, **{"soft_wrap": sentences, **options})
 
     console = Quoting(stderr=stderr, highlight=False, markup=False, emoji=False)  # names are not markup
     if console.width < NARROWEST:

@@ -71,7 +71,7 @@ def prepare_other(options: RunOptions, outputs: Outputs) -> Session:
         )
     console = make_console()
     console.print(f"{options.sequence.name} ({options.sequence.rig}), {options.start}, {options.method}")
-    console.print(UNJUDGED, soft_wrap=True)
+    console.print(UNJUDGED)
     description = RunDescription(options.title, options.identity([]), describe_provenance("", [], None))
     return make_session(options, outputs, method, drive, description, console)
 
@@ -129,15 +129,15 @@ def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     numbers = ", ".join(str(stage.number) for stage in cascade.stages)
     known = f", {options.prior.words}" if options.prior else ""
     what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
-    console.print(what, soft_wrap=True)
+    console.print(what)
     if options.expectation:
-        console.print(options.expectation, soft_wrap=True)
+        console.print(options.expectation)
     for note in getattr(options.sequence, "notes", ()):
-        console.print(note, soft_wrap=True)
+        console.print(note)
     for stage in cascade.skipped:
-        console.print(f"Skipped: {stage.reason}", style="yellow", soft_wrap=True)
+        console.print(f"Skipped: {stage.reason}", style="yellow")
     if cascade.unjudged:
-        console.print(f"No result will be accepted: {cascade.unjudged}", style="yellow", soft_wrap=True)
+        console.print(f"No result will be accepted: {cascade.unjudged}", style="yellow")
 
 
 def describe_provenance(preset: str, stages: list[int], folder: Path | None) -> dict[str, str]:

@@ -252,7 +252,6 @@ def train(
         console.print(
             "Before any of their results is accepted, the verdict has to be fitted to them: "
             f"calib-inspect fit-verdict --weights {output} --data …",
-            soft_wrap=True,
         )
 
 
@@ -273,7 +272,7 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
 
             observers.append(closing.enter_context(TrainingLog(save, f"{options.preset} ±{options.range}")))
         path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
-    console.print(f"Weights with their training record: {path}", soft_wrap=True)
+    console.print(f"Weights with their training record: {path}")
 
 
 def step_file(save: Path, step: TrainingOptions, output: Path) -> Path:

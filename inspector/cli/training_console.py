@@ -45,7 +45,6 @@ class ConsoleObserver:
         self.console.print(
             f"{progress.share:4.0%}  {progress.minutes:6.1f} min  {progress.samples:8,d} samples  "
             f"{progress.samples_per_second:5.1f}/s  {terms}  " + pose,
-            soft_wrap=True,
         )
 
     def validated(self, progress: Progress, figures: ValidationFigures) -> None:
@@ -56,5 +55,4 @@ class ConsoleObserver:
             f"(p95 {figures.rotation_p95_deg:.2f}°), "
             f"translation {figures.initial_translation_cm:.1f} -> {figures.translation_cm:.1f} cm",
             style="bold",
-            soft_wrap=True,
         )

@@ -151,7 +151,7 @@ class Session:
     def _show(self) -> None:
         """Open the viewer or the page, and print where it is, once."""
         if self.outputs.show() and self.outputs.page is not None:
-            self.console.print(f"Watch it at {self.outputs.page}", soft_wrap=True)
+            self.console.print(f"Watch it at {self.outputs.page}")
 
     def _range(self, first: Frame) -> tuple[int, int]:
         """Numbers of the first and the last frame, read from the last frame where the dataset may skip numbers."""
@@ -173,7 +173,7 @@ class Session:
             remark = recording.close(advance)
             progress.update(task, total=progress.tasks[0].completed)  # the index may have fewer chunks than expected
         if remark:
-            self.console.print(remark, style="yellow", soft_wrap=True)
+            self.console.print(remark, style="yellow")
 
     def _observe(self, method: Calibrator, position: int, summary: Summary) -> Observation | None:
         """Read and calibrate one frame; None where it cannot be used, which the summary counts."""
@@ -194,7 +194,7 @@ class Session:
                 raise
             summary.skipped.append(BadFrame(number, str(error)))
             summary.unread += isinstance(error, DatasetError) and not named_cause(error)
-            self.console.print(f"Skipped: {error}", style="yellow", soft_wrap=True)
+            self.console.print(f"Skipped: {error}", style="yellow")
             return None
         given = None
         if self.verify and not self.drive and trace.verdict is not None:

@@ -18,6 +18,7 @@ from rich.table import Table
 from calibnet import __version__
 from calibnet.errors import CalibnetError, DatasetError
 from calibnet.evaluation.measure import Step
+from calibnet.verdict import DRIVE_LIMITS
 from inspector.cli import errors
 from inspector.cli.evaluate import Bars
 from inspector.cli.fleet_console import fleet_progress
@@ -257,6 +258,13 @@ def test_a_name_with_brackets_or_colons_is_printed_as_it_is(capsys: pytest.Captu
     console.print(table)
     shown = capsys.readouterr().out
     assert "3 parts in a[/b] and :smile:" in shown and "[red]x[/] a[/b]" in shown
+
+
+def test_a_sentence_is_not_broken_by_us(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    sentence = f"The result is within {' / '.join(map(str, [DRIVE_LIMITS] * 9))}."
+    make_console(stderr=False).print(sentence, style="yellow")
+    assert capsys.readouterr().out == f"{sentence}\n"
 
 
 def test_bars_are_named_by_foreign_text() -> None:
