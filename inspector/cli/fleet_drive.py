@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import time
 import traceback
 from collections.abc import Iterator
@@ -193,14 +195,14 @@ def _verified(task: Task, path: Path, started: float) -> Row:
                 found = verify_sequence(opening, labels=drive.labels, **{**options, **results})
         except Exception as error:
             failed = _failed(error)
-            failed = DriveFailed(_at_its_place(failed.sentence, path, drive), failed.lasting)
+            failed = DriveFailed(_within_drive(failed.sentence, path), failed.lasting)
             with suppress(OSError, CalibnetError):  # the disk may be full: why it failed stands in the table as well
                 _record_sentence(drive, folder, FAILED, "", failed.sentence)
             raise failed from None
         if found.summary is not None and found.summary.interrupted:
             raise KeyboardInterrupt
         columns = of_verdict(found.verdict) | {"given_camera_from_lidar": row_major(found.given)}
-        columns["reason"] = _at_its_place(columns["reason"], path, drive)
+        columns["reason"] = _within_drive(columns["reason"], path)
         if not (folder / RECORDING).exists():
             _record_sentence(drive, folder, columns["verdict"], columns["cause"], columns["reason"])
         files = {"json": VERDICT, "report": PAGE, "recording": RECORDING}
@@ -208,9 +210,10 @@ def _verified(task: Task, path: Path, started: float) -> Row:
     return row_of(drive, **columns, **there, seconds=time.monotonic() - started)
 
 
-def _at_its_place(sentence: str, copy: Path, drive: Drive) -> str:
-    """A sentence about files of a drive that was copied, with their own address: the copy is gone."""
-    return sentence.replace(str(copy), drive.path.rstrip("/"))
+def _within_drive(sentence: str, path: Path) -> str:
+    """A sentence with paths relative to the drive's, which its row has; that of a temporary copy means nothing."""
+    alone = rf"{re.escape(str(path))}(?=\.?(?:[\s,;:)'\"]|$))"
+    return re.sub(alone, lambda _: path.name, sentence.replace(f"{path}{os.sep}", ""))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 
 from calibnet.datasets.published import PUBLISHED, options_of
 from calibnet.errors import ConfigError
-from inspector.cli.fleet_drive import Task, read_options
+from inspector.cli.fleet_drive import Task, _within_drive, read_options
 from inspector.fleet.drives import Drive, find_drives
 from inspector.fleet.places import Store
 
@@ -121,3 +121,15 @@ def test_an_address_stays_as_it_is(tmp_path: Path) -> None:
 def test_neither_a_list_nor_a_folder(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"is neither a folder nor a \.csv file"):
         find_drives([str(tmp_path / "none")])
+
+
+@pytest.mark.parametrize(
+    ("sentence", "said"),
+    [
+        ("Scan /d/a/clouds/0.bin is empty.", "Scan clouds/0.bin is empty."),
+        ("/d/a has no images; look into /d/a.", "a has no images; look into a."),
+        ("/d/ab and /d/a.yaml are not of '/d/a'.", "/d/ab and /d/a.yaml are not of 'a'."),
+    ],
+)
+def test_files_in_a_reason_are_named_relative_to_the_drive(sentence: str, said: str) -> None:
+    assert _within_drive(sentence, Path("/d/a")) == said

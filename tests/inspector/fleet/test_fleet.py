@@ -126,7 +126,7 @@ def test_a_drive_that_cannot_be_read_is_a_row_with_its_sentence(
     row = rows_of(Path("all"))["tuesday"]
     assert row.verdict == FAILED
     assert "1 of 2 frames cannot be read" in row.reason
-    assert "0000.bin" in row.reason
+    assert "Scan clouds/0000.bin cannot be read" in row.reason, "the path of the drive is in its row"
     assert row.reason in err.replace("\n", "")
     assert row.report == ""
     assert (Path("all") / row.recording).is_file(), "the catalogue has a row of it as well"
