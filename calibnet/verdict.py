@@ -26,14 +26,14 @@ CAUSES = (
     "lens-model",
     "roll",
     "mirrored",
-    "other-picture",
+    "other-image",
     "time-offset",
     "accumulated",
     "units",
     "axes",
     "left-handed",
     "bit-depth",
-    "picture-size",
+    "image-size",
 )
 """Names of possible causes in the input, as in JSON."""
 
@@ -107,6 +107,7 @@ class Verdict:
         skipped: frames that were left out.
         within: the finest tolerance that the extrinsic is certain enough to be within; None if there is none. That of
             an accepted one is the first of `FRAME_TOLERANCES` or `DRIVE_TOLERANCES`.
+        advice: what to do next, a sentence; empty where the reason or the causes say it, or if there is nothing to do.
     """
 
     word: Word
@@ -118,6 +119,7 @@ class Verdict:
     used: int = 1
     skipped: tuple[BadFrame, ...] = ()
     within: Tolerance | None = None
+    advice: str = ""
 
     def rotated(self, rotation: Rotation) -> Verdict:
         """The verdict for a camera turned by ``rotation [3, 3]``."""
@@ -147,6 +149,7 @@ class Verdict:
             "verdict": self.word,
             "reason": self.reason,
             "causes": [cause.as_dict() for cause in self.causes],
+            "advice": self.advice,
             "camera_from_lidar": self.camera_from_lidar.tolist(),
             "moved": {"rotation_deg": self.moved[0], "translation_cm": self.moved[1]},
             "sigma": sigma,

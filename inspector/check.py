@@ -20,7 +20,7 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED
 from inspector.read.run import RecordedRun
 from inspector.read.understood import RecordingError
 from inspector.record.tabs.overview import fit_stage
-from inspector.verdicts import explained
+from inspector.verdicts import with_advice
 
 SUITE = "calib-inspect check"
 STATISTICS = {"median": "median", "p95": "95th percentile", "max": "largest", "drive": "the drive's"}
@@ -206,7 +206,7 @@ def junit(run: RecordedRun, outcomes: Sequence[Outcome]) -> bytes:
 
 
 def _add_verdict(suite: ElementTree.Element, run: RecordedRun) -> None:
-    case, reason = _case(suite, run, "verdict is accepted"), explained(run.verdict)
+    case, reason = _case(suite, run, "verdict is accepted"), with_advice(run.verdict)
     if run.verdict.word == ACCEPTED:
         ElementTree.SubElement(case, "system-out").text = f"{run.title}: {reason}"
     elif run.verdict.word == REJECTED:

@@ -19,7 +19,12 @@ OF_RESULT = "Calibration found"
 
 def verdict_line(verdict: Verdict) -> str:
     """The last line of a run."""
-    return f"Verdict: {verdict.word}. {explained(verdict)}"
+    return f"Verdict: {verdict.word}. {with_advice(verdict)}"
+
+
+def with_advice(verdict: Verdict) -> str:
+    """The reason, the likely causes, and what to do next."""
+    return " ".join(filter(None, (explained(verdict), verdict.advice)))
 
 
 def explained(verdict: Verdict) -> str:
@@ -30,7 +35,12 @@ def explained(verdict: Verdict) -> str:
 def further_causes(verdict: Verdict) -> list[str]:
     """Sentences on the causes that the reason does not contain already."""
     texts = dict.fromkeys(cause.text for cause in verdict.causes)  # two names may have the same sentence
-    return [text for text in texts if text not in verdict.reason]
+    return [text for text in texts if not _is_told(text, verdict.reason)]
+
+
+def _is_told(text: str, reason: str) -> bool:
+    """Whether a reason contains a cause's sentence already, perhaps as the end of one of its own."""
+    return text.rstrip(".").casefold() in reason.casefold()
 
 
 def title(verdict: Verdict) -> str:
@@ -47,7 +57,7 @@ def certainty(verdict: Verdict) -> str:
 
 
 def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
-    """The verdict as a heading, the reason, the causes with their evidence, and the uncertainty.
+    """The verdict as a heading, the reason, the causes with their evidence, what to do next, and the uncertainty.
 
     Args:
         verdict: the verdict.
@@ -57,12 +67,13 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
     lines = [f"# {heading}", "", verdict.reason, ""]
     lines += [f"- **{cause.name}**: {_once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
     lines += [""] if verdict.causes else []
+    lines += [verdict.advice, ""] if verdict.advice else []
     return [*lines, certainty(verdict), ""] if certainty(verdict) else lines
 
 
 def _once(cause: Cause, verdict: Verdict) -> str:
     """A cause's sentence and a space, unless the reason contains it already."""
-    return "" if cause.text in verdict.reason else f"{cause.text} "
+    return "" if _is_told(cause.text, verdict.reason) else f"{cause.text} "
 
 
 def verdict_counts(verdicts: Mapping[int, Verdict]) -> str:

@@ -40,8 +40,8 @@ def projected(
             "z forward)",
         )
         raise CalibrationError(
-            f"Only {occupied} cells of frame {frame.index} ({frame.source}) hold a LiDAR point before {stage}, of "
-            f"{len(frame.points)} points; {why}."
+            f"Hardly any of the {len(frame.points)} LiDAR points of frame {frame.index} ({frame.source}) fall into the "
+            f"image before {stage}; {why}."
         )
     return lidar
 

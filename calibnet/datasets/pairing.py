@@ -13,6 +13,7 @@ import numpy as np
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Floats
 from calibnet.runtime.reading import TEXT_BYTES, read_text
+from calibnet.runtime.text import number_of
 
 TIMES = "timestamps.txt"
 """File of times in a folder, with one line per file in the order of their names."""
@@ -160,10 +161,10 @@ def _by_time(
             f"{apart.min():.0f} ms away; check that both clocks agree, or give a larger --max-time-difference."
         )
     farthest = float(max(apart[position] for position in best.values()))
-    note = f"Paired by time: {len(pairs)} frames, image and scan up to {farthest:.0f} ms apart"
+    note = f"Paired by time: {number_of(len(pairs), 'frame')}, image and scan up to {farthest:.0f} ms apart"
     left_images, left_scans = len(images) - len(pairs), len(names) - len(pairs)
     if left_images or left_scans:
-        note += f"; {left_images} images and {left_scans} scans are left out"
+        note += f"; {number_of(left_images, 'image')} and {number_of(left_scans, 'scan')} are left out"
     notes = [f"{note}."]
     if farthest > WORTH_A_WARNING_MS:
         notes.append(

@@ -162,7 +162,10 @@ def _image_and_scan() -> Iterator[Attempt]:
         ("x forward, y right, z down", np.diag([1.0, -1.0, -1.0])),
         ("x right, y down, z forward", np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])),
     ):
-        text = f"The scan's axes seem to be {axes}; they must be x forward, y left, z up."
+        text = (
+            f"The scan's axes seem to be {axes}, where the extrinsic takes them for x forward, y left, z up; correct "
+            "whichever is wrong."
+        )
         yield Attempt(("axes",), text, scan(rotation))
     for axis, signs in (("x backward", [-1.0, 1.0, 1.0]), ("z down", [1.0, 1.0, -1.0])):
         text = f"The scan's axes are left-handed, with {axis}; they must be x forward, y left, z up."

@@ -7,9 +7,11 @@ from typing import NamedTuple
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.advice import MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive_predictors import aligned_cm, drive_predictors, halves_cm
 from calibnet.judging.predictors import reach
+from calibnet.runtime.text import number_of
 from calibnet.trace import MARGIN, DriveEstimate
 from calibnet.verdict import (
     ACCEPTED,
@@ -44,22 +46,30 @@ def judge_drive(
         searched: range that was to be searched around the initial extrinsic.
         classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
     """
-    word, reason, within = _word(estimate, initial, searched, classifier)
-    there = estimate.camera_from_lidar
+    said = _said(estimate, initial, searched, classifier)
     return Verdict(
-        word, reason, there, moved(initial, there), (), estimate.covariance, estimate.frames, estimate.skipped, within
+        said.word,
+        said.reason,
+        estimate.camera_from_lidar,
+        moved(initial, estimate.camera_from_lidar),
+        covariance=estimate.covariance,
+        used=estimate.frames,
+        skipped=estimate.skipped,
+        within=said.within,
+        advice=said.advice,
     )
 
 
 class _Said(NamedTuple):
-    """The word of a verdict, the reason, and the tolerance that the result is within."""
+    """The word of a verdict, the reason, what to do next, and the tolerance that the result is within."""
 
     word: Word
     reason: str
+    advice: str = ""
     within: Tolerance | None = None
 
 
-def _word(
+def _said(
     estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
 ) -> _Said:
     used, skipped = estimate.frames, len(estimate.skipped)
@@ -70,41 +80,43 @@ def _word(
         return _Said(
             REJECTED,
             f"The result lies {turned:.2g}° and {shifted:.0f} cm from the start, outside the range searched "
-            f"({searched.label}). A wrong lens or a time lag can cause this. If the start may be that far off, run all "
-            "stages (--stages 1-5).",
+            f"({searched.label}).",
+            out_of_range(searched),
         )
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
         return _Said(
             CANNOT_TELL,
             f"The frames determine the extrinsic only to {estimate.rotation_deg:.2g}° and "
-            f"{estimate.translation_cm:.0f} cm (1σ); add frames of other places.",
+            f"{estimate.translation_cm:.0f} cm (1σ).",
+            SCATTER,
         )
     if isinstance(classifier, str):
         return _Said(CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}")
     moments = min(used, len({look.position for look in estimate.looks}) or used)
     if moments < FEWEST_JUDGED:
-        needed = f"a drive needs {FEWEST_JUDGED} to be accepted, preferably of different places"
-        of_them = "" if moments == used else f" of {moments} moment{'' if moments == 1 else 's'}"
-        return _Said(CANNOT_TELL, f"{used} frames{of_them} agree, but {needed}.")
+        of_them = "" if moments == used else f" of {number_of(moments, 'moment')}"
+        few = f"A drive is judged by at least {FEWEST_JUDGED} frames of different moments"
+        return _Said(CANNOT_TELL, f"{few}; this one has {number_of(used, 'frame')}{of_them}.", MORE_PLACES)
     predictors = drive_predictors(estimate)
     if predictors is None:
-        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.")
+        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
     within = classifier.finest(predictors, DRIVE_TOLERANCES)
     if within == DRIVE_LIMITS:
-        return _Said(ACCEPTED, f"{used} frames agree.", within)
+        return _Said(ACCEPTED, f"{used} frames agree.", within=within)
     wrong = classifier(predictors)
     if math.isnan(wrong):
-        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.")
+        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
     halves, aligned = halves_cm(estimate.looks), aligned_cm(estimate)
     why = [f"the halves of the drive differ by {halves:.0f} cm"] if halves > HALVES_CM else []
     if aligned > ALIGNED_CM:
         why.append(f"edges and networks differ by {aligned:.0f} cm, and either may be right")
-    agree = "agree, but less well than in drives with a correct result"
+    certain = f"not certain to be within {DRIVE_LIMITS}"
     if within is not None:
-        agree = f"agree, and the result is within {within}, but perhaps not within {DRIVE_LIMITS}"
+        certain = f"within {within}, but perhaps not within {DRIVE_LIMITS}"
     return _Said(
         CANNOT_TELL,  # not rejected: many drives beyond the limits are only a little beyond them
-        f"{used} frames {agree} (probability of an error of more than {DRIVE_LIMITS}: {wrong:.0%})"
+        f"The result of {used} frames is {certain} (probability of a larger error: {wrong:.0%})"
         f"{''.join(f'; {one}' for one in why)}.",
+        MORE_PLACES,
         within,
     )

@@ -9,6 +9,7 @@ from calibnet.datasets.frame import Frame
 from calibnet.datasets.images.plausibility import ROW_STEP, bit_depth
 from calibnet.datasets.plausibility import Implausible, of_camera, of_extrinsic
 from calibnet.geometry.types import Extrinsic
+from calibnet.judging.advice import MORE_FRAMES, RICHER_SCENE, out_of_range
 from calibnet.judging.causes import IMAGE_AND_SCAN, Measure, Search, cause
 from calibnet.judging.coefficients import Coefficients
 from calibnet.judging.covariance import covariance
@@ -77,6 +78,7 @@ def judge(
     def why_lens() -> tuple[Cause, ...]:
         return suspects or (() if match_error is None or trace is None else lens_causes(trace, coefficients.lens))
 
+    word: Word
     if trace is None or not trace.stages:
         causes = why(IMAGE_AND_SCAN, match_error)
         reason = "Hardly any point of the scan falls into the image under the initial extrinsic."
@@ -84,9 +86,12 @@ def judge(
 
     last = trace.stages[-1]
 
-    def verdict(word: Word, reason: str, causes: tuple[Cause, ...] = (), within: Tolerance | None = None) -> Verdict:
+    def verdict(
+        word: Word, reason: str, causes: tuple[Cause, ...] = (), within: Tolerance | None = None, advice: str = ""
+    ) -> Verdict:
         going, spread = moved(trace.initial, last.after), covariance(trace, coefficients.covariance)
-        return Verdict(word, _because(reason, causes), last.after, going, causes, spread, within=within)
+        advice = "" if causes else advice  # a cause says what to do
+        return Verdict(word, _because(reason, causes), last.after, going, causes, spread, within=within, advice=advice)
 
     if any(remark.certain for remark in remarks):
         return verdict(REJECTED, "The input is not plausible.", suspects)
@@ -104,7 +109,7 @@ def judge(
                 text = "They seem to show different places, or the start is far outside the range searched."
                 causes = (
                     Cause(
-                        "other-picture",
+                        "other-image",
                         text,
                         f"{error:.1f} px, and no correction that was tried makes them fit",
                     ),
@@ -114,8 +119,9 @@ def judge(
         return verdict(REJECTED, reason, causes)
     gone = reach(trace.initial, last.after, trace.stages[0].range)
     if gone.share > MARGIN:
-        word: Word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
-        return verdict(word, f"The LiDAR {gone}.", why_lag(gone.share) or why_lens())
+        word = REJECTED if gone.share > FARTHEST_REACH else CANNOT_TELL
+        causes, advice = why_lag(gone.share) or why_lens(), out_of_range(trace.stages[0].range)
+        return verdict(word, f"The LiDAR {gone}.", causes, advice=advice)
 
     classifier = coefficients.for_frame(last.range)
     if isinstance(classifier, str):
@@ -129,19 +135,17 @@ def judge(
     if within == FRAME_LIMITS:
         return verdict(ACCEPTED, "Image and scan fit together.", within=within)
     if math.isnan(wrong):
-        return verdict(CANNOT_TELL, "The matches hold too little information to judge the result.", suspects)
-    fit = "Image and scan fit together, but less well than in runs with a correct result"
+        reason = "The matches hold too little information to judge the result."
+        return verdict(CANNOT_TELL, reason, suspects, advice=RICHER_SCENE)
+    fit = f"Image and scan fit together, but the result is not certain to be within {FRAME_LIMITS}"
     causes = why_lens()
     within = None if causes else within  # nothing is certain of a result that a fault may explain
     if within is not None:
         fit = f"Image and scan fit together, and the result is within {within}, but perhaps not within {FRAME_LIMITS}"
-    reason = f"{fit} (probability of an error: {wrong:.0%})."
-    if prior:
-        reason = f"{fit} (probability of an error: {wrong:.0%} without prior knowledge, less with {prior})."
-        return verdict(CANNOT_TELL, reason, causes, within)
-    if within is None and wrong > classifier.rejected_above:
-        return verdict(REJECTED, reason, causes)
-    return verdict(CANNOT_TELL, reason, causes, within)
+    known_beforehand = f" without prior knowledge, less with {prior}" if prior else ""
+    reason = f"{fit} (probability of a larger error: {wrong:.0%}{known_beforehand})."
+    word = REJECTED if not prior and within is None and wrong > classifier.rejected_above else CANNOT_TELL
+    return verdict(word, reason, causes, within, MORE_FRAMES)
 
 
 def _suspect(remark: Implausible) -> Cause:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
+from calibnet.judging.advice import CORRECT_IT, NARROWER
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.verdict import (
     ACCEPTED,
@@ -84,12 +85,15 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     """
     estimate = found.camera_from_lidar
 
-    def verdict(word: Word, reason: str, within: Tolerance | None = None) -> Verdict:
-        return replace(found, word=word, reason=reason, moved=moved(given, estimate), within=within)
+    def verdict(word: Word, reason: str, within: Tolerance | None = None, advice: str = found.advice) -> Verdict:
+        advice = "" if word == ACCEPTED or found.causes else advice  # a cause says what to do
+        return replace(found, word=word, reason=reason, moved=moved(given, estimate), within=within, advice=advice)
 
     error = pose_error(given, estimate)
     skipped, tried = len(found.skipped), found.used + len(found.skipped)
-    few = f"{skipped} of {tried} frames do not fit or cannot be read." if 2 * skipped >= tried else None
+    few = None
+    if 2 * skipped >= tried:
+        few = f"{skipped} of {tried} frames do not fit or cannot be read. {found.skipped[0].why}"
     if found.word != ACCEPTED and found.within is None:
         if found.word == REJECTED and found.causes:
             return verdict(REJECTED, found.reason)
@@ -118,14 +122,13 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         tolerances[-1],
     )
     if _is_beyond(error, offset, found.covariance, told):
-        return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {told}.")
+        return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {told}.", advice=CORRECT_IT)
     for tolerance in tolerances:
         share = probability_within(offset, found.covariance, tolerance, certain)
         if share >= PROBABLE:
             return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: {off}.", tolerance)
-    return verdict(
-        CANNOT_TELL, f"The calibration is off by {off}; the probability that it is within {tolerance} is {share:.0%}."
-    )
+    reason = f"The calibration is off by {off}; the probability that it is within {tolerance} is {share:.0%}."
+    return verdict(CANNOT_TELL, reason, advice=NARROWER)
 
 
 def unfit(given: Extrinsic, reason: str, causes: tuple[Cause, ...] = ()) -> Verdict:

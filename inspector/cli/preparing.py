@@ -126,9 +126,10 @@ def make_session(
 
 def announce(console: Console, options: RunOptions, cascade: Cascade) -> None:
     """Print what is about to run, and which stages cannot."""
-    numbers = ", ".join(str(stage.number) for stage in cascade.stages)
+    numbers = ", ".join(map(str, cascade.numbers))
+    stages = f"stage {numbers}" if len(cascade.numbers) == 1 else f"stages {numbers}"
     known = f", {options.prior.words}" if options.prior else ""
-    what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, stages {numbers}"
+    what = f"{options.sequence.name} ({options.sequence.rig}), {options.start}{known}, {stages}"
     console.print(what)
     if options.expectation:
         console.print(options.expectation)

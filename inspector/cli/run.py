@@ -83,7 +83,7 @@ def finish(summary: Summary, outputs: Outputs, report: Path | None, on_stderr: b
         for line in [
             *size_lines(outputs.file, summary.frames),
             *saved_lines(outputs, summary.frames),
-            *next_lines(outputs.file),
+            *next_lines(outputs.file, summary.exportable),
         ]:
             tell(line)
         if report is not None:

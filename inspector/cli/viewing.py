@@ -88,8 +88,8 @@ def _as_one(command: Callable[..., Any], options: Mapping[str, Callable[..., Any
     return decorated
 
 
-def next_lines(file: Path, rig: bool = False) -> list[str]:
-    """Commands that can follow on a recording, or on that of a rig."""
+def next_lines(file: Path, exportable: bool = True, rig: bool = False) -> list[str]:
+    """Commands that can follow on a recording, or on that of a rig; a rejected result is not exported."""
     from inspector.export.registry import FORMATS
 
     quoted = shlex.quote(str(file))
@@ -99,10 +99,10 @@ def next_lines(file: Path, rig: bool = False) -> list[str]:
         if rig
         else ("Export the result for other tools", "")
     )
-    return [
-        f"Make a page of it: calib-inspect report {quoted} --output report/ --open",
-        f"{what}: calib-inspect export {quoted} --format ros{where}  (or {others})",
-    ]
+    lines = [f"Make a page of it: calib-inspect report {quoted} --output report/ --open"]
+    if exportable:
+        lines.append(f"{what}: calib-inspect export {quoted} --format ros{where}  (or {others})")
+    return lines
 
 
 def saved_lines(outputs: Outputs, frames: int = 0) -> list[str]:

@@ -49,6 +49,7 @@ class _Said:
     sigma: _Sigma | None
     frames: _Frames
     within: Tolerance | None = None
+    advice: str = ""
 
 
 def read_verdict(text: str, path: Path) -> Verdict:
@@ -70,6 +71,7 @@ def read_verdict(text: str, path: Path) -> Verdict:
         used=said.frames.used,
         skipped=said.frames.skipped,
         within=said.within,
+        advice=said.advice,
     )
 
 

@@ -111,10 +111,11 @@ def briefly(error: PoseError) -> str:
 
 
 def verdict(run: RecordedRun) -> list[Finding]:
-    """The reason of the run's verdict, likely causes, the uncertainty, and the skipped frames."""
+    """The reason of the run's verdict, likely causes, what to do next, the uncertainty, and the skipped frames."""
     found = run.verdict
     lines = [Finding(GRADES[found.word], found.reason)]
     lines += [Finding("bad", f"{cause.name.capitalize()}: {cause.text} ({cause.evidence})") for cause in found.causes]
+    lines += [Finding("note", found.advice)] if found.advice else []
     lines += [Finding("note", certainty(found))] if certainty(found) else []
     return lines + [Finding("note", f"Frame {bad.frame} was skipped: {bad.why}") for bad in found.skipped]
 

@@ -11,9 +11,10 @@ from statistics import median
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.text import number_of
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector.record.observation import Observation
-from inspector.verdicts import verdict_counts, verdict_line
+from inspector.verdicts import majority, verdict_counts, verdict_line
 
 
 @dataclass
@@ -101,11 +102,11 @@ class Summary:
         if self.frames == 0:
             return ["No frame was recorded."]
         seconds = (self.ended or time.monotonic()) - self.started
-        lines = [f"{_frames(self.frames)} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
+        lines = [f"{number_of(self.frames, 'frame')} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
         lines += self.of_frames()
         if self.skipped:
             numbers = ", ".join(str(bad.frame) for bad in self.skipped)
-            lines.append(f"{_frames(len(self.skipped))} skipped because they could not be used: {numbers}.")
+            lines.append(f"{number_of(len(self.skipped), 'frame')} skipped because they could not be used: {numbers}.")
         if self.drive:
             lines.append(self.drive)
         times = ", ".join(f"{name} {median(values):.0f}" for name, values in self._milliseconds.items())
@@ -116,6 +117,9 @@ class Summary:
         """Sentences on the single frames: their median, the worst, and how many got worse."""
         if not self._initial:
             lines = [f"Correction, median over frames: {_middle(self._change)}; there is no reference to compare with."]
+            rejected = sum(verdict.word == REJECTED for verdict in self.verdicts.values())
+            if rejected == self.frames:
+                lines = ["By themselves all frames are rejected, and keep the extrinsic that they started from."]
             if len(self._bad) > 1 and math.isfinite(max(self._bad)):
                 worst = self._bad.index(max(self._bad))
                 lines.append(f"Worst fit: frame {self._numbers[worst]}, match error {self._bad[worst]:.1f} px.")
@@ -128,7 +132,8 @@ class Summary:
             lines.append(f"Worst: frame {self._numbers[worst]}, with an error of {_figures(self._corrected[worst])}.")
         if self._worse:
             count, numbers = len(self._worse), ", ".join(map(str, self._worse))
-            lines.append(f"{count} of {_frames(len(self._corrected))} got worse in rotation or translation: {numbers}.")
+            of_all = number_of(len(self._corrected), "frame")
+            lines.append(f"{count} of {of_all} got worse in rotation or translation: {numbers}.")
         return lines
 
     def matrix_lines(self) -> list[str]:
@@ -145,6 +150,13 @@ class Summary:
         return self.given_verdict or self.drive_verdict or single
 
     @property
+    def exportable(self) -> bool:
+        """Whether the result may be exported, since it is not rejected."""
+        if self.drive_verdict is not None:
+            return self.drive_verdict.word != REJECTED
+        return not self.verdicts or majority(self.verdicts.values()) != REJECTED
+
+    @property
     def verdict(self) -> str:
         """The last line of a run: its verdict on the given calibration, the drive or the frames; empty without any."""
         if self.outcome is not None:
@@ -159,7 +171,3 @@ def _middle(errors: list[PoseError]) -> str:
 
 def _figures(error: PoseError) -> str:
     return degrees_and_cm(error.rotation_deg, error.translation_cm)
-
-
-def _frames(count: int) -> str:
-    return "1 frame" if count == 1 else f"{count} frames"

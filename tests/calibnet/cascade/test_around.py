@@ -18,7 +18,7 @@ FRAME = make_frame(1)
 
 def test_too_few_points_name_frame_and_stage() -> None:
     sparse = replace(FRAME, points=FRAME.points[:5])
-    with pytest.raises(CalibrationError, match=r"^Only \d+ cells of frame .* before stage 4, of 5 points; check that"):
+    with pytest.raises(CalibrationError, match=r"^Hardly any of the 5 LiDAR points of frame .* before stage 4; check"):
         projected(sparse, REFERENCE, FRAME.camera, (8, 16), "stage 4")
     assert projected(FRAME, REFERENCE, FRAME.camera, (8, 16), "stage 4").occupied.sum() > 20
 

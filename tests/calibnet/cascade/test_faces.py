@@ -129,7 +129,7 @@ def test_a_drive_is_solved_through_all_faces():
 
 def test_no_face_shows_the_scan():
     frame = replace(make_wide(), points=make_wide().points[:3])
-    with pytest.raises(CalibrationError, match="hold a LiDAR point"):
+    with pytest.raises(CalibrationError, match="Hardly any of the 3 LiDAR points"):
         cascade().calibrate(frame, MOUNT)
 
 

@@ -81,7 +81,7 @@ def test_each_image_gets_the_scan_that_is_nearest_in_time(write_layout):
     write_times(layout.scans, [9.990, 10.109, 10.500])
     sequence = layout.open()
     assert sequence.notes[0] == (
-        "Paired by time: 2 frames, image and scan up to 10 ms apart; 1 images and 1 scans are left out."
+        "Paired by time: 2 frames, image and scan up to 10 ms apart; 1 image and 1 scan are left out."
     )
     assert [(one.image.stem, one.scan.stem) for one in sequence.files] == [("0000", "a"), ("0001", "b")]
     assert_allclose([frame.timestamp for frame in sequence], [0.0, 0.1])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibnet.geometry import RANGES, miscalibration
+from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.drive_predictors import apart, drive_predictors, halves_cm
@@ -48,8 +48,8 @@ def estimate(
         (estimate(ahead=-0.7), "rejected", "The result lies 0° and 70 cm from the start"),
         (estimate(degrees=0.2), "cannot tell", "only to 0.35° and 5 cm"),  # 0.2 on each of three axes
         (estimate(centimetres=8.0), "cannot tell", "only to 0.17° and 14 cm"),
-        (estimate(error=2.5), "cannot tell", "10 frames agree, but less well than in drives with a correct result"),
-        (estimate(error=4.0), "cannot tell", "(probability of an error of more than 0.3° / 8 cm: 85%)."),
+        (estimate(error=2.5), "cannot tell", "The result of 10 frames is not certain to be within 0.3° / 8 cm"),
+        (estimate(error=4.0), "cannot tell", "(probability of a larger error: 85%)."),
         (estimate(error=2.5, halves=40), "cannot tell", "%); the halves of the drive differ by 40 cm."),
         (estimate(bad=4), "accepted", "6 frames agree."),
         (estimate(bad=5), "rejected", "Only 5 of 10 frames could be used. It is cut short."),
@@ -68,8 +68,24 @@ def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
     verdicts = [judge_drive(estimate(error=of), REFERENCE, RANGES[2], coarser) for of in (1.5, 2.5, 4.0)]
     assert [verdict.within for verdict in verdicts] == [DRIVE_LIMITS, DRIVE_TOLERANCES[1], None]
     assert [verdict.word for verdict in verdicts] == ["accepted", "cannot tell", "cannot tell"]
-    assert "and the result is within 0.5° / 15 cm, but perhaps not within 0.3° / 8 cm" in verdicts[1].reason
+    assert "is within 0.5° / 15 cm, but perhaps not within 0.3° / 8 cm" in verdicts[1].reason
     assert judge_drive(estimate(error=1.5, degrees=0.2), REFERENCE, RANGES[2], coarser).within is None
+
+
+@pytest.mark.parametrize(
+    ("drive", "searched", "advice"),
+    [
+        (estimate(), RANGES[2], ""),
+        (estimate(yaw=6.1), RANGES[2], "run all stages (--stages 1-5); if it cannot be, check the camera matrix"),
+        (estimate(yaw=25.0), RANGES[0], "Check the camera matrix, the lens and the time stamps."),  # all stages ran
+        (estimate(degrees=0.2), RANGES[2], "Add frames of other places; if that does not help, check the camera"),
+        (estimate(error=2.5), RANGES[2], "Use more frames, some dozens, of different places"),
+        (replace(estimate(), looks=()), RANGES[2], "Take frames in which poles, cars or walls"),
+    ],
+)
+def test_what_to_do_next(drive: DriveEstimate, searched: MiscalibrationRange, advice: str) -> None:
+    found = judge_drive(drive, REFERENCE, searched, CLASSIFIER).advice
+    assert advice in found and bool(found) == bool(advice)
 
 
 def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
@@ -82,16 +98,14 @@ def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
 def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:
     few = replace(estimate(), frames=3, looks=estimate().looks[:3])
     verdict = judge_drive(few, REFERENCE, RANGES[2], CLASSIFIER)
-    assert verdict.word == "cannot tell" and verdict.reason.startswith(
-        "3 frames agree, but a drive needs 4 to be accepted"
+    assert verdict.word == "cannot tell" and verdict.reason == (
+        "A drive is judged by at least 4 frames of different moments; this one has 3 frames."
     )
     four = replace(few, frames=4, looks=estimate().looks[:4])
     assert judge_drive(four, REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"
     two_cameras = replace(four, looks=(*four.looks[:2], *four.looks[:2]))
     verdict = judge_drive(two_cameras, REFERENCE, RANGES[2], CLASSIFIER)
-    assert verdict.word == "cannot tell" and verdict.reason.startswith(
-        "4 frames of 2 moments agree, but a drive needs 4"
-    )
+    assert verdict.word == "cannot tell" and verdict.reason.endswith("has 4 frames of 2 moments.")
 
 
 def test_a_start_in_the_corner_of_the_range_is_within_it() -> None:

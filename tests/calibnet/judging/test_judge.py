@@ -104,7 +104,7 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
 
     upright = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)
-    assert [cause.name for cause in upright.causes] == ["other-picture"]
+    assert [cause.name for cause in upright.causes] == ["other-image"]
     mirror = faults.mirrored(FRAME)
     known = judge(
         mirror,
@@ -122,6 +122,7 @@ def test_who_goes_beyond_the_range_searched_is_rejected_and_by_how_much_is_said(
     verdict = judge(FRAME, GUESS, run(REFERENCE, far, FITS, match_error=1.2), CLASSIFIER)
     assert verdict.word == REJECTED
     assert verdict.reason == "The LiDAR moved 4.5 m along the view, farther than the ±0.5 m searched."
+    assert verdict.advice.startswith("If the start may be that far off, run all stages (--stages 1-5)")
     near = miscalibration([0, 0, 0], [0, 0.7, 0]) @ REFERENCE
     unsure = judge(FRAME, GUESS, run(REFERENCE, near, FITS, match_error=1.2), CLASSIFIER)
     assert unsure.word == CANNOT_TELL and "0.7 m along the image's height" in unsure.reason
@@ -130,12 +131,13 @@ def test_who_goes_beyond_the_range_searched_is_rejected_and_by_how_much_is_said(
     assert judge(FRAME, GUESS, trace, CLASSIFIER).causes == (), "why is not asked"
     named = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 1.0)
     assert [cause.name for cause in named.causes] == ["focal-length"] and "shorter than camera_matrix" in named.reason
+    assert named.advice == "", "the cause says what to do"
 
 
 def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=1.2)
     verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, CLASSIFIER)
-    assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
+    assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["image-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
     assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The image is blank."
     upper_bits_lost = replace(FRAME, image=FRAME.image >> 6)  # hardly anything is left, and that is why

@@ -34,6 +34,7 @@ def test_json_of_a_verdict() -> None:
         "sigma": {"covariance": covariance.tolist()},
         "frames": {"used": 3, "skipped": [{"frame": 7, "why": "damaged"}]},
         "within": None,
+        "advice": "",
     }
     coarse = replace(verdict, within=Tolerance(0.5, 15.0)).as_dict()["within"]
     assert coarse == {"rotation_deg": 0.5, "translation_cm": 15.0}

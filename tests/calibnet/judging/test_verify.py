@@ -11,6 +11,7 @@ from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
+from calibnet.judging.advice import CORRECT_IT, NARROWER
 from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, probability_within, unfit, verify
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
@@ -98,6 +99,7 @@ def test_a_result_that_is_certain_of_a_coarser_tolerance_judges_by_that_one(
     verdict = verify(given, unsure, DRIVE)
     assert verdict.word == word and end in verdict.reason
     assert verdict.within == (DRIVE_TOLERANCES[1] if word == "accepted" else None)
+    assert verdict.advice == {"accepted": "", "cannot tell": NARROWER, "rejected": CORRECT_IT}[word]
     sure = verify(given, replace(unsure, within=DRIVE_LIMITS), DRIVE)  # its covariance resolves no finer one
     assert sure.word == word and sure.within == verdict.within
 

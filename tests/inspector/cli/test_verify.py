@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from calibnet.errors import CalibrationError, DatasetError
+from calibnet.judging.advice import CORRECT_IT
 from calibnet.trace import DriveEstimate, Estimate
 from calibnet.verdict import Cause, Verdict
 from inspector.cli.errors import run
@@ -101,7 +102,7 @@ def test_a_disturbed_one_is_rejected_with_its_axis_in_words_and_json(invoke: Inv
     content = json.loads(out)
     assert code == 1 and content["verdict"] == "rejected"
     assert "off by 2.00° ± 0.10° (most of it yaw, +2.00°) and " in content["reason"]
-    assert err.splitlines()[-1] == f"Verdict: rejected. {content['reason']}"
+    assert err.splitlines()[-1] == f"Verdict: rejected. {content['reason']} {CORRECT_IT}"
     assert content["moved"]["rotation_deg"] == pytest.approx(2.0)
     assert content["sigma"]["covariance"] == COVARIANCE.tolist() and content["frames"] == {"used": 3, "skipped": []}
     np.testing.assert_allclose(content["camera_from_lidar"], REFERENCE)
