@@ -13,7 +13,15 @@ from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, Verdict, Word
 from inspector.markdown import markdown_table
 from inspector.verdicts import explained
 
-COLUMNS = ("camera", "verdict", "off the reference", "uncertainty (1σ)", "camera alone", "corrected by", "match error")
+COLUMNS = (
+    "camera",
+    "verdict",
+    "off the reference",
+    "uncertainty (1σ)",
+    "vs camera alone",
+    "corrected by",
+    "match error",
+)
 """Columns of the table with a row per camera, the most important first."""
 VIEWED = 5
 """Number of its columns that the viewer has room for; reports have all."""
@@ -122,7 +130,7 @@ class RigResult:
     def how(self) -> str:
         """How the cameras were solved, in words."""
         if self.tolerance:
-            return f"as one rig, each within {self.tolerance} of its place on it"
+            return f"as one rig, each ±{self.tolerance} (1σ) about its place on it"
         return "as one rigid rig" if self.rigid else "one by one"
 
     @property
@@ -156,15 +164,20 @@ class RigResult:
     def _at_most(self) -> str:
         return "" if self.rigid and not self.tolerance else " at most"
 
-    def table(self) -> tuple[list[str], list[list[str]]]:
-        """Headings of the columns that are not empty, and a row per camera, named without the prefix that all share."""
-        rows = [camera.row() for camera in self.cameras]
-        kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
+    @property
+    def short_names(self) -> list[str]:
+        """The cameras' names without the words at their start that all share."""
         names = [camera.name for camera in self.cameras]
         alike = next((place for place, letters in enumerate(zip(*names, strict=False)) if len(set(letters)) > 1), 0)
         words = max(names[0].rfind(mark, 0, alike) for mark in "-_. ") + 1
-        for row in rows:
-            row[0] = row[0][words:]
+        return [name[words:] for name in names]
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Headings of the columns that are not empty, and a row per camera, by its short name."""
+        rows = [camera.row() for camera in self.cameras]
+        kept = [column for column in range(len(COLUMNS)) if any(row[column] for row in rows)]
+        for row, name in zip(rows, self.short_names, strict=True):
+            row[0] = name
         return [COLUMNS[column] for column in kept], [[row[column] for column in kept] for row in rows]
 
     def markdown(self) -> Iterator[str]:

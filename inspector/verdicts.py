@@ -50,8 +50,8 @@ def title(verdict: Verdict) -> str:
 
 
 def certainty(verdict: Verdict) -> str:
-    """Uncertainty of the result in degrees and centimetres; empty where none is stated."""
-    if verdict.covariance is None:
+    """Uncertainty of the result in degrees and centimetres; empty where there is none, or the reason has one."""
+    if verdict.covariance is None or "±" in verdict.reason:
         return ""
     return f"±{degrees_and_cm(verdict.sigma_rotation_deg, verdict.sigma_translation_cm)} (1σ)."
 

@@ -21,7 +21,7 @@ from inspector.record.pictures.legends import log_point_legend
 from inspector.record.subtree import Subtree
 from inspector.record.tabs import cascade
 from inspector.record.tabs.blueprint import make_blueprint
-from inspector.record.tabs.views import View, overlay_view, point_legend, with_legend
+from inspector.record.tabs.views import View, frame_view, point_legend, with_legend
 
 AT_ONCE = Contents(frozenset({Part.OVERLAYS}), dense=True)
 """Parts of an answer that are shown before its details."""
@@ -59,7 +59,7 @@ class Picture:
 
     def view(self, layout: Layout) -> View:
         """The large image, and the text beside it."""
-        picture = overlay_view("Pose, each stage, reference and result", entities.OVERLAY_CURRENT, layout.image)
+        picture = frame_view(layout, "Pose, each stage, reference and result", entities.OVERLAY_CURRENT)
         words = rrb.Vertical(
             rrb.TextDocumentView(origin=entities.TABLE, name="Newest answer"),
             rrb.TextDocumentView(origin=KEYS, name="Keys of the terminal"),

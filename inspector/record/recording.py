@@ -139,11 +139,13 @@ class Recording:
             to_frame = lambda frame: self._rec.set_frame(frame, self._seconds.get(frame, 0.0))  # noqa: E731
             log_watch(self._rec, watched.watch, list(sentences(watched)), to_frame)
 
-    def log_drive_overlay(self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None) -> None:
+    def log_drive_overlay(
+        self, frame: Frame, estimate: DriveEstimate, reference: Extrinsic | None, given: Verdict | None = None
+    ) -> None:
         """Log a frame's points under the drive's extrinsic; nothing for a frame that is not recorded."""
         if frame.index not in self._seconds:
             return
-        observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference)
+        observation = Observation(frame, CascadeTrace(estimate.camera_from_lidar, ()), reference, given=given)
         log_drive_overlay(self._rec, observation, self._contents, estimate.verdict)
         self._flush_frame()
 

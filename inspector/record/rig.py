@@ -48,9 +48,10 @@ LEFT_SHARE = 0.64
 
 @dataclass(frozen=True)
 class Shown:
-    """A camera of the rig, with its frames."""
+    """A camera of the rig, with its name in views and its frames."""
 
     solved: CameraResult
+    name: str
     frames: Frames
 
     @property
@@ -78,7 +79,8 @@ def record_rig(
     Returns:
         The number of moments shown.
     """
-    cameras = [Shown(one, frames[one.name]) for one in solved.cameras]
+    named = zip(solved.cameras, solved.short_names, strict=True)
+    cameras = [Shown(camera, name, frames[camera.name]) for camera, name in named]
     stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, rig_blueprint(cameras))
     try:
         rec = Subtree(stream.rec)
@@ -161,7 +163,7 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
         _below(
             camera,
             overlay_view(
-                camera.solved.name,
+                camera.name,
                 entities.OVERLAY_CORRECTED,
                 (size.width, size.height),
                 small=len(cameras) > FEW_CAMERAS,
@@ -204,7 +206,7 @@ def _page(camera: Shown) -> View:
     side_by_side = size[0] < 2 * size[1]  # tall images leave room beside them
     layout = rrb.Horizontal if side_by_side else rrb.Vertical
     small = rrb.Vertical(*below) if side_by_side else rrb.Horizontal(*below)
-    return layout(found, small, name=camera.solved.name)
+    return layout(found, small, name=camera.name)
 
 
 def _below(camera: Shown, view: rrb.View) -> rrb.View:

@@ -32,6 +32,8 @@ HELD_OUT = {
     "initial_{}": ("before the stage, median", colors.INITIAL),
 }
 """Curves of figures on held-out frames, by the pattern of their names: what they are called, and their colour."""
+MARK, HELD_OUT_MARK = 2.5, 6.0
+"""Sizes of the marks on curves; those of held-out frames are few, and a short run has a single one at its end."""
 
 
 class TrainingLog:
@@ -47,7 +49,7 @@ class TrainingLog:
         for kind, unit in entities.ERROR_KINDS.items():
             self._name(f"{entities.TRAINING}/{kind}_{unit}", *ON_TRAINING)
             for pattern, named in HELD_OUT.items():
-                self._name(f"{entities.VALIDATION}/{pattern.format(kind)}_{unit}", *named)
+                self._name(f"{entities.VALIDATION}/{pattern.format(kind)}_{unit}", *named, HELD_OUT_MARK)
 
     def progressed(self, progress: Progress) -> None:
         """Log the running means of the losses."""
@@ -80,9 +82,9 @@ class TrainingLog:
             self._claim.complete()
         self._claim.release()
 
-    def _name(self, path: str, name: str, color: colors.Rgb) -> None:
+    def _name(self, path: str, name: str, color: colors.Rgb, mark: float = MARK) -> None:
         line = rr.SeriesLines(names=name, colors=color, widths=2.0)
-        self._rec.log_once(path, line, rr.SeriesPoints(names=name, colors=color, marker_sizes=2.5))
+        self._rec.log_once(path, line, rr.SeriesPoints(names=name, colors=color, marker_sizes=mark))
 
     def _at(self, progress: Progress) -> None:
         self.recording.set_time("samples", sequence=progress.samples)

@@ -48,8 +48,9 @@ def _draw(rig: RecordedRig, number: int, camera: CameraResult, folder: Path) -> 
     moments = rig.moments[camera.name]
     index = moments[len(moments) // 2]
     image, sides = pictures.image(index), list[Side]()
+    start = "as given" if camera.reference is None else "miscalibrated"
     result = f"corrected, {camera.verdict.word}"
-    shown = {"as given": entities.OVERLAY_MISCALIBRATED, result: entities.OVERLAY_CORRECTED}
+    shown = {start: entities.OVERLAY_MISCALIBRATED, result: entities.OVERLAY_CORRECTED}
     for side, (name, entity) in zip(("left", "right"), shown.items(), strict=True):
         file = f"{PICTURES}/camera_{number}_{side}.jpg"
         write_whole(folder / file, draw_overlay(image, *pictures.overlay(entity, index), size), Kind.JPEG)

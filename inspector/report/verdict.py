@@ -212,8 +212,9 @@ def _together(figures: Figures) -> list[Finding]:
 
 
 def _judge_agreement(figures: Figures) -> list[Finding]:
-    unknown = Finding("note", "There is no reference, so the accuracy of the result is unknown.")
-    if len(figures.run.frames) == 1:
+    run = figures.run
+    unknown = Finding("note", "There is no reference, so errors are not known, only estimated.")
+    if len(run.frames) == 1:
         return [unknown, Finding("bad", "A single frame cannot show agreement: run more frames.")]
     findings = [unknown]
     for quantity in (ROTATION, TRANSLATION):
@@ -226,7 +227,7 @@ def _judge_agreement(figures: Figures) -> list[Finding]:
             findings.append(Finding("fair", f"{name}: the frames agree roughly ({scatter})."))
         else:
             findings.append(Finding("bad", f"{name}: the frames do not agree ({scatter})."))
-        if start.median < CLEAR_CHANGE * end.median:
+        if run.drive is None and start.median < CLEAR_CHANGE * end.median:
             offset = f"the start lies {quantity.say(start.median)} from the frames' median"
             doubt = "not clearly more than they disagree, so it may have been right"
             findings.append(Finding("note", f"{name}: {offset}, {doubt}."))

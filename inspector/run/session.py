@@ -21,7 +21,7 @@ from calibnet.judging.lag import lags
 from calibnet.judging.verify import DRIVE, FRAME, named_cause, unfit, verify
 from calibnet.runtime.interruption import StopRequest
 from calibnet.trace import DriveEstimate
-from calibnet.verdict import REJECTED, BadFrame
+from calibnet.verdict import REJECTED, BadFrame, Verdict
 from calibnet.watch import Watched
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation, Skipped
@@ -228,7 +228,7 @@ class Session:
         recording.log_drive(estimate, reference, summary.given_verdict, summary.of_frames())
         if self.watching is not None:
             recording.log_watch(self.watching(estimate))
-        self._record_drive_overlays(recording, estimate, stop)
+        self._record_drive_overlays(recording, estimate, summary.given_verdict, stop)
         summary.drive = drive_sentence(estimate, reference, initial)
         summary.drive_verdict = estimate.verdict
         if estimate.verdict is None or estimate.verdict.word != REJECTED:
@@ -239,14 +239,16 @@ class Session:
         summary.drive = f"{why}: the whole drive is not solved as one."
         recording.log_no_drive([summary.drive, *summary.of_frames()])
 
-    def _record_drive_overlays(self, recording: Recording, estimate: DriveEstimate, stop: StopRequest) -> None:
+    def _record_drive_overlays(
+        self, recording: Recording, estimate: DriveEstimate, given: Verdict | None, stop: StopRequest
+    ) -> None:
         """Show the drive's extrinsic on every recorded frame, including those that were left out of the solution."""
         for position in self.positions:
             if stop.requested:
                 raise KeyboardInterrupt
             with contextlib.suppress(DatasetError):
                 frame = self.sequence[position]
-                recording.log_drive_overlay(frame, estimate, self.start.reference(frame))
+                recording.log_drive_overlay(frame, estimate, self.start.reference(frame), given)
 
     def _what_is_kept(self, summary: Summary) -> str:
         if summary.frames == 0 or self.outputs.file is None:

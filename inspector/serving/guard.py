@@ -21,6 +21,8 @@ from starlette.websockets import WebSocketClose
 
 LOCALHOST = "127.0.0.1"
 TOKEN_BYTES = 18
+NOT_FOUND = "Not found. Open the address that calib-inspect printed when it started; every start has a new one."
+FORBIDDEN = "Forbidden. Open the address that calib-inspect printed when it started, exactly as it is."
 
 
 def new_token() -> str:
@@ -81,7 +83,7 @@ class Guard:
         token, _, path = str(scope["path"]).lstrip("/").partition("/")
         known = secrets.compare_digest(token.encode(), self._token.encode())
         if not (allowed and known):
-            refusal = PlainTextResponse("Forbidden", 403) if not allowed else PlainTextResponse("Not found", 404)
+            refusal = PlainTextResponse(FORBIDDEN, 403) if not allowed else PlainTextResponse(NOT_FOUND, 404)
             refused: ASGIApp = WebSocketClose() if scope["type"] == "websocket" else refusal
             await refused(scope, receive, send)
             return

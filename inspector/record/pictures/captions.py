@@ -18,9 +18,9 @@ class Strip(NamedTuple):
     height: int
 
 
-def caption_strip(image: tuple[int, int]) -> Strip:
-    """The size of the caption above an image of this width and height."""
+def caption_strip(image: tuple[int, int], figures: bool = True) -> Strip:
+    """The size of the caption above an image of this width and height, with figures or without."""
     width, height = image
     letters = max(8, round(max(LETTERS_OF_WIDTH * width, LETTERS_OF_HEIGHT * height)))
-    lines = 1 if width >= ONE_LINE * height else 2
+    lines = 2 if figures and width < ONE_LINE * height else 1
     return Strip(letters, lines, round(1.3 * letters * lines))

@@ -7,7 +7,7 @@ from functools import lru_cache
 import rerun as rr
 
 from calibnet.geometry.types import Extrinsic
-from calibnet.verdict import REJECTED
+from calibnet.verdict import REJECTED, Verdict
 from inspector import colors, entities
 from inspector.record.contents import Contents
 from inspector.record.observation import Observation
@@ -57,7 +57,10 @@ class FrameOverlays:
 
     def log_result(self, rec: Subtree, entity: str, whose: str = "") -> None:
         """Log the points under the final result, and above them the verdict."""
-        trace = self._observation.trace
+        trace, given = self._observation.trace, self._observation.given
+        if given is not None:
+            self.log(rec, entity, f"{whose}{given_caption(given)}", trace.corrected, colors.VERDICTS[given.word])
+            return
         word = "" if trace.verdict is None else trace.verdict.word
         became = "worse than before" if self._observation.worse else "corrected"
         name = f"{REJECTED}, left as it was" if trace.rejected else ", ".join(filter(None, [became, word]))
@@ -75,7 +78,7 @@ class FrameOverlays:
     ) -> None:
         """Log a strip of the image's width above it."""
         camera, path = self._camera, entities.caption(entity)
-        strip = caption_strip((camera.width, camera.height))
+        strip = caption_strip((camera.width, camera.height), self._observation.reference is not None)
         lines = [": ".join(filter(None, [name, figures]))] if strip.lines == 1 else [name, figures]
         picture = text_png(lines, (camera.width, strip.height), strip.letters, color)
         rec.log(
@@ -84,6 +87,11 @@ class FrameOverlays:
             rr.EncodedImage(contents=picture, media_type="image/png", opacity=1.0),
             rr.AnyValues(text=": ".join(filter(None, [name, figures]))),
         )
+
+
+def given_caption(given: Verdict) -> str:
+    """The verdict on the calibration that is verified, above points under the one that was found."""
+    return f"as given {given.word}, here as found"
 
 
 @lru_cache(maxsize=1)

@@ -22,13 +22,19 @@ class SearchWindow:
         self._cell = min(x, width - 1), min(y, height - 1)
         x, y = self._cell
         self._scores = scale.volume[:, :, y, x].astype(np.float32)
+        down, across = self._scores.shape
+        rows, columns = np.arange(down)[:, None] - down // 2 + y, np.arange(across) - across // 2 + x
+        self._inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
         self._found = scale.best[y, x]
         self._true = None if match.true_displacement is None else np.asarray(match.true_displacement) / scale.stride
         self._middle = np.array([self._scores.shape[1] // 2, self._scores.shape[0] // 2]) + 0.5
 
     def scores(self) -> rr.Image:
-        """The matching scores, dark to bright over the window's own range."""
-        return rr.Image(colors.map_colors(self._scores, float(self._scores.min()), float(self._scores.max())))
+        """The matching scores, dark to bright over the window's own range; without colour outside the image."""
+        seen = self._scores[self._inside]
+        picture = colors.map_colors(self._scores, float(seen.min()), float(seen.max()))
+        picture[~self._inside] = colors.GROUND
+        return rr.Image(picture)
 
     def cells(self) -> rr.Boxes2D:
         """Frames in the window around the cell where the point is now and the one where it was found."""

@@ -20,10 +20,10 @@ from inspector.record.pictures.maps import certainty_image, flow_image, reach_px
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.views import (
     View,
+    frame_view,
     in_rows,
     map_legends,
     map_view,
-    overlay_view,
     point_legend,
     uncapitalized,
     with_legend,
@@ -31,6 +31,8 @@ from inspector.record.tabs.views import (
 
 NAME = "Cascade"
 
+MOST_LARGE, WIDE = 4, 2.0
+"""Largest number of images on a page, and smallest aspect ratio, at which they are large enough for large points."""
 ARROW_SPACING = (2, 3)
 """Smallest and largest distance between arrows of the displacement field, in cells; long arrows are farther apart."""
 ARROW_COLOR = (20, 20, 20)
@@ -77,16 +79,17 @@ def view(layout: Layout) -> View:
     """A page with all overlays, one with the overlay that steps through the stages, and one for every stage."""
     pages: list[View] = []
     if Part.OVERLAYS in layout.contents.parts:
-        overlays = [overlay_view(f"Start: {layout.start.lower()}", entities.OVERLAY_MISCALIBRATED, layout.image)]
-        overlays += [
-            overlay_view(f"After {uncapitalized(stage.title)}", entities.overlay_stage(stage.number), layout.image)
-            for stage in layout.stages
-        ]
+        shown = {f"Start: {layout.start.lower()}": entities.OVERLAY_MISCALIBRATED}
+        shown |= {
+            f"After {uncapitalized(stage.title)}": entities.overlay_stage(stage.number) for stage in layout.stages
+        }
+        small = _are_small(layout, len(shown))
+        overlays = [frame_view(layout, name, path, small=small) for name, path in shown.items()]
         columns = 2 if len(overlays) > 1 else 1
-        current = overlay_view(
+        current = frame_view(
+            layout,
             "Choose the timeline “step” below and play: start, every stage, truth, result",
             entities.OVERLAY_CURRENT,
-            layout.image,
         )
         pages = [
             with_legend(in_rows(overlays, columns), point_legend(layout), "All stages"),
@@ -114,9 +117,18 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
         earlier = layout.stages[: layout.stages.index(stage)]
         name = f"Before: after stage {earlier[-1].number}" if earlier else f"Before: {layout.start.lower()}"
         path = entities.overlay_stage(earlier[-1].number) if earlier else entities.OVERLAY_MISCALIBRATED
-        after = overlay_view("After: " + uncapitalized(stage.title), entities.overlay_stage(stage.number), layout.image)
-        rows.insert(0, rrb.Horizontal(overlay_view(name, path, layout.image), after))
+        small = _are_small(layout, images=4)
+        after = frame_view(
+            layout, "After: " + uncapitalized(stage.title), entities.overlay_stage(stage.number), small=small
+        )
+        rows.insert(0, rrb.Horizontal(frame_view(layout, name, path, small=small), after))
     return rrb.Vertical(*rows, map_legends(), row_shares=[1.0] * len(rows) + [0.25], name=stage.title)
+
+
+def _are_small(layout: Layout, images: int) -> bool:
+    """Whether so many images on one page, two in a row, are small: tall ones, or more than two rows."""
+    width, height = layout.image
+    return images > MOST_LARGE or width < WIDE * height
 
 
 def _log_overlays(rec: Subtree, observation: Observation, contents: Contents) -> None:

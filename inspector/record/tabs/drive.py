@@ -19,7 +19,7 @@ from calibnet.verdict import Verdict
 from inspector import colors, entities
 from inspector.record.contents import Contents, Part
 from inspector.record.observation import Layout, Observation
-from inspector.record.pictures.frame_overlays import FrameOverlays
+from inspector.record.pictures.frame_overlays import FrameOverlays, given_caption
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.table import matrix_lines
@@ -28,7 +28,7 @@ from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
 
 NAME = "Whole drive as one"
 
-PARAMETERS = {"pitch": "deg", "yaw": "deg", "roll": "deg", "x": "cm", "y": "cm", "z": "cm"}
+PARAMETERS = {"roll": "deg", "pitch": "deg", "yaw": "deg", "x": "cm", "y": "cm", "z": "cm"}
 """Parameters of the extrinsic, in the camera frame, with the unit of their curves."""
 COVARIANCE_ROWS = {"x": 0, "y": 1, "z": 2, "pitch": 3, "yaw": 4, "roll": 5}
 LEGEND_CURVES = "legend/drive"
@@ -119,13 +119,22 @@ def view(layout: Layout) -> View:
 
 def _zero(layout: Layout) -> str:
     """The extrinsic to which the curves are relative, in words."""
-    return "the reference" if layout.has_reference else "the estimate from all frames"
+    return "the reference" if layout.has_reference else "the final estimate"
 
 
 def log_drive_overlay(rec: Subtree, observation: Observation, contents: Contents, verdict: Verdict | None) -> None:
-    """Log a frame's points under the drive's extrinsic, which the observation's trace starts from."""
+    """Log a frame's points under the drive's extrinsic, which the observation's trace starts from.
+
+    Args:
+        rec: recording that has the frame already.
+        observation: the frame, with the verdict on the given extrinsic if that was to be verified.
+        contents: content of the recording.
+        verdict: verdict on the drive.
+    """
     rec.set_frame(observation.frame.index, observation.frame.timestamp)
     name = "whole drive as one" if verdict is None else f"whole drive, {verdict.word}"
+    if observation.given is not None:
+        verdict, name = observation.given, given_caption(observation.given)
     color = colors.LETTERS if verdict is None else colors.VERDICTS[verdict.word]
     overlays = FrameOverlays(observation, contents)
     overlays.log(rec, entities.OVERLAY_DRIVE, name, observation.trace.initial, color)

@@ -29,9 +29,9 @@ from inspector.record.tabs.views import (
     TITLE_HEIGHT,
     View,
     curve_view,
+    frame_view,
     frames_named,
     legend,
-    overlay_view,
     point_legend,
 )
 
@@ -93,9 +93,9 @@ def log_worst(rec: Subtree, observation: Observation, contents: Contents) -> Non
 def view(layout: Layout) -> View:
     """The large picture above curves, and the text beside them."""
     names = _pictures(layout)
-    pictures = [overlay_view(name, path, layout.image) for name, path in names.items()]
+    pictures = [frame_view(layout, name, path) for name, path in names.items()]
     if layout.with_worst:
-        worst = overlay_view(WORST, entities.OVERLAY_WORST, layout.image, image_of=entities.IMAGE_WORST)
+        worst = frame_view(layout, WORST, entities.OVERLAY_WORST, image_of=entities.IMAGE_WORST)
         pictures.append(worst)
     left: list[View] = [rrb.Tabs(*pictures, active_tab=0, name="Result"), point_legend(layout)]
     shares = [min(_height(layout, LARGE_SHARE) + 2 * TITLE_HEIGHT, LARGEST_OVERLAY), LEGEND_HEIGHT]
@@ -106,7 +106,7 @@ def view(layout: Layout) -> View:
     said: list[View] = [rrb.TextDocumentView(origin=entities.TABLE, name="This frame, stage by stage")]
     if layout.with_drive:
         said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The answer: whole drive as one"))
-    small = [overlay_view(name, path, layout.image, small=True) for name, path in names.items() if path in _SMALL]
+    small = [frame_view(layout, name, path, small=True) for name, path in names.items() if path in _SMALL]
     heights = [min(_height(layout, 1.0 - LARGE_SHARE) + TITLE_HEIGHT, LARGEST_SMALL)] * len(small)
     return rrb.Horizontal(
         rrb.Vertical(*left, row_shares=shares),
@@ -130,7 +130,7 @@ def _pictures(layout: Layout) -> dict[str, str]:
 def _height(layout: Layout, share: float) -> float:
     """Height in pixels of a picture with its caption, if it takes ``share`` of the screen's width."""
     width, height = layout.image
-    return share * SCREEN_WIDTH * (height + caption_strip(layout.image).height) / width
+    return share * SCREEN_WIDTH * (height + caption_strip(layout.image, layout.has_reference).height) / width
 
 
 def _curve_views(layout: Layout) -> list[View]:

@@ -37,8 +37,8 @@ View = rrb.View | rrb.Container
 def overlay_view(
     name: str,
     points: str,
-    image: tuple[int, int] | None = None,
-    caption: bool = True,
+    image: tuple[int, int],
+    figures: bool = True,
     image_of: str = entities.IMAGE,
     small: bool = False,
 ) -> rrb.Spatial2DView:
@@ -48,26 +48,30 @@ def overlay_view(
         name: name of the view.
         points: entity of the overlay.
         image: size of the image, so that points outside do not widen the view.
-        caption: whether to show the caption, which is not readable in a small view.
+        figures: whether captions have errors, which a recording without a reference has not.
         image_of: entity of the image.
         small: whether to draw smaller points, all of one size; points have a fixed size on the screen, and would cover
             a small picture.
     """
-    bounds = None
-    if image is not None:
-        top = -float(caption_strip(image).height) if caption else 0.0
-        bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(top, image[1]))
+    bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(-caption_strip(image, figures).height, image[1]))
     overrides: dict[Any, Any] = {f"/{image_of}": rr.EncodedImage.from_fields(opacity=DIMMED)}
     if small:
         overrides[f"/{points}"] = rr.Points2D.from_fields(radii=rr.Radius.ui_points(SMALL_POINT))
     return rrb.Spatial2DView(
         origin="/",
-        contents=[f"/{image_of}", f"/{points}/**", *([] if caption else [f"- /{entities.caption(points)}"])],
+        contents=[f"/{image_of}", f"/{points}/**"],
         name=name,
         visual_bounds=bounds,
         background=colors.GROUND,
         overrides=overrides,
     )
+
+
+def frame_view(
+    layout: Layout, name: str, points: str, image_of: str = entities.IMAGE, small: bool = False
+) -> rrb.Spatial2DView:
+    """The `overlay_view` of a recording's frames."""
+    return overlay_view(name, points, layout.image, layout.has_reference, image_of, small)
 
 
 def map_view(name: str, path: str, stage: int, grid: Grid, *marks: str) -> rrb.Spatial2DView:

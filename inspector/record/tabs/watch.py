@@ -18,6 +18,7 @@ from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
 from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
+from inspector.record.tabs.drive import PARAMETERS
 from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
 
 NAME = "Did it move?"
@@ -103,10 +104,9 @@ def view(layout: Layout) -> View:
 
 def watch_view() -> View:
     """The same view without a layout."""
-    units = {axis: "cm" if axis in ("x", "y", "z") else "deg" for axis in AXES}
     views = [
         curve_view(f"{axis.capitalize()} against the whole drive [{unit}]", f"/watch/{axis}")
-        for axis, unit in units.items()
+        for axis, unit in PARAMETERS.items()
     ]
     text = rrb.TextDocumentView(origin=TEXT, name="Did the mount move?")
     curves = with_legend(rrb.Grid(*views, grid_columns=3), legend("Curves", LEGEND), "Curves")

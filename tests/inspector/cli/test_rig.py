@@ -194,7 +194,7 @@ def test_a_tolerance_is_handed_on_and_told(rig: Path, invoke: Invoke) -> None:
     assert residual["rotation_deg"] == pytest.approx(0.5) and residual["translation_cm"] == pytest.approx(5.0)
     assert residual["match_error_px"] == 1.5
     assert "left: accepted" in err and "0.50° / 5.0 cm from the result of its own frames" in err
-    assert "as one rig, each within 0.5° / 2 cm of its place on it" in err
+    assert "as one rig, each ±0.5° / 2 cm (1σ) about its place on it" in err
     assert invoke(str(rig), "--tolerance", "2cm")[0] == 2
     assert invoke(str(rig), "--tolerance", "1deg/1cm", "--rigid")[0] == 2
 

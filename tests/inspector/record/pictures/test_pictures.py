@@ -11,9 +11,11 @@ import pytest
 from PIL import Image
 
 from calibnet.geometry import PinholeCamera, project
-from inspector.colors import EMPTY, depth_colors, flow_colors
+from calibnet.trace import ScaleTrace
+from inspector.colors import EMPTY, GROUND, depth_colors, flow_colors
 from inspector.record.contents import Coloring
 from inspector.record.observation import Observation
+from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.channel_grid import (
     GAP,
     HEADER,
@@ -25,9 +27,10 @@ from inspector.record.pictures.channel_grid import (
     palette_png,
     slice_grid,
 )
-from inspector.record.pictures.matches import StartingPoints, chosen_match
+from inspector.record.pictures.matches import Match, StartingPoints, chosen_match
 from inspector.record.pictures.overlay import Thinning, make_overlay
 from inspector.record.pictures.painting import depth_edges, make_painter
+from inspector.record.pictures.search_window import SearchWindow
 
 
 def test_near_is_red_and_far_is_blue() -> None:
@@ -105,6 +108,28 @@ def test_chosen_cell_is_occupied_and_its_true_displacement_is_the_fields(fakes: 
     unknown = StartingPoints.of(Observation(frame, trace), stage)
     assert chosen_match(unknown, stage.detail).true_displacement is None
     assert unknown.true_field(8) is None
+
+
+def test_a_search_window_has_no_colour_outside_the_image() -> None:
+    volume = np.ones((5, 5, 4, 6), np.float16)
+    volume[1, 2], volume[:, :, 0, 0] = 0.0, 0.5
+    volume[2, 2, 0, 0] = 0.75
+    channels = np.zeros((1, 4, 6), np.float16)
+    best, occupied = np.zeros((4, 6, 2), np.int64), np.ones((4, 6), bool)
+    scale = ScaleTrace(8, volume, volume, best, channels, channels, occupied)
+    shown = SearchWindow(scale, Match((1.0, 1.0), None)).scores()
+    picture = np.asarray(shown.buffer.as_arrow_array().to_pylist()[0], np.uint8).reshape(5, 5, 3)
+    outside = (picture == GROUND).all(axis=2)
+    assert outside[:2].all() and outside[:, :2].all() and not outside[2:, 2:].any()
+    assert picture[2, 2].sum() > picture[3, 3].sum()
+
+
+@pytest.mark.parametrize(
+    ("image", "figures", "lines"), [((1242, 375), True, 1), ((1920, 1080), True, 2), ((1920, 1080), False, 1)]
+)
+def test_a_caption_leaves_no_line_empty(image: tuple[int, int], figures: bool, lines: int) -> None:
+    strip = caption_strip(image, figures)
+    assert (strip.lines, strip.height) == (lines, round(1.3 * strip.letters * lines))
 
 
 def test_an_edge_is_a_point_that_stands_before_something_farther() -> None:

@@ -20,6 +20,7 @@ from inspector import entities
 from inspector.read.run import read_run
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.drive import curve, deviation, drive_sentence, log_drive
+from inspector.verdicts import certainty
 from tests.support.fakes import FakeCascade
 
 REFERENCE = transform([[0, -1, 0], [0, 0, -1], [1, 0, 0]], [0.0, -0.1, -0.2])
@@ -62,6 +63,12 @@ def test_networks_alone_are_said_not_to_know_what_they_share() -> None:
     sentence = drive_sentence(estimate(aligned=False), None, found(5, 0.3))
     assert "changed the calibration by 4.50° / " in sentence and "aligned" not in sentence
     assert sentence.endswith("±0.30° / 7.0 cm (1σ) by the frames' scatter, not counting what all of them get wrong.")
+
+
+def test_a_reason_that_says_how_certain_it_is_is_not_followed_by_another_figure() -> None:
+    plain = Verdict("accepted", "3 frames agree.", REFERENCE, (0.1, 2.0), covariance=np.diag(SIGMA**2))
+    assert certainty(plain) == "±0.30° / 7.0 cm (1σ)."
+    assert certainty(replace(plain, reason="It is off by 0.10° ± 0.2° and 2 ± 4 cm.")) == ""
 
 
 def test_deviations_have_the_units_of_their_curves() -> None:
