@@ -26,16 +26,17 @@ CAUSES = (
     "lens-model",
     "roll",
     "mirrored",
-    "other-image",
+    "other-picture",
     "time-offset",
     "accumulated",
     "units",
     "axes",
     "left-handed",
     "bit-depth",
-    "image-size",
+    "picture-size",
 )
-"""Names of possible causes in the input, as in JSON."""
+"""Names of possible causes in the input, as in JSON; scripts compare them, so they keep the word "picture" for an
+image."""
 
 
 class Tolerance(NamedTuple):

@@ -45,7 +45,7 @@ class Implausible:
     """A finding that cannot be right, or is unlikely.
 
     Attributes:
-        name: ``focal-length``, ``principal-point``, ``image-size``, ``distortion``, ``units``, ``axes``,
+        name: ``focal-length``, ``principal-point``, ``picture-size``, ``distortion``, ``units``, ``axes``,
             ``accumulated``, ``bit-depth`` or ``bayer``.
         text: a sentence without full stop: the finding; what to do.
         certain: whether no sensor can have it, so that the input is refused.
@@ -154,7 +154,7 @@ def rectification(camera: CameraModel, rotation: NDArray[np.float64], projection
         "whatever their topic is called (kitti2bag writes such); give their calibration, P without distortion, with "
         "--guess FILE"
     )
-    return Implausible("image-size", text)
+    return Implausible("picture-size", text)
 
 
 def pixel_shape(camera: PinholeCamera) -> Implausible | None:
@@ -180,7 +180,7 @@ def image_size(camera: PinholeCamera) -> Implausible | None:
         f"{2 * camera.center[0]:.0f}x{2 * camera.center[1]:.0f}, and this one is {camera.width}x{camera.height}; "
         "scale the camera matrix by the factor that the image was resized by"
     )
-    return Implausible("image-size", text, certain=not 1 / SURELY_OTHER < factor < SURELY_OTHER)
+    return Implausible("picture-size", text, certain=not 1 / SURELY_OTHER < factor < SURELY_OTHER)
 
 
 def principal_point(camera: PinholeCamera) -> Implausible | None:

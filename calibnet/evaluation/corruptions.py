@@ -73,7 +73,7 @@ def corruptions(sequence: FrameSequence, position: int, donors: Sequence[Frame])
 def image_faults(donors: Sequence[Frame]) -> Iterator[Corruption]:
     """Faults of the image."""
     for number, donor in enumerate(donors):
-        yield Corruption("other-image", f"{number + 1}", "other-image", faults.image_of(donor), number == 0)
+        yield Corruption("other-picture", f"{number + 1}", "other-picture", faults.image_of(donor), number == 0)
     yield Corruption("grey", "", None, faults.grey)
     for pixels in (2.0, 5.0, 10.0):
         yield Corruption("blurred", f"{pixels:g} px", None, faults.blurred(pixels), pixels == 5)
@@ -101,7 +101,7 @@ def camera_faults() -> Iterator[Corruption]:
             "principal-point", strength, "principal-point", faults.principal(*pixels), abs(pixels[0]) == 60
         )
     for factor in (0.75, 0.5, 2.0):
-        yield Corruption("other-size", f"x{factor:g}", "image-size", faults.matrix_of_size(factor), factor == 0.5)
+        yield Corruption("other-size", f"x{factor:g}", "picture-size", faults.matrix_of_size(factor), factor == 0.5)
     for k1 in (-0.1, -0.2, -0.35, 0.1):
         yield Corruption("distorted", f"k1 {k1:g}", "distortion", faults.distorted(k1), k1 == -0.2)
     yield Corruption("equidistant", "", "lens-model", faults.equidistant)

@@ -109,7 +109,7 @@ def judge(
                 text = "They seem to show different places, or the start is far outside the range searched."
                 causes = (
                     Cause(
-                        "other-image",
+                        "other-picture",
                         text,
                         f"{error:.1f} px, and no correction that was tried makes them fit",
                     ),

@@ -50,9 +50,9 @@ def scene(seed: int = 0) -> np.ndarray:
         ((170.0, 170.0, 639.5, 359.5), [("focal-length", True)]),
         ((900.0, 675.0, 639.5, 359.5), [("focal-length", False)]),  # resized to another shape
         ((900.0, 300.0, 639.5, 359.5), [("focal-length", True)]),
-        ((1800.0, 1800.0, 1279.5, 719.5), [("image-size", True)]),  # of 2560x1440
-        ((450.0, 450.0, 319.5, 179.5), [("image-size", True)]),  # of 640x360
-        ((1350.0, 1350.0, 960.0, 540.0), [("image-size", False)]),  # of 1920x1080
+        ((1800.0, 1800.0, 1279.5, 719.5), [("picture-size", True)]),  # of 2560x1440
+        ((450.0, 450.0, 319.5, 179.5), [("picture-size", True)]),  # of 640x360
+        ((1350.0, 1350.0, 960.0, 540.0), [("picture-size", False)]),  # of 1920x1080
         ((900.0, 900.0, 639.5, 650.0), [("principal-point", False)]),  # the sky is cut off
         ((900.0, 900.0, 639.5, -400.0), [("principal-point", True)]),
     ],

@@ -80,7 +80,7 @@ def test_every_frame_is_judged_with_every_fault_from_the_guess_that_does_not_kno
     def judge(frame: Frame, guess: Extrinsic, trace: CascadeTrace | None, late: Search | None) -> Verdict:
         guesses.append(guess)
         if trace is None:
-            return Verdict(REJECTED, "", guess, causes=(Cause("other-image", "", ""),))
+            return Verdict(REJECTED, "", guess, causes=(Cause("other-picture", "", ""),))
         return Verdict(ACCEPTED, "", trace.stages[-1].after)
 
     turned = transform(np.diag([-1.0, -1.0, 1.0]), np.zeros(3)) @ REFERENCE

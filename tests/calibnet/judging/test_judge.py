@@ -104,7 +104,7 @@ def test_matches_beyond_the_limit_are_rejected_and_the_cause_is_looked_for() -> 
     assert np.array_equal(verdict.camera_from_lidar, REFERENCE)
 
     upright = judge(FRAME, GUESS, trace, CLASSIFIER, match_error=lambda frame, guess: 30.0 if frame is FRAME else 29.0)
-    assert [cause.name for cause in upright.causes] == ["other-image"]
+    assert [cause.name for cause in upright.causes] == ["other-picture"]
     mirror = faults.mirrored(FRAME)
     known = judge(
         mirror,
@@ -137,7 +137,7 @@ def test_who_goes_beyond_the_range_searched_is_rejected_and_by_how_much_is_said(
 def test_implausible_input_is_rejected_however_well_it_fits() -> None:
     trace = run(GUESS, REFERENCE, FITS, match_error=1.2)
     verdict = judge(faults.matrix_of_size(0.5)(FRAME), GUESS, trace, CLASSIFIER)
-    assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["image-size"]
+    assert verdict.word == REJECTED and [cause.name for cause in verdict.causes] == ["picture-size"]
     blank = replace(FRAME, image=np.full_like(FRAME.image, 128))
     assert judge(blank, GUESS, trace, CLASSIFIER).reason == "The image is blank."
     upper_bits_lost = replace(FRAME, image=FRAME.image >> 6)  # hardly anything is left, and that is why

@@ -74,7 +74,7 @@ def test_a_matrix_of_larger_pictures_is_a_suspect(tmp_path: Path) -> None:
     rectified = scale @ [[721.5, 0, 609.6, 44.9], [0, 721.5, 172.9, 0.2], [0, 0, 1, 0.003]]
     topics: dict[str, str | None] = {"/cam/image_raw": "/cam/camera_info"}
     mixed = Bag([bag_of(tmp_path / "drive", topics, k=raw.ravel(), p=rectified.ravel())])[0]
-    assert [remark.name for remark in mixed.remarks] == ["image-size"]
+    assert [remark.name for remark in mixed.remarks] == ["picture-size"]
     assert "rectified already" in mixed.remarks[0].text
     assert not Bag([bag_of(tmp_path / "right", topics, **P)])[0].remarks
 
