@@ -10,7 +10,7 @@ from calibnet.geometry import RANGES, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.coefficients import load_coefficients
 from calibnet.judging.predictors import Predictors, misfits, predictors, reach
-from calibnet.verdict import BadFrame, Cause, Tolerance, Verdict, moved
+from calibnet.verdict import CAUSES, BadFrame, Cause, Tolerance, Verdict, moved
 from calibnet.weights.manifest import load_manifest
 from tests.support.drive import REFERENCE
 from tests.support.matches import matches, run
@@ -94,3 +94,9 @@ def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_find_wor
     bad = Predictors(1.6, -3.5, -0.2, np.log(5.0))
     assert classifier(good) < classifier.accepted_below < classifier(bad)
     assert coefficients.fitted["frames"]["false_accept_rate"] <= 0.01
+
+
+def test_scripts_compare_the_names_of_causes_so_they_never_change() -> None:
+    names = """focal-length principal-point distortion lens-model roll mirrored other-picture time-offset accumulated units
+        axes left-handed bit-depth picture-size"""
+    assert set(CAUSES) == set(names.split())
