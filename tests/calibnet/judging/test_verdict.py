@@ -97,6 +97,6 @@ def test_the_coefficients_that_ship_belong_to_the_weights_that_ship_and_find_wor
 
 
 def test_scripts_compare_the_names_of_causes_so_they_never_change() -> None:
-    names = """focal-length principal-point distortion lens-model roll mirrored other-picture time-offset accumulated units
-        axes left-handed bit-depth picture-size"""
+    names = """focal-length principal-point distortion lens-model roll mirrored other-picture time-offset accumulated
+        units axes left-handed bit-depth picture-size"""
     assert set(CAUSES) == set(names.split())
