@@ -12,7 +12,7 @@ import numpy as np
 
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Floats
-from calibnet.runtime.reading import TEXT_BYTES, read_text
+from calibnet.runtime.reading import read_lines
 from calibnet.runtime.text import number_of
 
 TIMES = "timestamps.txt"
@@ -183,7 +183,7 @@ def times_of(files: Mapping[str, Path]) -> Floats | None:
     """
     path = next(iter(files.values())).parent / TIMES
     if path.exists():
-        lines = [line.strip() for line in read_text(path, "Times", TEXT_BYTES).splitlines()]
+        lines = [line.strip() for line in read_lines(path, "Times")]
         words = [line for line in lines if line and not line.startswith("#")]
         words = _by_file(words, files) or words
         seconds = [_seconds(word) for word in words]

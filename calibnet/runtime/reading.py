@@ -20,7 +20,7 @@ import yaml
 from calibnet.errors import CalibnetError, DatasetError
 
 MEGABYTE = 1 << 20
-TEXT_BYTES = 16 * MEGABYTE
+TEXT_BYTES, MOST_LINES = 16 * MEGABYTE, 1_000_000
 """Largest size of a list of times or frames; that of a calibration, manifest or preset is `SETTINGS_BYTES`."""
 SETTINGS_BYTES = MEGABYTE // 4
 LFS_POINTER = b"version https://git-lfs.github.com/spec/"
@@ -149,6 +149,17 @@ def read_text(
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise error(f"{what} {path} cannot be read (it is not a text file in UTF-8); {remedy}.") from None
+
+
+def read_lines(path: Path, what: str, remedy: str = "restore it") -> list[str]:
+    """The lines of a list of times or frames; arguments and errors are those of `read_file`.
+
+    They are counted before they are split, since 16 MB may be as many lines.
+    """
+    text = read_text(path, what, TEXT_BYTES, DatasetError, remedy)
+    if text.count("\n") > MOST_LINES:
+        raise DatasetError(f"{what} {path} has more than {MOST_LINES:,} lines; {remedy}.")
+    return text.splitlines()
 
 
 def parse_yaml(text: str) -> Any:

@@ -131,6 +131,7 @@ def rows() -> Iterator[Row]:
         yield Row(f"time {text!r}", then(_times(text), *timed), FINE if "png" not in text else BAD)
     for text in ("0000-01-01 00:00:00", "2026-02-30 00:00:00", "2026-01-01 00:00:61", "nan", "1\x002", "0x1p3"):
         yield Row(f"time {text!r}", then(_times(text), *timed), BAD, ("is not a time",))
+    yield Row("eight million times", then(_times("1\n" * (8 << 20)), *timed), BAD, ("more than 1,000,000 lines",))
     yield Row("a --json that is an input under another name", _linked, BAD, ("is an input of this run",))
 
 

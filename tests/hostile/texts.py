@@ -67,6 +67,7 @@ BAD_TIMES = {
     "binary": "0.0\n\0\1\2\n",
     "two a line": "0.0 0.1\n0.2\n0.3\n",
     "5000 digits": "0.0\n" + "9" * 5000 + "\n0.2\n",
+    "sixteen million lines": "\n" * (16 << 20),
 }
 BAD_STAMPS = {
     "a word": "yesterday\n" * 3,
@@ -82,6 +83,7 @@ LISTS = {
     "latin-1": "000008\n\udce9\n",
     "a million of one": "000042\n" * 1_000_000,
     "a name of a million characters": "9" * 1_000_000,
+    "eight million of one": "1\n" * (8 << 20),
 }
 
 

@@ -12,7 +12,7 @@ from calibnet.datasets.calibration import Calibration, checked_intrinsics, check
 from calibnet.datasets.paired import FrameFiles
 from calibnet.errors import DatasetError
 from calibnet.geometry.types import Extrinsic, Floats
-from calibnet.runtime.reading import TEXT_BYTES, read_text
+from calibnet.runtime.reading import read_lines, read_text
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 NOMINAL_PERIOD = 0.1
@@ -126,7 +126,7 @@ def read_times(path: Path, seconds: Callable[[str], float]) -> list[float]:
     """
     remedy = "get it from KITTI"
     times = []
-    for number, line in enumerate(read_text(path, "List of times", TEXT_BYTES, remedy=remedy).splitlines(), start=1):
+    for number, line in enumerate(read_lines(path, "List of times", remedy), start=1):
         if not line.strip():
             continue
         try:

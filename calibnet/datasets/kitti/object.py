@@ -16,7 +16,7 @@ from calibnet.datasets.kitti.calibration import (
 from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
 from calibnet.errors import DatasetError
 from calibnet.geometry import transform
-from calibnet.runtime.reading import TEXT_BYTES, read_text
+from calibnet.runtime.reading import read_lines
 
 PARTS = ("training", "testing")
 
@@ -73,7 +73,7 @@ def _listed(folder: Path, split: str) -> list[str]:
     if not path.exists():
         present = ", ".join([*PARTS, *(file.stem for file in sorted(folder.glob("*.txt")))])
         raise DatasetError(f"{path} does not exist, so there is no split {split!r}; splits there: {present}.")
-    stems = read_text(path, "List of frames", TEXT_BYTES).split()
+    stems = [stem for line in read_lines(path, "List of frames") for stem in line.split()]
     if not stems:
         raise DatasetError(f"{path} is empty; list one frame per line, for instance 000007.")
     return stems
