@@ -18,6 +18,11 @@ LAS_HEADER, LAS_HEADER_1_4, LAS_POINT = 227, 375, 14
 """Sizes in bytes of the header of LAS 1.2 and 1.4, and of a point's position and intensity."""
 COMPRESSED = 128
 """Smallest number of a compressed point format (LAZ)."""
+LAS_RECORD, CHUNK_TABLE, AT_THE_END = 54, 8, -1
+"""Sizes in bytes of a record's header and of the head of LAZ's table of chunks, and the offset of one that a stream has
+at its end."""
+POINTS_PER_BYTE = 8
+"""Largest number of compressed points per byte of the file; a scan has less than one, even rounded to 5 cm."""
 LEAST_SECONDS, LONGEST_SECONDS, LONGEST_WAIT, MEGABYTES_BESIDE = 3, 8, 60, 2048
 """Limits for unpacking a scan: CPU seconds for a small one, and at most, growing by one per megabyte; seconds in total
 on a busy machine; and megabytes of memory besides its points. A megabyte of a valid scan takes a tenth of a second."""
@@ -66,7 +71,11 @@ def read_las(data: bytes) -> Columns:
         raise CloudError(f"its header states {count:,} points, but at most {MOST_POINTS:,} are read")
     if not LAS_POINT <= length <= LONGEST_ROW or not LAS_HEADER <= start <= len(data):
         raise CloudError("its header is damaged")
-    points = unpacked(data, count * length) if kind >= COMPRESSED else data[start : start + count * length]
+    if kind >= COMPRESSED:
+        _check_compressed(data, start, count)
+        points = unpacked(data, count * length)
+    else:
+        points = data[start : start + count * length]
     if len(points) < count * length:
         raise CloudError(f"it is truncated: its header states {count:,} points")
     layout = np.dtype({"names": ["xyz", "i"], "formats": [("<i4", 3), "<u2"], "offsets": [0, 12], "itemsize": length})
@@ -74,6 +83,27 @@ def read_las(data: bytes) -> Columns:
     with np.errstate(over="ignore", invalid="ignore"):
         positions = table["xyz"] * scales + offsets
     return {"x": positions[:, 0], "y": positions[:, 1], "z": positions[:, 2], "intensity": table["i"]}
+
+
+def _check_compressed(data: bytes, start: int, points: int) -> None:
+    """Check what the library takes as given, and would follow for seconds: how many records, chunks and points.
+
+    Args:
+        data: content of the whole file.
+        start: offset of the compressed points.
+        points: their number according to the header.
+
+    Raises:
+        CloudError: the file is damaged.
+    """
+    head, records = struct.unpack_from("<H4xI", data, 94)
+    if head + records * LAS_RECORD > start or points > len(data) * POINTS_PER_BYTE:
+        raise CloudError("its header is damaged")
+    table = struct.unpack_from("<q", data, start)[0] if start + CHUNK_TABLE <= len(data) else 0
+    if table == AT_THE_END:
+        table = struct.unpack_from("<q", data, len(data) - CHUNK_TABLE)[0]
+    if not start < table <= len(data) - CHUNK_TABLE or struct.unpack_from("<4xI", data, table)[0] > max(points, 1):
+        raise CloudError("it is truncated, or its table of chunks is damaged")
 
 
 def unpacked(data: bytes, most: int) -> bytes:

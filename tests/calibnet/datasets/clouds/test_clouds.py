@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pyarrow import feather, parquet
 
+from calibnet.datasets.clouds import tables
 from calibnet.datasets.clouds.bin import KITTI, LAYOUTS, read_bin, recognised
 from calibnet.datasets.clouds.columns import CloudError, intensity_name, points_of
 from calibnet.datasets.clouds.pcd import read_pcd
@@ -164,6 +166,30 @@ def test_a_damaged_table_is_one_sentence(suffix, damage, write_layout):
     path.write_bytes(damage(FILES[suffix]))
     with pytest.raises(DatasetError, match=path.name):
         layout.open()[1]
+
+
+START = struct.unpack_from("<I", FILES[".laz"], 96)[0]
+TABLE = struct.unpack_from("<q", FILES[".laz"], START)[0]
+
+
+@pytest.mark.parametrize(
+    ("form", "place", "value", "sentence"),
+    [
+        ("<I", 100, 1 << 24, "header"),
+        ("<I", 107, 15_000_000, "header"),
+        ("<q", START, 1 << 37, "table of chunks"),
+        ("<q", START, START, "table of chunks"),
+        ("<q", START, -1, "table of chunks"),
+        ("<I", TABLE + 4, 1 << 30, "table of chunks"),
+    ],
+)
+def test_what_would_keep_the_unpacker_busy_is_found_before(form, place, value, sentence, monkeypatch):
+    """The first and the third alone took all of its seconds."""
+    monkeypatch.setattr(tables, "unpacked", lambda *_: pytest.fail("it is unpacked"))
+    data = bytearray(FILES[".laz"])
+    struct.pack_into(form, data, place, value)
+    with pytest.raises(CloudError, match=sentence):
+        tables.read_las(bytes(data))
 
 
 def test_a_table_without_a_coordinate_names_what_it_has(write_layout):
