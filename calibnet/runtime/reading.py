@@ -30,10 +30,14 @@ DEEPEST = 24
 
 Identity = tuple[int, int]
 """Device and inode, which are the same for two paths to one file."""
+Version = tuple[int, int]
+"""Size, and time of the last change."""
 Loaded = TypeVar("Loaded")
 
 _inputs: set[Identity] | None = None
 """Files that the run reads; None outside of `protecting_inputs`."""
+_versions: dict[Path, Version] = {}
+"""Files that it will read more than once, as they were when it began."""
 
 
 class TooLargeError(OSError):
@@ -42,22 +46,27 @@ class TooLargeError(OSError):
 
 @contextmanager
 def protecting_inputs() -> Iterator[None]:
-    """A context that remembers which files are read, so that none of them is replaced (`is_input`)."""
-    global _inputs
-    before, _inputs = _inputs, set()
+    """A context that remembers which files are read, so that none of them is replaced (`is_input`) or changes."""
+    global _inputs, _versions
+    before, _inputs, _versions = (_inputs, _versions), set(), {}
     try:
         yield
     finally:
-        _inputs = before
+        _inputs, _versions = before
 
 
 def register_input(path: Path) -> None:
-    """Remember a file that will be read later; a missing one is ignored."""
+    """Remember a file that will be read later, perhaps several times; a missing one is ignored.
+
+    It is refused once it has changed, since a result from both of its versions would be one of neither.
+    """
     if _inputs is not None:
         try:
-            _inputs.add(_identity(path.stat()))
+            status = path.stat()
         except OSError:
             return
+        _inputs.add(_identity(status))
+        _versions[path] = _version(status)
 
 
 def is_input(status: os.stat_result) -> bool:
@@ -74,7 +83,8 @@ def open_file(path: Path, largest: int | None = None, remember: bool = True) -> 
         remember: whether it is an input of the run.
 
     Raises:
-        OSError: it is missing, cannot be read, is not a regular file, or is too large (`TooLargeError`).
+        OSError: it is missing, cannot be read, is not a regular file, is too large (`TooLargeError`), or has changed
+            since `register_input`.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
@@ -86,6 +96,8 @@ def open_file(path: Path, largest: int | None = None, remember: bool = True) -> 
             raise OSError(0, f"it is {kind_of(status.st_mode)}, not a file", str(path))
         if largest is not None and status.st_size > largest:
             raise TooLargeError(0, _too_large(status.st_size, largest), str(path))
+        if remember and _versions.get(path, _version(status)) != _version(status):
+            raise OSError(0, "it has changed since this run began", str(path))
     except BaseException:
         os.close(descriptor)
         raise
@@ -264,6 +276,10 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def _identity(status: os.stat_result) -> Identity:
     return status.st_dev, status.st_ino
+
+
+def _version(status: os.stat_result) -> Version:
+    return status.st_size, status.st_mtime_ns  # some network file systems number files anew
 
 
 def _too_large(size: int, largest: int) -> str:

@@ -127,3 +127,20 @@ def test_what_git_lfs_left_is_called_so(tmp_path: Path) -> None:
     file.write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 12\n")
     with pytest.raises(DatasetError, match=r"0000\.bin cannot be read \(Git LFS left a pointer .* 'git lfs pull'\)"):
         read_file(file, "Scan", 1000)
+
+
+@pytest.mark.parametrize("change", ["longer", "another"])
+def test_a_file_that_is_read_again_must_not_have_changed(tmp_path: Path, change: str) -> None:
+    image = tmp_path / "0000.png"
+    image.write_bytes(b"first")
+    with protecting_inputs():
+        register_input(image)
+        assert read_file(image, "Image", 100) == b"first"
+        image.write_bytes({"longer": b"first and more", "another": b"other"}[change])
+        os.utime(image, ns=(0, 10**18))
+        with pytest.raises(
+            DatasetError, match=r"Image .*0000\.png cannot be read \(it has changed since this run began"
+        ):
+            read_file(image, "Image", 100)
+    with protecting_inputs():
+        read_file(image, "Image", 100)
