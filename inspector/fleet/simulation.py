@@ -20,7 +20,7 @@ from numpy.random import Generator
 from calibnet.datasets.frame import Frame
 from calibnet.datasets.synthetic import KITTI_LIKE, SyntheticSequence
 from calibnet.errors import ConfigError
-from calibnet.geometry import miscalibration
+from calibnet.geometry import invert, miscalibration
 from calibnet.geometry.types import Transform
 from calibnet.runtime.writing import write_whole
 
@@ -40,12 +40,22 @@ LIST, TRUTH = "DRIVES.csv", "truth.csv"
 
 @dataclass(frozen=True)
 class Simulated:
-    """A drive to be written."""
+    """A drive to be written.
+
+    Attributes:
+        car: number of the car.
+        drive: number of the drive, of that car.
+        street: number of the street.
+        delta: error of its calibration where the mount has not moved.
+        move: the mount's move, which the calibration does not know; identity for none.
+        fault: what is wrong with it.
+    """
 
     car: int
     drive: int
     street: int
     delta: Transform
+    move: Transform
     fault: Fault
 
 
@@ -112,14 +122,17 @@ def draw(count: int, streets: int, generator: Generator) -> list[Simulated]:
             fault = "camera"
         elif car in moving and drive >= DRIVES_A_CAR // 2:
             fault = "moved"
-        fleet.append(Simulated(car, drive, number % streets, _delta(car, fault, generator), fault))
+        fleet.append(Simulated(car, drive, number % streets, _delta(generator), _move(car, fault), fault))
     return fleet
 
 
-def _delta(car: int, fault: Fault, generator: Generator) -> Transform:
-    """The error of a drive's calibration."""
+def _delta(generator: Generator) -> Transform:
+    return miscalibration(generator.normal(0.0, SMALL_DEG, 3), generator.normal(0.0, SMALL_M, 3))
+
+
+def _move(car: int, fault: Fault) -> Transform:
     if fault != "moved":
-        return miscalibration(generator.normal(0.0, SMALL_DEG, 3), generator.normal(0.0, SMALL_M, 3))
+        return np.eye(4)
     moves = np.random.default_rng([car, 23])  # the same for all drives of the car
     turn, shift = moves.normal(size=3), moves.normal(size=3)
     return miscalibration(MOVED_DEG * turn / np.linalg.norm(turn), MOVED_M * shift / np.linalg.norm(shift))
@@ -132,14 +145,20 @@ def _write_frame(frame: Frame, folder: Path) -> None:
 
 
 def _write_drive(one: Simulated, folder: Path) -> None:
-    """Write a plain folder with a calibration, whose frames are links into the street."""
+    """Write a plain folder with a calibration, whose frames are links into the street.
+
+    Where the mount has moved, the scans are written as the LiDAR sees them from there.
+    """
     street, drive = folder / "streets" / str(one.street), folder / _path(one)
     drive.mkdir(parents=True)
     for name in ("images", "clouds"):
-        if one.fault == "truncated" and name == "clouds":
+        if one.fault in ("truncated", "moved") and name == "clouds":
             shutil.copytree(street / name, drive / name)
             for scan in sorted((drive / name).iterdir()):
-                os.truncate(scan, 1001)
+                if one.fault == "truncated":
+                    os.truncate(scan, 1001)
+                else:
+                    _move_scan(scan, one.move)
         else:
             (drive / name).symlink_to(Path(os.path.relpath(street / name, drive)))
     matrix = KITTI_LIKE.camera.matrix.copy()
@@ -153,6 +172,14 @@ def _write_drive(one: Simulated, folder: Path) -> None:
         "camera_from_lidar": (one.delta @ KITTI_LIKE.camera_from_lidar).tolist(),
     }
     write_whole(drive / "calibration.yaml", yaml.safe_dump(calibration).encode())
+
+
+def _move_scan(file: Path, move: Transform) -> None:
+    """Rewrite a scan so that ``move @ camera_from_lidar`` puts its points where they were seen."""
+    points = np.fromfile(file, "<f4").reshape(-1, 4)
+    here = invert(move @ KITTI_LIKE.camera_from_lidar) @ KITTI_LIKE.camera_from_lidar
+    points[:, :3] = points[:, :3] @ here[:3, :3].T + here[:3, 3]
+    file.write_bytes(points.astype("<f4").tobytes())
 
 
 def _path(one: Simulated) -> str:

@@ -38,9 +38,10 @@ def test_every_fault_is_drawn_and_a_mount_stays_where_it_moved_to() -> None:
     }
     moved = [one for one in fleet if one.fault == "moved"]
     assert len({one.car for one in moved}) == 1
-    assert all(np.array_equal(one.delta, moved[0].delta) for one in moved)
-    error = pose_error(moved[0].delta, np.eye(4))
+    assert all(np.array_equal(one.move, moved[0].move) for one in moved)
+    error = pose_error(moved[0].move, np.eye(4))
     assert error.rotation_deg == pytest.approx(2.0, abs=0.02)
+    assert all(np.array_equal(one.move, np.eye(4)) for one in fleet if one.fault != "moved")
 
 
 def test_the_drives_are_what_the_truth_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,6 +49,8 @@ def test_the_drives_are_what_the_truth_says(tmp_path: Path, monkeypatch: pytest.
     file = simulate(tmp_path / "fleet", 20, 0, frames=2)
     with (tmp_path / "fleet" / "truth.csv").open() as text:
         truth = {(row["car"], row["drive"]): row["fault"] for row in csv.DictReader(text)}
+    drawn = draw(20, 4, np.random.default_rng([0, 22]))
+    moves = {(f"car-{one.car:04d}", f"drive-{one.drive:02d}"): one.move for one in drawn}
     drives = find_drives([str(file)])
     assert len(drives) == len(truth) == 20
     assert sum(1 for _ in (tmp_path / "fleet" / "streets").rglob("*.png")) == 8, "frames are written once"
@@ -57,10 +60,17 @@ def test_the_drives_are_what_the_truth_says(tmp_path: Path, monkeypatch: pytest.
         assert len(sequence) == 2
         camera, extrinsic = sequence.calibration.camera, sequence.calibration.camera_from_lidar  # type: ignore[attr-defined]
         assert camera.matrix[0, 0] == pytest.approx(720.0 * (FOCAL if fault == "camera" else 1.0))
-        assert (pose_error(extrinsic, KITTI_LIKE.camera_from_lidar).rotation_deg > 1.0) == (fault == "moved")
+        error = pose_error(extrinsic, KITTI_LIKE.camera_from_lidar)
+        assert error.rotation_deg < 1.0 and error.translation_cm < 10.0, "a moved mount keeps its calibration"
         if fault == "truncated":
             with pytest.raises(DatasetError):
                 sequence[0]
+            continue
+        scan = np.fromfile(Path(drive.path) / "clouds" / "0000.bin", "<f4").reshape(-1, 4)
+        seen, there = np.c_[scan[:, :3], np.ones(len(scan))], np.c_[make_frame(0).points[:, :3], np.ones(len(scan))]
+        true = KITTI_LIKE.camera_from_lidar
+        assert (np.abs(seen - there).max() > 0.1) == (fault == "moved")
+        np.testing.assert_allclose(seen @ (moves[drive.car, drive.drive] @ true).T, there @ true.T, atol=1e-3)
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
