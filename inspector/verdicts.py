@@ -51,7 +51,7 @@ def title(verdict: Verdict) -> str:
 
 def certainty(verdict: Verdict) -> str:
     """Uncertainty of the result in degrees and centimetres; empty where there is none, or the reason has one."""
-    if verdict.covariance is None or "±" in verdict.reason:
+    if verdict.covariance is None or "±" in verdict.reason or "1σ" in verdict.reason:
         return ""
     return f"±{degrees_and_cm(verdict.sigma_rotation_deg, verdict.sigma_translation_cm)} (1σ)."
 

@@ -8,6 +8,7 @@ calibrates some frames from all over the sequence as the commands do.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import re
 import sys
 from pathlib import Path
@@ -21,6 +22,8 @@ INCOMPATIBLE = 66
 MOST_FRAMES = 24
 """Largest number of frames calibrated: the viewer waits for them, and `calib-inspect seq` records them all."""
 RANGE = "5/0.5"
+DEEPEST = 3
+"""Largest number of folders between a file and the folder that is recognised, itself counted."""
 RAW_DRIVE = re.compile(r"(\d{4}_\d{2}_\d{2})_drive_(\d{4})_(?:sync|extract)")
 
 
@@ -55,8 +58,12 @@ def recognise(path: Path) -> Recognised | None:
     return None
 
 
-def import_folder(found: Recognised) -> None:
+def import_folder(found: Recognised, joins: tuple[str, str] | None) -> None:
     """Calibrate and write the recording to stdout.
+
+    Args:
+        found: the folder.
+        joins: ids of the viewer's own recording of it, see `ids`.
 
     Raises:
         CalibnetError: the folder cannot be read, or no frame can be calibrated.
@@ -86,23 +93,47 @@ def import_folder(found: Recognised) -> None:
         skipped=cascade.skipped,
         start=start,
         outputs=Outputs(),
-        description=RunDescription(title, identity),
+        description=RunDescription(title, identity, joins=joins),
         contents=Contents.of(Detail.OVERVIEW),
+        drive=len(positions) > 1,
         console=Console(quiet=True),
     ).run()
 
 
+def ids(options: list[str]) -> tuple[str, str] | None:
+    """The application and the recording id that the viewer gives its own recording of the path, if it says so.
+
+    What is written under these joins that recording. Under an id of its own it would be a second one, behind images
+    without a layout.
+    """
+    given = dict(itertools.pairwise(options))
+    application, recording = given.get("--application-id"), given.get("--recording-id")
+    return (application, recording) if application and recording else None
+
+
+def is_read_already(path: Path, application: str) -> bool:
+    """Whether a file belongs to a folder of ours that the viewer opens, which names its application after the folder.
+
+    The viewer asks for each of its files as well, and reports those that nobody takes as errors.
+    """
+    above = path.resolve().parents[:DEEPEST]
+    return any(folder.name == application and recognise(folder) is not None for folder in above)
+
+
 def main() -> None:
     """Entry point of the console script."""
-    found = None
+    found, joins = None, ids(sys.argv[2:])
     with contextlib.suppress(OSError, IndexError):
-        found = recognise(Path(sys.argv[1]))
+        path = Path(sys.argv[1])
+        found = recognise(path)
+        if found is None and joins and is_read_already(path, joins[0]):
+            sys.exit(0)
     if found is None:
         sys.exit(INCOMPATIBLE)
     from calibnet.errors import CalibnetError
 
     try:
-        import_folder(found)
+        import_folder(found, joins)
     except (CalibnetError, OSError):
         sys.exit(INCOMPATIBLE)
 

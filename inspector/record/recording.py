@@ -46,15 +46,24 @@ class RunDescription:
         title: title in the viewer's list of recordings, for instance ``"kitti-odometry/04"``.
         options: all options that affect the data, such as seed, range and preset.
         provenance: further information, such as versions, which is not part of the identity.
+        joins: application and recording id of a recording that this one becomes part of; None for its own.
     """
 
     title: str
     options: dict[str, Any]
     provenance: dict[str, Any] = field(default_factory=dict)
+    joins: tuple[str, str] | None = None
+
+    @property
+    def application_id(self) -> str:
+        """Ours, or that of the recording that it joins."""
+        return self.joins[0] if self.joins else entities.APPLICATION_ID
 
     @property
     def recording_id(self) -> str:
-        """An id that depends only on title and options."""
+        """An id that depends only on title and options, or that of the recording that it joins."""
+        if self.joins:
+            return self.joins[1]
         text = repr((self.title, sorted(self.options.items())))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -76,7 +85,7 @@ class Recording:
         self._flushed = 0
         self._worst = -math.inf
         blueprint = make_blueprint(layout, self._tabs)
-        self._stream = Stream(entities.APPLICATION_ID, description.recording_id, description.title, sinks, blueprint)
+        self._stream = Stream(description.application_id, description.recording_id, description.title, sinks, blueprint)
         self._stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         provenance = rr.AnyValues(**description.provenance, **_described(layout))
         self._stream.rec.send_property(entities.PROVENANCE, provenance)

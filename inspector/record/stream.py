@@ -81,7 +81,8 @@ class Stream:
             if sinks:
                 rec.set_sinks(*sinks, default_blueprint=blueprint)
             else:
-                rec.stdout(default_blueprint=blueprint)
+                rec.stdout()
+                rec.send_blueprint(blueprint)  # at once: the viewer has made a layout of its own for what it imports
         return rec
 
     def close(self, advance: Callable[[int, int], bool] | None = None) -> None:

@@ -24,7 +24,7 @@ from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.table import matrix_lines
 from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
-from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
+from inspector.verdicts import OF_GIVEN, OF_RESULT, certainty, markdown_lines
 
 NAME = "Whole drive as one"
 
@@ -151,7 +151,7 @@ def _lines(
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     if estimate.verdict is not None:
         lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
-        if estimate.verdict.covariance is not None:
+        if certainty(estimate.verdict):
             lines.pop()  # uncertainty and error form one paragraph
     solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"
     if reference is not None:

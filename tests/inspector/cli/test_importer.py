@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
+from rerun.chunk import RrdReader
 
-from inspector.cli.importer import INCOMPATIBLE, recognise
+from inspector.cli.importer import INCOMPATIBLE, ids, is_read_already, recognise
+from tests.support.folder import write_folder
 
 
 def make(root: Path, *names: str) -> Path:
@@ -51,6 +53,36 @@ def test_own_sensors_start_from_their_guess(tmp_path: Path) -> None:
 )
 def test_other_folders_are_not_ours(tmp_path: Path, names: tuple[str, ...]) -> None:
     assert recognise(make(tmp_path, *names)) is None
+
+
+def test_files_of_an_opened_folder_are_taken_and_others_are_not(tmp_path: Path) -> None:
+    car = make(tmp_path / "car", "images", "clouds/0000.bin", "calibration.yaml", "clouds/deep/er/0000.bin")
+    drive = make(tmp_path / "sequences" / "04", "image_2", "velodyne/000000.bin", "calib.txt")
+    assert is_read_already(car / "clouds" / "0000.bin", "car")
+    assert is_read_already(car / "calibration.yaml", "car")
+    assert is_read_already(drive / "velodyne" / "000000.bin", "04")
+    assert not is_read_already(car / "clouds" / "0000.bin", "0000.bin"), "it is opened by itself"
+    assert not is_read_already(car / "clouds" / "deep" / "er" / "0000.bin", "car")
+    assert not is_read_already(make(tmp_path / "other", "a.bin") / "a.bin", "other")
+
+
+def test_the_viewer_says_which_recording_it_has_begun() -> None:
+    assert ids(["--application-id", "car", "--recording-id", "rec_1", "--static"]) == ("car", "rec_1")
+    assert ids(["--application-id", "car"]) is None
+    assert ids([]) is None
+
+
+def test_what_it_writes_is_part_of_the_viewers_own_recording(tmp_path: Path) -> None:
+    car = write_folder(tmp_path / "car", 2)
+    code = f"import sys; sys.argv = ['importer', {str(car)!r}, '--application-id', 'car', '--recording-id', 'rec_1']\n"
+    code += "from calibnet.cascade.cascade import Cascade\nfrom tests.support.fakes import FakeCascade\n"
+    code += "Cascade.load = lambda **_: FakeCascade()\nfrom inspector.cli.importer import main\nmain()\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    file = tmp_path / "imported.rrd"
+    file.write_bytes(done.stdout)
+    stores = RrdReader(file)
+    assert [(one.application_id, one.recording_id) for one in stores.recordings()] == [("car", "rec_1")]
+    assert [one.application_id for one in stores.blueprints()] == ["car"]
 
 
 def test_the_exit_code_is_reruns() -> None:
