@@ -1,7 +1,7 @@
 """A frame and a cascade without data sets, weights or torch: small, seeded and self-consistent.
 
 The volumes peak where the points truly belong and every stage leaves a third of the error, so that
-tests and pictures show what a working cascade would.
+tests and images show what a working cascade would.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REFERENCE = transform(AXES_CAMERA_FROM_LIDAR, [0.06, -0.08, -0.27])
 
 
 def make_frame(index: int = 0, width: int = 400, height: int = 120, points: int = 6000) -> Frame:
-    """A wall, a road and a smooth picture."""
+    """A wall, a road and a smooth image."""
     generator = np.random.default_rng(index)
     matrix = np.array([[0.58 * width, 0.0, width / 2], [0.0, 0.58 * width, height / 2], [0.0, 0.0, 1.0]])
     azimuth = generator.uniform(-0.9, 0.9, points)

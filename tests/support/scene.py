@@ -1,4 +1,4 @@
-"""A scene whose picture shows its depth: boxes before a wall, scanned from the camera's own place."""
+"""A scene whose image shows its depth: boxes before a wall, scanned from the camera's own place."""
 
 from __future__ import annotations
 

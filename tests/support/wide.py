@@ -1,4 +1,4 @@
-"""A fisheye that sees 183 degrees, and a scan all around it whose points are dots in its picture."""
+"""A fisheye that sees 183 degrees, and a scan all around it whose points are dots in its image."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def turned(degrees: float) -> Transform:
 
 
 def make_wide(on_its_head: bool = False, seed: int = 0) -> Frame:
-    """A frame; on its head its picture is turned by 180 degrees, and nothing else is another."""
+    """A frame; on its head its image is turned by 180 degrees, and nothing else is another."""
     generator = np.random.default_rng(seed)
     directions = generator.normal(size=(6000, 3)) * [1.0, 0.25, 1.0]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

@@ -49,7 +49,7 @@ def test_terms_without_points_are_left_out() -> None:
     assert gather(boxes(), miscalibration([0, 0, 120], [0, 0, 0]) @ REFERENCE).terms == ()
 
 
-def test_a_grey_picture_pulls_nowhere() -> None:
+def test_a_grey_image_pulls_nowhere() -> None:
     value, gradient = gather(boxes(picture=False), REFERENCE)(pose_from_vector(np.full(6, 0.01)))
     assert np.isfinite(value) and np.abs(gradient).max() < 1e-6
 
@@ -91,7 +91,7 @@ def test_few_points_count_by_their_share() -> None:
 
 
 @pytest.mark.parametrize("size", [(1, 64), (2, 2), (40, 1)])
-def test_pictures_of_any_size_and_spoilt_scans_are_taken(size: tuple[int, int]) -> None:
+def test_images_of_any_size_and_spoilt_scans_are_taken(size: tuple[int, int]) -> None:
     frame = boxes()
     camera = PinholeCamera(size[1], size[0], np.array([[50.0, 0, size[1] / 2], [0, 50.0, size[0] / 2], [0, 0, 1]]))
     points = frame.points.copy()

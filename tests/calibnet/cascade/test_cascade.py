@@ -79,7 +79,7 @@ def test_stages_follow_one_another(trace: CascadeTrace) -> None:
     assert np.array_equal(trace.arrived, trace.stages[-1].after)
 
 
-def test_what_the_picture_does_not_confirm_is_not_applied(frame: Frame, trace: CascadeTrace) -> None:
+def test_what_the_image_does_not_confirm_is_not_applied(frame: Frame, trace: CascadeTrace) -> None:
     last = trace.stages[-1]
     assert trace.fits and last.match_error_px > 0.5 and not np.array_equal(trace.arrived, INITIAL)
     doubting = cascade(limit=last.match_error_px - 0.01).calibrate(frame, INITIAL)
@@ -104,7 +104,7 @@ def test_only_the_finest_stage_judges(frame: Frame) -> None:
     assert coarse.fits and np.array_equal(coarse.arrived, coarse.stages[-1].after)
 
 
-def test_a_drive_of_pictures_that_fit_no_scan_has_no_estimate(frame: Frame) -> None:
+def test_a_drive_of_images_that_fit_no_scan_has_no_estimate(frame: Frame) -> None:
     with pytest.raises(CalibrationError, match=r"scan of frame 3 .* do not fit together after stage 5, .* px off"):
         cascade(limit=0.01).calibrate_drive([frame, frame], INITIAL)
 
@@ -285,7 +285,7 @@ def test_networks_with_image_branches_of_their_own_use_them(frame: Frame, monkey
     monkeypatch.setattr(stage_module, "resize_image", lambda *seen: sizes.append(seen) or resized(*seen))
     different = cascade(shared=False)
     trace = different.calibrate(frame, INITIAL)
-    assert (len(calls), len(sizes)) == (3, 1), "but one picture, where they see it at one size"
+    assert (len(calls), len(sizes)) == (3, 1), "but one image, where they see it at one size"
     before = INITIAL
     for stage in different.stages:
         before = Cascade([stage]).calibrate(frame, before).arrived

@@ -133,7 +133,7 @@ def test_no_face_shows_the_scan():
         cascade().calibrate(frame, MOUNT)
 
 
-def test_edges_of_all_faces_are_evidence_of_the_camera_as_one_picture():
+def test_edges_of_all_faces_are_evidence_of_the_camera_as_one_image():
     """Its value is the mean of what each face says of the correction in its own axes."""
     frame = make_wide()
     correction = pose_from_vector(np.array([0.02, -0.01, 0.015, 0.003, -0.002, 0.004]))

@@ -1,4 +1,4 @@
-"""Cameras at any roll: the picture is turned upright, and what the stages find is turned back."""
+"""Cameras at any roll: the image is turned upright, and what the stages find is turned back."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def roll(degrees: float) -> np.ndarray:
 
 
 def dots(degrees: float) -> Frame:
-    """A camera at a roll, and a picture with a dot where each of its points is."""
+    """A camera at a roll, and an image with a dot where each of its points is."""
     extrinsic = roll(degrees) @ REFERENCE
     camera = PinholeCamera(256, 96, MATRIX)
     upright = np.array([[-1.6, -0.2, 9.0], [0.4, 0.6, 5.0], [2.5, -0.7, 12.0], [0.1, 0.1, 30.0]])
@@ -105,12 +105,12 @@ def test_quarter_turns_keep_every_pixel(degrees, clockwise):
     assert (upright.camera.width, upright.camera.height) == upright.image.shape[1::-1]
 
 
-def test_a_turned_picture_is_cut_to_where_it_mostly_is():
+def test_a_turned_image_is_cut_to_where_it_mostly_is():
     image = np.full((300, 400, 3), 200, np.uint8)
     matrix = np.array([[300.0, 0, 199.5], [0, 300.0, 149.5], [0, 0, 1.0]])
     frame = Frame(0, 0.0, image, np.zeros((1, 4), np.float32), PinholeCamera(400, 300, matrix), roll(30) @ REFERENCE)
     upright = Upright.of(frame.camera_from_lidar, NARROW).frame(frame)
-    assert (upright.image == 200).all(), "beyond its border the picture goes on"
+    assert (upright.image == 200).all(), "beyond its border the image goes on"
     # 400x300 turned by 30 degrees is 496x460; rows of a third of the fullest begin where its corners are as wide
     widest = 400 / np.cos(np.radians(30))
     wide = 1 / np.tan(np.radians(30)) + np.tan(np.radians(30))  # a corner widens by so much a row
@@ -119,8 +119,8 @@ def test_a_turned_picture_is_cut_to_where_it_mostly_is():
     assert upright.camera.center[1] == pytest.approx((upright.camera.height - 1) / 2, abs=2)
 
 
-def test_black_borders_are_no_picture():
-    """A picture that somebody has turned before has them."""
+def test_black_borders_are_no_image():
+    """An image that somebody has turned before has them."""
     frame = dots(0)
     canvas = np.zeros((256, 256, 3), np.uint8)
     canvas[80:176] = frame.image

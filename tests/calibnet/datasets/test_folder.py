@@ -292,7 +292,7 @@ def test_two_files_of_one_stem(write_layout):
 
 
 @pytest.mark.parametrize("bits", [8, 16])
-def test_pictures_in_pgm(bits, write_layout):
+def test_images_in_pgm(bits, write_layout):
     layout = write_layout("folder")
     grey = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in layout.images]
     for path, picture in zip(layout.images, grey, strict=True):

@@ -57,7 +57,7 @@ def scene(seed: int = 0) -> np.ndarray:
         ((900.0, 900.0, 639.5, -400.0), [("principal-point", True)]),
     ],
 )
-def test_the_camera_matrix_against_its_picture(values, found):
+def test_the_camera_matrix_against_its_image(values, found):
     assert names(of_camera(camera(*values))) == found
 
 
@@ -99,7 +99,7 @@ def test_the_scan_against_the_world(change, found):
 
 
 def texture(seed: int = 0) -> np.ndarray:
-    """A smooth 12-bit picture, 0..4095, that uses the whole range."""
+    """A smooth 12-bit image, 0..4095, that uses the whole range."""
     noise = np.random.default_rng(seed).uniform(0, 4095, (9, 16, 3)).astype(np.float32)
     return cv2.resize(noise, (1280, 720), interpolation=cv2.INTER_CUBIC).clip(0, 4095)
 
@@ -115,11 +115,11 @@ def texture(seed: int = 0) -> np.ndarray:
         (lambda picture: picture.astype(np.int64) % 256, [("bit-depth", False)]),  # the upper four bits cut off
     ],
 )
-def test_the_picture_against_its_bits(change, found):
+def test_the_image_against_its_bits(change, found):
     assert names([bit_depth(change(texture()).astype(np.uint8))]) == found
 
 
-def test_a_picture_of_a_bayer_sensor_is_known_by_its_neighbours():
+def test_an_image_of_a_bayer_sensor_is_known_by_its_neighbours():
     colours = (texture() / 16).astype(np.uint8)
     grey = np.repeat(colours[..., 1:2], 3, axis=2)
     raw = colours[..., 1].copy()
@@ -129,7 +129,7 @@ def test_a_picture_of_a_bayer_sensor_is_known_by_its_neighbours():
 
 
 @pytest.mark.parametrize("bits", [8, 10, 12, 14, 16])
-def test_a_picture_of_16_bits_is_read_as_bright_as_its_camera_meant_it(bits, tmp_path):
+def test_an_image_of_16_bits_is_read_as_bright_as_its_camera_meant_it(bits, tmp_path):
     """Cameras give 10 or 12 bits and files hold 16: read as the latter they would be almost black."""
     levels = np.random.default_rng(bits).integers(0, 256, (40, 50, 3)).astype(np.uint8)
     levels[0, 0] = 255
@@ -168,8 +168,8 @@ def test_millimetres_are_refused_with_the_scan_s_name(write_layout):
     assert caught.value.cause == "units" and isinstance(caught.value, DatasetError)
 
 
-def test_pictures_that_were_shrunk_without_their_matrix_are_refused(write_layout):
-    """Also where the format has no picture size of its own."""
+def test_images_that_were_shrunk_without_their_matrix_are_refused(write_layout):
+    """Also where the format has no image size of its own."""
     layout = write_layout("kitti-odometry")
     for path in layout.images:
         cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), (32, 24)))
@@ -210,7 +210,7 @@ def test_the_first_suspect_is_named():
         ((1e200,) * 5, False),
     ],
 )
-def test_a_lens_that_leaves_nothing_of_the_picture_is_none(coefficients: tuple[float, ...], known: bool) -> None:
+def test_a_lens_that_leaves_nothing_of_the_image_is_none(coefficients: tuple[float, ...], known: bool) -> None:
     model = "plumb_bob" if len(coefficients) == 5 else "rational_polynomial"
     matrix = np.array([[700.0, 0.0, 640.0], [0.0, 700.0, 360.0], [0.0, 0.0, 1.0]])
     found = distortion(CameraModel(1280, 720, matrix, model, np.array(coefficients)))

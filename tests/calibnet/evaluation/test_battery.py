@@ -62,7 +62,7 @@ def test_rates_of_nothing_are_null() -> None:
 
 
 class HalfWay:
-    """A calibrator that finds everything but does not run on grey pictures."""
+    """A calibrator that finds everything but does not run on grey images."""
 
     def calibrate(self, frame: Frame, initial: Extrinsic, detail: bool = False) -> CascadeTrace:
         if frame.image.min() == 128:

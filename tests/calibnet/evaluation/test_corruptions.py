@@ -36,7 +36,7 @@ def seen_at(frame: Frame, point: tuple[float, float, float]) -> tuple[float, flo
     return float(u), float(v)
 
 
-def test_a_rolled_picture_s_truth_is_rolled_with_it() -> None:
+def test_a_rolled_image_s_truth_is_rolled_with_it() -> None:
     # 10 m ahead, 2 m to the left: at u = 511.5 - 116 = 395.5, v = 159.5
     frame = replace(FRAME, image=spot(395, 159))
     assert seen_at(frame, (10, 2, 0)) == pytest.approx((395.5, 159.5), abs=0.01)
@@ -45,7 +45,7 @@ def test_a_rolled_picture_s_truth_is_rolled_with_it() -> None:
     assert seen_at(rolled, (10, 2, 0))[1] < 159.5 - 35  # clockwise: what was left is up
 
 
-def test_a_shifted_picture_keeps_its_truth() -> None:
+def test_a_shifted_image_keeps_its_truth() -> None:
     shifted = faults.shifted(60, -20)(replace(FRAME, image=spot(400, 100)))
     scale = 1024 / 1242
     assert brightest(shifted.image) == pytest.approx((400 + 60 * scale, 100 - 20 * scale), abs=0.6)
@@ -53,7 +53,7 @@ def test_a_shifted_picture_keeps_its_truth() -> None:
 
 
 @pytest.mark.parametrize("k1", [-0.2, 0.1])
-def test_a_distorted_picture_shows_a_point_where_opencv_s_lens_does(k1: float) -> None:
+def test_a_distorted_image_shows_a_point_where_opencv_s_lens_does(k1: float) -> None:
     frame = faults.distorted(k1)(replace(FRAME, image=spot(711, 219)))
     ray = np.array([[(711 - 511.5) / 580, (219 - 159.5) / 580, 1.0]])
     place, _ = cv2.projectPoints(ray, np.zeros(3), np.zeros(3), frame.camera.matrix, np.array([k1, 0.0, 0.0, 0.0]))
@@ -61,7 +61,7 @@ def test_a_distorted_picture_shows_a_point_where_opencv_s_lens_does(k1: float) -
     assert frame.image.shape[:2] == (frame.camera.height, frame.camera.width)
 
 
-def test_an_equidistant_picture_shows_a_point_where_opencv_s_fisheye_does() -> None:
+def test_an_equidistant_image_shows_a_point_where_opencv_s_fisheye_does() -> None:
     frame = faults.equidistant(replace(FRAME, image=spot(711, 219)))
     ray = np.array([[[(711 - 511.5) / 580, (219 - 159.5) / 580, 1.0]]])
     place, _ = cv2.fisheye.projectPoints(ray, np.zeros(3), np.zeros(3), frame.camera.matrix, np.zeros(4))
@@ -77,7 +77,7 @@ def test_the_matrix_of_another_size_and_a_wrong_lens_are_what_is_said_not_what_i
     assert moved.center == pytest.approx((511.5 + 60 * 1024 / 1242, 159.5)) and moved.focal == (580.0, 580.0)
 
 
-def test_bytes_of_a_picture_with_more_bits() -> None:
+def test_bytes_of_an_image_with_more_bits() -> None:
     image = np.arange(256, dtype=np.uint8).reshape(16, 16, 1).repeat(3, axis=2)
     frame = replace(FRAME, image=image)
     assert faults.high_byte(12)(frame).image.max() == 15
@@ -85,7 +85,7 @@ def test_bytes_of_a_picture_with_more_bits() -> None:
     assert (low // 16 == image % 16).all()  # 12 bits are 16 times as bright, and go round after 16 steps
 
 
-def test_an_over_exposed_picture_is_white_where_it_was_bright() -> None:
+def test_an_over_exposed_image_is_white_where_it_was_bright() -> None:
     image = np.full((4, 4, 3), 30, np.uint8)
     image[0] = 100
     exposed = faults.exposed(4)(replace(FRAME, image=image)).image

@@ -1,4 +1,4 @@
-"""Virtual rigs: their truth is exact, so a point is seen where its picture is."""
+"""Virtual rigs: their truth is exact, so a point is seen where its image is."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ FRAME = boxes()
     ],
     ids=["itself", "narrower", "turned", "drawn"],
 )
-def test_a_point_is_seen_where_the_virtual_picture_shows_it(rig: VirtualRig) -> None:
+def test_a_point_is_seen_where_the_virtual_image_shows_it(rig: VirtualRig) -> None:
     # 10 m ahead, 1 m to the left, in the LiDAR frame
     point = np.array([[10.0, 1.0, 0.2, 0.5]], np.float32)
     u, v = project(point, FRAME.camera_from_lidar, FRAME.camera).pixels[0]
     image = np.zeros((FRAME.camera.height, FRAME.camera.width, 3), np.uint8)
-    image[...] = 1  # what is black counts as beyond the picture's border
+    image[...] = 1  # what is black counts as beyond the image's border
     image[int(v) - 4 : int(v) + 5, int(u) - 4 : int(u) + 5] = 255
     seen = rig(replace(FRAME, image=image, points=point))
     assert seen.image.shape == (seen.camera.height, seen.camera.width, 3) and seen.image.dtype == np.uint8

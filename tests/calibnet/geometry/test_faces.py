@@ -71,7 +71,7 @@ def test_a_lens_that_looks_down_has_the_faces_of_a_cube():
     assert narrow == ()
 
 
-def test_what_is_black_in_every_picture_is_cut_off():
+def test_what_is_black_in_every_image_is_cut_off():
     camera = fisheye(120.0)
     image = np.full((300, 400, 3), 200, np.uint8)
     image[:, 280:] = 0  # from 40 degrees to the right on

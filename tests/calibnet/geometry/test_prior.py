@@ -66,7 +66,7 @@ def test_a_deviation_counts_as_a_measurement_of_the_start():
     assert correction[0] == pytest.approx(-0.04 * 0.01**2 / (0.02**2 + 0.01**2)), "back towards the start"
 
 
-def test_what_is_known_is_of_the_real_camera_where_the_picture_is_turned():
+def test_what_is_known_is_of_the_real_camera_where_the_image_is_turned():
     """A camera on its side: its x is the turned camera's y."""
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     prior = Prior.of(["x"]).about(INITIAL).turned(quarter)

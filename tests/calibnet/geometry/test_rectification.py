@@ -1,4 +1,4 @@
-"""Pictures of a lens as the pinhole has them: dots are drawn where the lens puts them, and found where they belong."""
+"""Images of a lens as the pinhole has them: dots are drawn where the lens puts them, and found where they belong."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_a_pinhole_may_look_to_the_side():
 
 
 def test_what_a_fisheye_leaves_black_is_cut_off():
-    """A picture that is lit only between columns 100 and 299 loses the rest, and no pixel moves."""
+    """An image that is lit only between columns 100 and 299 loses the rest, and no pixel moves."""
     of_lens = fisheye(150.0)
     whole = central(of_lens)
     image = np.zeros((300, 400, 3), np.uint8)

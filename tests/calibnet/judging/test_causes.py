@@ -20,7 +20,7 @@ FRAME = boxes()
 def unlike(frame: Frame, guess: Extrinsic) -> float:
     """A measure that knows the frame as it should be: 5 if it is that, more the farther it is from it."""
     if len(frame.points) != len(FRAME.points) or (frame.points[:, 0] < -20).mean() > 0.5:
-        raise CalibrationError("nothing falls into the picture")
+        raise CalibrationError("nothing falls into the image")
     scan = np.abs(frame.points - FRAME.points).mean()
     picture = np.abs(frame.image.astype(float) - FRAME.image)[60:260, 350:680].mean() / 10
     camera = np.abs(frame.camera.matrix - FRAME.camera.matrix).max()

@@ -43,7 +43,7 @@ def test_the_motion_between_two_scans_is_that_of_the_car(frames: list[Frame]) ->
 
 
 def late(frames: list[Frame], by: int) -> list[Frame]:
-    """Pictures with the scan of a later moment."""
+    """Images with the scan of a later moment."""
     return [replace(frames[at], points=frames[at + by].points) for at in range(max(0, -by), len(frames) - max(0, by))]
 
 

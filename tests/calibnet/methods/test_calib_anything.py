@@ -42,10 +42,10 @@ def test_the_score_is_one_where_masks_part_what_differs() -> None:
     assert score(miscalibration([0, 0, 5], [0, 0, 0]) @ REFERENCE) < 0.8 * weight
 
 
-def test_points_that_leave_the_picture_count_as_chance() -> None:
+def test_points_that_leave_the_image_count_as_chance() -> None:
     labels, scan = two_halves(np.array([0.0, 1.0]))
     score = Consistency(labels, CAMERA, scan, REFERENCE)
-    away = miscalibration([0, 0, 41], [0, 0, 0]) @ REFERENCE  # half of the picture is turned away from
+    away = miscalibration([0, 0, 41], [0, 0, 0]) @ REFERENCE  # half of the image is turned away from
     assert 0 <= score(away) < 0.6 * score(REFERENCE)
 
 
@@ -72,7 +72,7 @@ def test_planes_and_things_are_segments_of_their_own() -> None:
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1.0, atol=1e-6)
 
 
-def test_the_picture_is_cut_along_its_edges() -> None:
+def test_the_image_is_cut_along_its_edges() -> None:
     labels = segmented(boxes(), CAMERA)
     for left, top, right, bottom, _ in BOXES:
         inside = labels[top + 6 : bottom - 6, left + 6 : right - 6]
@@ -80,7 +80,7 @@ def test_the_picture_is_cut_along_its_edges() -> None:
 
 
 def write_masks(folder: Path, size: tuple[int, int] = (320, 1024)) -> Path:
-    """Masks of the boxes, and one of the whole picture, as Segment Anything's script writes them."""
+    """Masks of the boxes, and one of the whole image, as Segment Anything's script writes them."""
     where = folder / "000007"
     where.mkdir(parents=True)
     for number, (left, top, right, bottom, _) in enumerate([*BOXES, (0, 0, 1024, 320, 0)]):
@@ -90,11 +90,11 @@ def write_masks(folder: Path, size: tuple[int, int] = (320, 1024)) -> Path:
     return folder
 
 
-def test_masks_are_read_from_a_folder_by_the_pictures_name(tmp_path: Path) -> None:
+def test_masks_are_read_from_a_folder_by_the_images_name(tmp_path: Path) -> None:
     frame = replace(boxes(), source="somewhere/000007.png")
     labels = read_masks(write_masks(tmp_path), frame, CAMERA)
     left, top, right, bottom, _ = BOXES[0]
-    assert labels[0, 0] == -1, "what covers half of the picture or more tells nothing"
+    assert labels[0, 0] == -1, "what covers half of the image or more tells nothing"
     assert len(set(labels[top:bottom, left:right].ravel())) == 1
     initial = miscalibration([0, 0, 1.5], [0, 0, 0]) @ REFERENCE
     found = CalibAnything(RANGE, masks=tmp_path).calibrate(frame, initial).corrected

@@ -1,4 +1,4 @@
-"""Every geometric augmentation must leave points on what they were on in the picture."""
+"""Every geometric augmentation must leave points on what they were on in the image."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STEP = 100.0  # pixels from black to white
 
 
 def ramp_frame(seed: int = 0) -> Frame:
-    """A picture that is its own coordinates: red tells the column, green the row; points all around."""
+    """An image that is its own coordinates: red tells the column, green the row; points all around."""
     generator = np.random.default_rng(seed)
     matrix = np.array([[360.0, 0.0, 305.3], [0.0, 352.0, 86.1], [0.0, 0.0, 1.0]])
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
@@ -50,18 +50,18 @@ def sampled(frame: Frame) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     return (1 - bottom) * upper + bottom * lower, index
 
 
-def assert_points_stay_on_the_picture(before: Frame, after: Frame) -> None:
+def assert_points_stay_on_the_image(before: Frame, after: Frame) -> None:
     """Compare the colours at the points with the columns and rows they had at first."""
     original = project(before.points, before.camera_from_lidar, before.camera)
     place = np.full((len(before.points), 2), np.nan)
     place[original.index] = original.pixels
     colours, index = sampled(after)
     was = place[index]
-    # away from the picture's edge and from the ramps' turning points, where interpolation looks them off
+    # away from the image's edge and from the ramps' turning points, where interpolation looks them off
     smooth = (np.abs((was / STEP + 0.5) % 1 - 0.5) > 0.06).all(axis=1)
     inner = (was > 6).all(axis=1) & (was < [WIDTH - 7, HEIGHT - 7]).all(axis=1) & smooth & (colours[:, 2] > 254)
     assert inner.sum() > 100
-    error = (colours[inner, :2] - triangle(was[inner])) * STEP / 255  # pixels of the first picture
+    error = (colours[inner, :2] - triangle(was[inner])) * STEP / 255  # pixels of the first image
     assert np.abs(error).max() < 1.0
     slope = np.sign((was[inner] / STEP) % 2 - 1)
     assert np.abs((slope * error).mean(axis=0)).max() < 0.1, "a constant shift, for instance of half a pixel"
@@ -69,17 +69,17 @@ def assert_points_stay_on_the_picture(before: Frame, after: Frame) -> None:
 
 def test_the_check_itself_sees_half_a_pixel() -> None:
     frame = ramp_frame()
-    assert_points_stay_on_the_picture(frame, frame)
+    assert_points_stay_on_the_image(frame, frame)
     matrix = frame.camera.matrix.copy()
     matrix[0, 2] += 0.3
     with pytest.raises(AssertionError):
-        assert_points_stay_on_the_picture(frame, replace(frame, camera=PinholeCamera(WIDTH, HEIGHT, matrix)))
+        assert_points_stay_on_the_image(frame, replace(frame, camera=PinholeCamera(WIDTH, HEIGHT, matrix)))
 
 
-def test_mirrored_points_stay_on_the_picture() -> None:
+def test_mirrored_points_stay_on_the_image() -> None:
     frame = ramp_frame()
     mirrored = mirror(frame)
-    assert_points_stay_on_the_picture(frame, mirrored)
+    assert_points_stay_on_the_image(frame, mirrored)
     assert np.linalg.det(mirrored.camera_from_lidar[:3, :3]) == pytest.approx(1.0)
     twice = mirror(mirrored)
     assert np.array_equal(twice.image, frame.image) and np.array_equal(twice.points, frame.points)
@@ -94,7 +94,7 @@ def test_a_turned_camera_with_another_lens_sees_the_points_where_they_were(seed:
     turned = virtual_camera(frame, height, width, np.random.default_rng(seed), RECIPE.camera)
     assert turned.image.shape == (height, width, 3)
     assert (turned.camera.height, turned.camera.width) == (height, width)
-    assert_points_stay_on_the_picture(frame, turned)
+    assert_points_stay_on_the_image(frame, turned)
     offset = turned.camera_from_lidar[:3, :3].T @ turned.camera_from_lidar[:3, 3]
     np.testing.assert_allclose(offset, frame.camera_from_lidar[:3, :3].T @ frame.camera_from_lidar[:3, 3])
 
@@ -144,11 +144,11 @@ def test_augmentation_is_a_function_of_the_generator() -> None:
     assert not np.array_equal(one.image, other.image)
 
 
-def test_a_magnified_camera_cuts_a_part_and_keeps_points_on_the_picture() -> None:
+def test_a_magnified_camera_cuts_a_part_and_keeps_points_on_the_image() -> None:
     before = ramp_frame(2)
     for seed in range(4):
         after = virtual_camera(before, 96, 320, np.random.default_rng(seed), RECIPE.camera, magnification=1.6)
-        assert_points_stay_on_the_picture(before, after)
+        assert_points_stay_on_the_image(before, after)
         assert after.image.shape == (96, 320, 3)
 
 

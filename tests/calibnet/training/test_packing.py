@@ -77,7 +77,7 @@ def test_a_scan_that_is_cut_or_unpacks_without_end_is_refused(monkeypatch: pytes
         unpack_scan(whole)
 
 
-def test_a_picture_comes_back_in_its_own_colours() -> None:
+def test_an_image_comes_back_in_its_own_colours() -> None:
     image = make_frame(1).image
     again = decode_image(pack_image(image))
     assert again.shape == image.shape and again.dtype == np.uint8
@@ -96,7 +96,7 @@ def test_what_a_miscalibrated_camera_sees_is_kept_and_what_none_sees_is_not() ->
         assert len(project(kept.points, turned, frame.camera).depth) == len(project(near, turned, frame.camera).depth)
 
 
-def test_a_large_picture_is_made_smaller_with_its_camera() -> None:
+def test_a_large_image_is_made_smaller_with_its_camera() -> None:
     frame = make_frame(0, 2 * LARGEST_WIDTH, 500)
     small = smaller(frame)
     assert small.image.shape == (250, LARGEST_WIDTH, 3) and small.camera.width == LARGEST_WIDTH
@@ -197,7 +197,7 @@ def test_damaged_parts_are_named(pack: Callable[..., Path], tmp_path: Path, harm
     assert "\n" not in str(raised.value)
 
 
-def test_a_damaged_picture_is_named(pack: Callable[..., Path], tmp_path: Path) -> None:
+def test_a_damaged_image_is_named(pack: Callable[..., Path], tmp_path: Path) -> None:
     (path,) = pack(tmp_path).iterdir()
     tensors = load_file(path)
     with safe_open(path, "pt") as file:

@@ -49,7 +49,7 @@ class KnownCascade:
         return CascadeTrace(initial, tuple(stages))
 
     def explain(self, frame: Frame, initial: Transform, lags: object = None) -> Verdict:
-        """Rejects everything, and takes everything for a mirrored picture."""
+        """Rejects everything, and takes everything for a mirrored image."""
         mirrored = Cause("mirrored", "The image is mirrored.", "so a test wants it")
         return Verdict("rejected", "It does not fit.", self.calibrate(frame, initial).arrived, causes=(mirrored,))
 

@@ -1,4 +1,4 @@
-"""A frame of a fisheye lens: recorded are the picture as it was taken, the points in it, and the camera as it is."""
+"""A frame of a fisheye lens: recorded are the image as it was taken, the points in it, and the camera as it is."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_points_are_seen_through_the_lens(observation: Observation) -> None:
     assert len(projection.index) > 1000
 
 
-def test_pictures_of_a_stage_are_of_the_pinhole(observation: Observation) -> None:
+def test_images_of_a_stage_are_of_the_pinhole(observation: Observation) -> None:
     """Its cells lie in the rectified image, whatever the lens."""
     stage = observation.trace.stages[0]
     pinhole = replace(observation, frame=replace(observation.frame, original=None))
@@ -76,12 +76,12 @@ def test_pictures_of_a_stage_are_of_the_pinhole(observation: Observation) -> Non
     assert_allclose(ours.projection.pixels, theirs.projection.pixels, atol=1e-2)
 
 
-def test_the_picture_and_the_camera_are_recorded_as_they_are(run: RecordedRun) -> None:
+def test_the_image_and_the_camera_are_recorded_as_they_are(run: RecordedRun) -> None:
     image = cv2.imdecode(np.frombuffer(run.image(0), np.uint8), cv2.IMREAD_COLOR)
     assert image.shape == (200, 500, 3)
     assert run.frames[0].camera.same(LENS)
     points = run.overlay(entities.OVERLAY_REFERENCE, 0)
-    assert points.uv[:, 0].max() > 400, "in the wider picture"
+    assert points.uv[:, 0].max() > 400, "in the wider image"
 
 
 @pytest.mark.parametrize("form", ["json", "opencv"])

@@ -223,7 +223,7 @@ def test_raw_images_of_colour(encoding: str, stored: np.ndarray, tmp_path: Path)
 
 @pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
 def test_bayer_patterns_have_the_names_of_ros(pattern: str, tmp_path: Path) -> None:
-    """A red picture: only the red cells of the pattern are bright."""
+    """A red image: only the red cells of the pattern are bright."""
     mosaic = np.zeros((32, 32), np.uint8)
     row, column = divmod(pattern.index("r"), 2)
     mosaic[row::2, column::2] = 200

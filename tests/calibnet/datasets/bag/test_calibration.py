@@ -67,8 +67,8 @@ def test_a_camera_that_nobody_calibrated_is_one_sentence(tmp_path: Path) -> None
         Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, k=np.zeros(9))])
 
 
-def test_a_matrix_of_larger_pictures_is_a_suspect(tmp_path: Path) -> None:
-    """As kitti2bag writes KITTI's rectified pictures: K, D and R of 1392x512, P of 1242x375; here a tenth of it."""
+def test_a_matrix_of_larger_images_is_a_suspect(tmp_path: Path) -> None:
+    """As kitti2bag writes KITTI's rectified images: K, D and R of 1392x512, P of 1242x375; here a tenth of it."""
     scale = np.diag([128 / 1242, 48 / 375, 1.0])
     raw = scale @ [[959.8, 0, 696.0], [0, 956.9, 224.2], [0, 0, 1]]
     rectified = scale @ [[721.5, 0, 609.6, 44.9], [0, 721.5, 172.9, 0.2], [0, 0, 1, 0.003]]
@@ -103,7 +103,7 @@ def test_a_calibration_beneath_its_images_is_found(tmp_path: Path) -> None:
     assert Bag([path], BagOptions(image="/l/image_rect"))[0].camera.matrix[0, 0] == 70.0
 
 
-def test_pictures_of_depth_are_none(tmp_path: Path) -> None:
+def test_images_of_depth_are_none(tmp_path: Path) -> None:
     bag = BagWriter(tmp_path / "drive", "mcap")
     depth = bag.compressed(FRAME.image, 10.0)
     bag.write("/depth/image_raw/compressedDepth", depth, 10.0)

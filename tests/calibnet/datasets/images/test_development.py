@@ -1,4 +1,4 @@
-"""Pictures of more than eight bits, of floats and of Bayer patterns: what becomes of known levels."""
+"""Images of more than eight bits, of floats and of Bayer patterns: what becomes of known levels."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def write(path: Path, levels: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14, 16])
-def test_a_drive_is_scaled_by_the_depth_of_all_its_pictures(write_layout, bits):
-    """The dark picture of a 12-bit drive stays dark, though its own levels would fit into 10 bits."""
+def test_a_drive_is_scaled_by_the_depth_of_all_its_images(write_layout, bits):
+    """The dark image of a 12-bit drive stays dark, though its own levels would fit into 10 bits."""
     layout = write_layout("folder")
     full = (RAMP * ((1 << bits) - 1)).astype(np.uint16)
     for path, share in zip(layout.images, (1.0, 0.2, 0.5), strict=True):
@@ -77,7 +77,7 @@ def test_a_named_pattern_is_demosaiced(write_layout, write_calibration, pattern,
     assert_array_equal(image[2:-2, 2:-2], np.broadcast_to([200, 120, 40], (44, 60, 3)))
 
 
-def test_a_picture_with_colours_is_not_demosaiced(write_layout, write_calibration):
+def test_an_image_with_colours_is_not_demosaiced(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(bayer="rggb"))
     with pytest.raises(DatasetError, match=r"has colours, although its calibration has 'bayer'; remove that"):
@@ -99,7 +99,7 @@ def test_each_frame_s_size_is_checked_whatever_its_depth(write_layout):
             sequence[position]
 
 
-def test_a_picture_alone_is_developed_by_itself(tmp_path: Path):
+def test_an_image_alone_is_developed_by_itself(tmp_path: Path):
     write(tmp_path / "a.png", (RAMP * 1023).astype(np.uint16))
     assert read_image(tmp_path / "a.png").max() == 255
     assert_array_equal(read_image(tmp_path / "a.png", None, Development(4096.0)).max(), 63)

@@ -1,4 +1,4 @@
-"""A folder whose pictures are not rectified, and whose calibration is another tool's."""
+"""A folder whose images are not rectified, and whose calibration is another tool's."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from calibnet.errors import DatasetError
 FISHEYE = {"distortion_model": "equidistant", "distortion": [0.05, -0.01, 0.0, 0.0]}
 
 
-def test_a_picture_of_a_fisheye_is_kept_beside_the_rectified_one(write_layout, write_calibration):
+def test_an_image_of_a_fisheye_is_kept_beside_the_rectified_one(write_layout, write_calibration):
     layout = write_layout("folder")
     layout.calibration.write_text(write_calibration(**FISHEYE))
     frame = layout.open()[1]
@@ -24,7 +24,7 @@ def test_a_picture_of_a_fisheye_is_kept_beside_the_rectified_one(write_layout, w
     assert_array_equal(frame.camera_from_lidar, layout.camera_from_lidar)
 
 
-def test_a_rectified_picture_is_the_picture_as_it_was_taken(write_layout):
+def test_a_rectified_image_is_the_image_as_it_was_taken(write_layout):
     frame = write_layout("folder").open()[0]
     assert frame.original is None
     assert frame.as_taken.image is frame.image
@@ -100,7 +100,7 @@ def test_a_file_of_transforms_knows_no_camera(write_layout):
         layout.open()
 
 
-def test_size_of_the_picture_serves_files_that_do_not_say_it(write_layout):
+def test_size_of_the_image_serves_files_that_do_not_say_it(write_layout):
     layout = write_layout("folder")
     layout.calibration.unlink()
     camera = {"camera_model": "plumb_bob", "distortion_coeffs": [0.0] * 5, "intrinsics": [60, 62, 31, 22.5]}

@@ -40,7 +40,7 @@ def test_a_fisheye_is_read_with_its_lens(write_layout):
     assert frame.as_taken.image.shape == (60, 80, 3)
 
 
-def test_pictures_and_scans_without_partner_are_counted(write_layout):
+def test_images_and_scans_without_partner_are_counted(write_layout):
     layout = write_layout("kitti-360")
     layout.scans[1].unlink()
     sequence = layout.open()

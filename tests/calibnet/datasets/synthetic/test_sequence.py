@@ -254,7 +254,7 @@ def test_memory_of_a_long_drive_stays_bounded():
 
 
 def test_own_camera_sees_what_a_resized_one_sees():
-    """The same scene at half the resolution is the same picture, resized: rays go through pixel centres."""
+    """The same scene at half the resolution is the same image, resized: rays go through pixel centres."""
     import cv2
 
     exposure = dataclasses.replace(SyntheticSequence(1, 1, SMALL).exposure, noise=0.0, quality=0, blur=0.3)

@@ -56,7 +56,7 @@ def test_sizes(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_untrained_it_moves_next_to_nothing_and_hears_picture_and_scan(name: str) -> None:
+def test_untrained_it_moves_next_to_nothing_and_hears_image_and_scan(name: str) -> None:
     network, (inputs, _) = network_of(name).eval(), batch(2.0)
     with torch.no_grad():
         output = network(inputs)
@@ -95,7 +95,7 @@ def inputs_of(image: Tensor, depth: Tensor) -> NetworkInputs:
 
 
 def test_depth_maps_are_fitted_with_the_nearest_point_and_the_rows_that_were_cut() -> None:
-    depth = torch.zeros(1, 4, 8)  # the lower half of a picture of 8 x 8
+    depth = torch.zeros(1, 4, 8)  # the lower half of an image of 8 x 8
     depth[0, 0, 0], depth[0, 0, 1], depth[0, 3, 7] = 8.0, 4.0, 0.5
     fitted = fitted_depth(inputs_of(torch.zeros(1, 3, 8, 8), depth), 16, 4)[0, 0]
     expected = torch.zeros(16, 4)
@@ -104,7 +104,7 @@ def test_depth_maps_are_fitted_with_the_nearest_point_and_the_rows_that_were_cut
     torch.testing.assert_close(fitted, expected)
 
 
-def test_pictures_are_fitted_and_normalised() -> None:
+def test_images_are_fitted_and_normalised() -> None:
     image = torch.full((1, 3, 8, 8), 175, dtype=torch.uint8)
     fitted = fitted_image(inputs_of(image, torch.zeros(1, 8, 8)), 16, 4)
     torch.testing.assert_close(fitted, torch.ones(1, 3, 16, 4))

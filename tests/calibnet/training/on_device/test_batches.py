@@ -71,7 +71,7 @@ def test_samples_are_those_of_numpy() -> None:
 
 
 class Ramps(Scenes):
-    """Frames whose pictures are their own coordinates."""
+    """Frames whose images are their own coordinates."""
 
     def __init__(self) -> None:
         super().__init__(0)
@@ -79,8 +79,8 @@ class Ramps(Scenes):
 
 
 @pytest.mark.parametrize("zoom", [(0.85, 1.5), (0.3, 0.5)])
-def test_points_stay_on_the_picture(zoom: tuple[float, float]) -> None:
-    """Where a pixel is on its ramp tells which one of the stored picture it shows; a tenth of a pixel matters."""
+def test_points_stay_on_the_image(zoom: tuple[float, float]) -> None:
+    """Where a pixel is on its ramp tells which one of the stored image it shows; a tenth of a pixel matters."""
     recipe = replace(PLAIN, camera=CameraRecipe(zoom=zoom))
     _, samples = streams(Ramps(), recipe)
     drawn = samples.drawn

@@ -68,7 +68,7 @@ def test_a_batch_is_what_numpy_makes_of_each_sample(shift: tuple[float, float]) 
             assert_alike(cells[number], expected)
         assert sample.visible[0].any() and not sample.visible[0].all()
         for visible, mask in zip(batch.visible, sample.visible, strict=True):
-            assert (visible[number].numpy() != mask).sum() <= 2, "points on the very edge of the picture"
+            assert (visible[number].numpy() != mask).sum() <= 2, "points on the very edge of the image"
 
 
 def assert_alike(made: Tensor, expected: np.ndarray) -> None:
