@@ -58,7 +58,7 @@ def test_what_is_not_there_is_named(write_layout, tmp_path):
     with pytest.raises(DatasetError, match="has no scene 'scene-0001'; scenes there: scene-0061, scene-0103"):
         layout.open(scene="1")
     with pytest.raises(
-        DatasetError, match="no keyframe of CAM_BACK and LIDAR_TOP in scene-0103; its cameras: CAM_FRONT"
+        DatasetError, match="no keyframe of CAM_BACK and LIDAR_TOP in scene-0103; cameras of all scenes: CAM_FRONT"
     ):
         layout.open(camera="CAM_BACK")
     with pytest.raises(DatasetError, match="has no tables; unpack nuScenes's metadata"):
