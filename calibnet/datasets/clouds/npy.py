@@ -6,7 +6,7 @@ import io
 import math
 import warnings
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,14 @@ from numpy.typing import NDArray
 
 from calibnet.datasets.clouds.columns import MOST_BYTES, MOST_COLUMNS, CloudError, Columns, joined, points_of
 
+POSITIONS = ("xyz", "points", "positions")
+"""Names of arrays ``[N, 3]`` with x, y and z, as of ros2_numpy."""
+WIDEST = 16
+"""Largest number of columns of an array of points."""
+
 
 def read_npy(data: bytes) -> NDArray[np.float32]:
-    """Points ``[N, 4]`` of an array ``[N, 3]`` or wider, or of one with fields x, y, z, intensity.
+    """Points ``[N, 4]`` of an array ``[N, 3]`` or wider or its rows ``[H, W, 3]``, or of fields x, y, z, intensity.
 
     Raises:
         CloudError: it has another form, or is damaged.
@@ -26,7 +31,7 @@ def read_npy(data: bytes) -> NDArray[np.float32]:
 
 
 def read_npz(data: bytes) -> NDArray[np.float32]:
-    """Points ``[N, 4]`` of the only array of a suitable shape, or of arrays called x, y, z and intensity.
+    """Points ``[N, 4]`` of the only array of a suitable shape, or of arrays called x, y, z (or xyz) and intensity.
 
     Raises:
         CloudError: there is none or several, the file is damaged, or it would unpack to more than a scan can have.
@@ -38,16 +43,12 @@ def read_npz(data: bytes) -> NDArray[np.float32]:
         if isinstance(error, CloudError):
             raise
         raise CloudError("it is truncated or not a .npz archive") from None
-    columns: Columns = {
-        name.lower(): array for name, array in arrays.items() if array.ndim == 1 and not array.dtype.names
-    }
+    columns = _columns(arrays)
     if set("xyz") <= columns.keys():
-        if len({len(column) for name, column in columns.items() if len(name) == 1}) > 1:
+        if len({len(columns[axis]) for axis in "xyz"}) > 1:
             raise CloudError("its x, y and z have different lengths")
         return points_of({name: column for name, column in columns.items() if len(column) == len(columns["x"])})
-    tables = [
-        name for name, array in arrays.items() if array.dtype.names or (array.ndim == 2 and 3 <= array.shape[1] <= 16)
-    ]
+    tables = [name for name, array in arrays.items() if array.dtype.names or _is_table(array)]
     if len(tables) != 1:
         held = ", ".join(f"{name[:40]} {array.shape}" for name, array in list(arrays.items())[:6]) or "none"
         raise CloudError(f"it does not have exactly one array [N, 4] among {held}; save only the points")
@@ -68,10 +69,29 @@ def _arrays(file: zipfile.ZipFile) -> Iterator[tuple[str, NDArray[np.generic]]]:
             continue  # ignore text and objects beside the points
 
 
+def _is_table(array: NDArray[Any]) -> bool:
+    return array.ndim == 2 and 3 <= array.shape[1] <= WIDEST
+
+
+def _columns(arrays: Mapping[str, NDArray[Any]]) -> Columns:
+    """Columns by name in lower case: arrays of single values, and the three of an array of `POSITIONS`."""
+    columns: Columns = {}
+    for name, array in arrays.items():
+        if array.dtype.names:
+            continue
+        if array.ndim == 1 or array.shape == (len(array), 1):
+            columns.setdefault(name.lower(), array.ravel())
+        elif name.lower() in POSITIONS and array.shape == (len(array), 3):
+            columns |= {axis: array[:, place] for place, axis in enumerate("xyz")}
+    return columns
+
+
 def _points(array: NDArray[Any]) -> NDArray[np.float32]:
     if array.dtype.names:
-        fields = {name: np.asarray(array[name]).ravel() for name in array.dtype.names}
-        return points_of({name.lower(): field for name, field in fields.items() if field.size == array.size})
+        columns = _columns({name: np.asarray(array.ravel()[name]) for name in array.dtype.names})
+        return points_of(columns)
+    if array.ndim == 3 and _is_table(array[0]):
+        array = array.reshape(-1, array.shape[2])
     if array.ndim == 2 and 3 <= array.shape[0] <= 8 and array.shape[1] > 8:
         raise CloudError(f"it is an array {array.shape}, which seems to be transposed; save [N, 4], one point per row")
     if array.ndim != 2 or array.shape[1] < 3:

@@ -21,9 +21,12 @@ SEPARATORS = (";", "\t", ",")
 COMMENTS = ("#", "//", "%")
 MOST_LINES_BEFORE = 1000
 """Largest number of lines before the first point."""
-UNIT = re.compile(r"\s*[\[(].*[\])]$")
-AXIS = re.compile(r"points?(?:_m_xyz)?:([012])|(?:pos_?|coord_?|points?_?)?([xyz])(?:_?m)?")
-"""Names of axes, in lower case and without a unit in brackets; VeloView writes ``Points_m_XYZ:0``."""
+METRES = {**dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1.0), "cm": 0.01, "mm": 0.001}
+UNIT = re.compile(r"(.+?)(?:\s*[\[(]([^\])]*)[\])]|_?(mm|cm|m))")
+"""A name with a unit: ``X (mm)``, ``x_m``."""
+AXIS = re.compile(r"points?(?:_m_xyz)?:([012])|(?:pos_?|coord_?|points?_?)?([xyz])1?")
+"""Names of axes, in lower case and without a unit. VeloView writes ``Points_m_XYZ:0``, Ouster ``X1`` for the first
+return."""
 UNNAMED = {3: ("x", "y", "z"), 4: ("x", "y", "z", "intensity")}
 """Columns without names, by their number."""
 DECLARE = f"name them in its first line, or {SAY}"
@@ -34,12 +37,14 @@ class _Head(NamedTuple):
 
     Attributes:
         names: names of the columns; None if there are none.
+        metres: unit of the positions in metres.
         start: offset of the first point.
         separator: separator of columns; None for blanks.
         width: number of columns.
     """
 
     names: tuple[str, ...] | None
+    metres: float
     start: int
     separator: str | None
     width: int
@@ -81,7 +86,10 @@ def read_text(data: bytes, layout: tuple[str, ...] | None = None) -> Columns:
         ),
     )
     table = read_table(read, body)
-    columns = {name: table[place] for name, place in wanted.items()}
+    columns: Columns = {
+        name: np.asarray(table[place], np.float64) * (head.metres if name in "xyz" else 1.0)
+        for name, place in wanted.items()
+    }
     if head.names is None and layout is None:
         _check_positions(columns)
     return columns
@@ -94,6 +102,7 @@ def _head(data: bytes) -> _Head:
         CloudError: there is none, or the lines before it do not name columns.
     """
     names: tuple[str, ...] | None = None
+    metres = 1.0
     file = io.BytesIO(data)
     for _ in range(MOST_LINES_BEFORE):
         start = file.tell()
@@ -105,23 +114,38 @@ def _head(data: bytes) -> _Head:
         separator = next((one for one in SEPARATORS if one in text), None)
         words = [word.strip().strip('"') for word in text.split(separator)]
         is_comment = line.startswith(COMMENTS)
-        if not text or (not is_comment and names is None and len(words) == 1 and words[0].isdecimal()):
-            continue  # a .pts file starts with the number of its points
+        if not text or (not is_comment and len(words) == 1 and words[0].isdecimal()):
+            continue  # the number of points, first in a .pts file and after the names in one of CloudCompare
         if not is_comment and (names is not None or all(_is_number(word, separator) for word in words)):
-            return _Head(names, start, separator, len(words))
-        called = tuple(map(_called, words))
+            return _Head(names, metres, start, separator, len(words))
+        called = tuple(_called(word)[0] for word in words)
         if set("xyz") <= set(called):
-            names = called
+            names, metres = called, _metres(words)
         elif not is_comment:
             raise CloudError(f"its first line ({one_line(text, 80)}) does not name columns x, y and z; {DECLARE}")
     raise CloudError("it has no points")
 
 
-def _called(word: str) -> str:
-    """The standard name of a column."""
-    name = UNIT.sub("", word.lower())
-    match = AXIS.fullmatch(name)
-    return name if match is None else match[2] or "xyz"[int(match[1])]
+def _called(word: str) -> tuple[str, str]:
+    """The standard name of a column, and its unit if it states one."""
+    word = word.lower()
+    unit = UNIT.fullmatch(word)
+    for name, of in (((unit[1], unit[2] or unit[3] or "") if unit else (word, "")), (word, "")):
+        if (match := AXIS.fullmatch(name)) is not None:
+            return match[2] or "xyz"[int(match[1])], of
+    return (unit[1] if unit and unit[2] is not None else word), ""
+
+
+def _metres(words: Sequence[str]) -> float:
+    """The unit of x, y and z in metres.
+
+    Raises:
+        CloudError: it is not one of `METRES`, or not the same for all.
+    """
+    units = {unit or "m" for name, unit in map(_called, words) if name in ("x", "y", "z")}
+    if len(units) > 1 or not units <= METRES.keys():
+        raise CloudError(f"its x, y and z are in {', '.join(sorted(units))[:60]}; write metres")
+    return METRES[units.pop()]
 
 
 def _is_number(word: str, separator: str | None) -> bool:

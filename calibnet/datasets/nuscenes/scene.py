@@ -61,7 +61,8 @@ class NuScenes(PairedSequence):
         if not pairs:
             channels = sorted({one.channel for one in sensors.values() if one.matrix is not None})
             raise DatasetError(
-                f"{tables} has no keyframe of {camera} and {LIDAR} in {scene}; cameras of all scenes: {', '.join(channels)}."
+                f"{tables} has no keyframe of {camera} and {LIDAR} in {scene}; cameras of all scenes: "
+                f"{', '.join(channels)}."
             )
         poses = read_poses(tables, {taken.pose for pair in pairs for taken in pair}) if compensate else None
         self._pairs = dict(enumerate(pairs))

@@ -229,6 +229,9 @@ def in_folder(layout, name: str, write: Callable[[Path, np.ndarray], None]) -> n
 WAYS: dict[str, Callable[[Path, np.ndarray], None]] = {
     "0001.npy": lambda path, rows: np.save(path, with_fields(rows)),
     "0001.npz": lambda path, rows: np.savez(path, points=rows, label="a drive"),
+    "0001.Npz": lambda path, rows: np.savez(path.open("wb"), xyz=rows[:, :3], intensity=rows[:, 3:], rgb=rows[:, :3]),
+    "0001.Npy": lambda path, rows: np.save(path.open("wb"), rows.reshape(40, 100, 4)),
+    "0001.nPy": lambda path, rows: np.save(path.open("wb"), rows.view([("xyz", "<f4", 3), ("intensity", "<f4")])),
     "0001.NPZ": lambda path, rows: np.savez(path.open("wb"), **dict(zip(["x", "y", "z", "i"], rows.T, strict=True))),
 }
 
@@ -316,6 +319,9 @@ NAMED = {
     "CloudCompare's name for none": "//X Y Z Scalar_field\n{ }",
     "another comment": "# made today\n\n# x  y  z  i\n{ }",
     "units, semicolons, a mark of order": "\ufeffX (m);Y [m];z_m;Reflectivity\n{;}",
+    "millimetres": "X (mm),Y (mm),Z (mm),REFLECTIVITY (%)\n{,}",
+    "Ouster's first return": "X1 (m);Y1 (m);Z1 (m);REFLECTIVITY (%)\n{;}",
+    "CloudCompare's number of points": "//X Y Z Intensity\n4000\n{ }",
     "VeloView's": '"Points_m_XYZ:0","Points_m_XYZ:1","Points_m_XYZ:2","intensity"\n{,}',
     "none, blanks": "{ }",
     "none, tabs": "{\t}",
@@ -329,13 +335,14 @@ NAMED = {
 def test_clouds_of_text(write_layout, way, suffix):
     layout = write_layout("folder")
     head, separator = re.fullmatch(r"(.*)\{(.+)\}", NAMED[way], re.DOTALL).groups()
-    lines = [separator.join(map(repr, row)) for row in scan()[:, :4].astype(np.float64).tolist()]
+    unit = [1000, 1000, 1000, 1] if way == "millimetres" else 1
+    lines = [separator.join(map(repr, row)) for row in (scan()[:, :4].astype(np.float64) * unit).tolist()]
     for path in layout.scans:
         path.unlink()
         path.with_suffix(suffix).write_text(
             head + "\n".join(lines) + "\n", newline="\r\n" if separator == ";" else "\n"
         )
-    assert_array_equal(layout.open()[1].points, scan()[:, :4])
+    assert_allclose(layout.open()[1].points, scan()[:, :4], rtol=1e-7 if way == "millimetres" else 0)
 
 
 def test_columns_of_text_are_found_by_name_among_words_and_dropouts():
@@ -367,6 +374,8 @@ def test_intensity_among_the_columns_of_cloudcompare(names, found):
         ("0 1.5 2.5 3.5\n1 2.5 3.5 4.5\n", "no names, and column 1 has only whole numbers"),
         ("a,b,c\n1,2,3\n", r"its first line \(a,b,c\) does not name columns x, y and z"),
         ("x,y,z\n1,2,far\n", "invalid value 'far'"),
+        ("x [ft],y [ft],z [ft]\n1,2,3\n", "its x, y and z are in ft; write metres"),
+        ("x [m],y [mm],z [mm]\n1,2,3\n", "its x, y and z are in m, mm; write metres"),
         ("1.5 2.5 3.5\n1.5 2.5\n", r"Row #2: Expected 3 columns, got 2"),
         ("x,y,z\n", "it has no points"),
     ],
