@@ -101,8 +101,8 @@ class Cascade:
             )
         manifest = load_manifest(preset, folder)
         loaded, skipped = load_stages(numbers, preset, manifest, folder or PACKAGE)
-        kept, _ = load_stages(range(1, numbers[0] if wider else 1), preset, manifest, folder or PACKAGE)
-        return cls(loaded, skipped, manifest.common_error, kept, load_coefficients(manifest, folder), prior)
+        beyond, _ = load_stages(range(1, numbers[0] if wider else 1), preset, manifest, folder or PACKAGE)
+        return cls(loaded, skipped, manifest.common_error, beyond, load_coefficients(manifest, folder), prior)
 
     @property
     def unjudged(self) -> str:

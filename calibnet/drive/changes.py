@@ -45,46 +45,48 @@ def watch(looks: Sequence[DriveLook]) -> Watch:
     if len(looks) < 2 * SHORTEST:
         raise ValueError(f"{len(looks)} frames are too few to detect a change; {2 * SHORTEST} are needed.")
     frames = np.array([look.frame for look in looks])
-    said = without_outliers(np.array([look.offset for look in looks]))
-    covariance = scatter(said)
+    offsets = without_outliers(np.array([look.offset for look in looks]))
+    covariance = scatter(offsets)
     whitener = np.linalg.inv(np.linalg.cholesky(covariance))
-    white = (said - said.mean(axis=0)) @ whitener.T
+    white = (offsets - offsets.mean(axis=0)) @ whitener.T
     excess = long_run_excess(white)
-    changes = _changes(frames, said, white / math.sqrt(excess), covariance * excess)
+    changes = _changes(frames, offsets, white / math.sqrt(excess), covariance * excess)
     means, counts = windowed(
-        said, [int(np.searchsorted(frames, change.frame)) for change in changes if change.until is None]
+        offsets, [int(np.searchsorted(frames, change.frame)) for change in changes if change.until is None]
     )
     deviation = np.sqrt(np.diag(covariance) * excess)
-    return Watch(frames, said, means, deviation / np.sqrt(counts)[:, None], changes, deviation * math.sqrt(2 / WINDOW))
+    return Watch(
+        frames, offsets, means, deviation / np.sqrt(counts)[:, None], changes, deviation * math.sqrt(2 / WINDOW)
+    )
 
 
-def windowed(said: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]:
+def windowed(offsets: Floats, borders: Sequence[int] = ()) -> tuple[Floats, Floats]:
     """Means ``[N, 6]`` of the frames around each, and their numbers ``[N]``; no window crosses a change.
 
     Args:
-        said: ``[N, 6]``.
+        offsets: ``[N, 6]``.
         borders: positions of the first frames after changes, ascending.
     """
-    means, counts, half = np.empty_like(said), np.empty(len(said)), WINDOW // 2
-    for start, stop in pairwise([0, *borders, len(said)]):
+    means, counts, half = np.empty_like(offsets), np.empty(len(offsets)), WINDOW // 2
+    for start, stop in pairwise([0, *borders, len(offsets)]):
         for at in range(start, stop):
-            around = said[max(start, at - half) : min(stop, at + half)]
+            around = offsets[max(start, at - half) : min(stop, at + half)]
             means[at], counts[at] = around.mean(axis=0), len(around)
     return means, counts
 
 
-def without_outliers(said: Floats) -> Floats:
+def without_outliers(offsets: Floats) -> Floats:
     """The results of frames ``[N, 6]``, with outliers moved closer to their neighbours."""
     half = WINDOW // 2
-    around = np.array([np.median(said[max(0, at - half) : at + half + 1], axis=0) for at in range(len(said))])
-    away = said - around
+    around = np.array([np.median(offsets[max(0, at - half) : at + half + 1], axis=0) for at in range(len(offsets))])
+    away = offsets - around
     most = OUTLIER * np.maximum(1.4826 * np.median(np.abs(away), axis=0), 1e-9)
     return np.asarray(around + np.clip(away, -most, most))
 
 
-def scatter(said: Floats) -> Matrix6:
+def scatter(offsets: Floats) -> Matrix6:
     """Covariance ``[6, 6]`` of a single frame, from differences between neighbours, which steps hardly affect."""
-    steps = np.diff(said, axis=0)
+    steps = np.diff(offsets, axis=0)
     most = OUTLIER * np.maximum(1.4826 * np.median(np.abs(steps), axis=0), 1e-9)
     kept = np.clip(steps, -most, most)
     ridge = np.diag(np.repeat([1e-4, np.radians(1e-3)], 3) ** 2)
@@ -108,16 +110,16 @@ def long_run_excess(white: Floats) -> float:
     return max(1.0, float((usual + len(steps) * measured.mean()) / (USUAL_BLOCKS + len(steps))))
 
 
-def _changes(frames: Floats, said: Floats, white: Floats, covariance: Matrix6) -> tuple[Change, ...]:
+def _changes(frames: Floats, offsets: Floats, white: Floats, covariance: Matrix6) -> tuple[Change, ...]:
     """Steps, or a drift, that are significant and large enough.
 
     Args:
         frames: ``[N]`` numbers of the frames.
-        said: ``[N, 6]``.
+        offsets: ``[N, 6]``.
         white: ``[N, 6]`` the same results, scaled so that the variance of long means is 1.
         covariance: ``[6, 6]`` of a frame, from long means.
     """
-    count = len(said)
+    count = len(offsets)
     level = math.log(count / FALSE_ALARM)
     price = 6 + 2 * math.sqrt(6 * level) + 2 * level  # of chi-square with six degrees of freedom, at that level
     ends = ruptures.KernelCPD(kernel="linear", min_size=SHORTEST).fit(white).predict(pen=price)
@@ -127,13 +129,13 @@ def _changes(frames: Floats, said: Floats, white: Floats, covariance: Matrix6) -
     slope = time @ white / (time @ time)
     sloped = _squares(white - time[:, None] * slope) + price
     if sloped < min(stepped, _squares(white)):
-        found = time @ said / (time @ time)
+        found = time @ offsets / (time @ time)
         certain = _confidence(found, covariance / (time @ time), 1)
         drift = Change(int(frames[0]), found, certain, int(frames[-1]))
         return (drift,) if drift.matters and certain > 1 - FALSE_ALARM else ()
     changes = []
     for before, at, after in zip(borders, borders[1:], borders[2:], strict=False):
-        moved = said[at:after].mean(axis=0) - said[before:at].mean(axis=0)
+        moved = offsets[at:after].mean(axis=0) - offsets[before:at].mean(axis=0)
         certain = _confidence(moved, covariance * (1 / (at - before) + 1 / (after - at)), count)
         changes.append(Change(int(frames[at]), moved, certain))
     return tuple(change for change in changes if change.matters and change.confidence > 1 - FALSE_ALARM)

@@ -92,7 +92,7 @@ def solve_drive(
             extrinsic = agree(looks, pose_prior, common_error).estimate().camera_from_lidar
 
     aligns = is_finest(stages[-1].range)
-    evidence, kept = list[Evidence](), list[DriveLook]()
+    evidence, last_looks = list[Evidence](), list[DriveLook]()
     to_align, convergence = Due(evenly_spaced(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
     consensus = Consensus(extrinsic, stages[-1].range, pose_prior, common_error)
 
@@ -102,7 +102,7 @@ def solve_drive(
     looks = DriveLooks(stages[-1], observed, range(len(frames)), extrinsic)
     for position, frame, trace in looks:
         consensus.add(trace.correction, trace.information)
-        kept.append(drive_look(frame, position, trace))
+        last_looks.append(drive_look(frame, position, trace))
         if aligns and to_align.reached(position):
             evidence.append(gather(frame, extrinsic))
         convergence.note(position, frame.index, lambda: estimate(*convergence.latest))
@@ -117,7 +117,7 @@ def solve_drive(
         tuple(convergence.points),
         skipped=tuple(looks.skipped),
         networks=of_networks if aligns else None,
-        looks=tuple(kept),
+        looks=tuple(last_looks),
         looked_from=extrinsic,
     )
 

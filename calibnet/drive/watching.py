@@ -177,9 +177,9 @@ def far_parts(
         borders |= set(lost) if lost[1] - lost[0] >= SHORTEST else set()
     solved = []
     for start, stop in pairwise(sorted(borders)):
-        said = [looks[position].offset for position in range(start, stop) if position in looks]
-        middle = pose_from_vector(np.median(said, axis=0)) if said else np.eye(4)
-        near = RANGES[-1].contains(middle, TRUSTED) and 2 * len(said) >= stop - start
+        offsets = [looks[position].offset for position in range(start, stop) if position in looks]
+        middle = pose_from_vector(np.median(offsets, axis=0)) if offsets else np.eye(4)
+        near = RANGES[-1].contains(middle, TRUSTED) and 2 * len(offsets) >= stop - start
         if near or stop - start < SHORTEST:
             continue
         part = Part(frames, start, stop)

@@ -46,21 +46,21 @@ def judge_drive(
         searched: range that was to be searched around the initial extrinsic.
         classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
     """
-    said = _said(estimate, initial, searched, classifier)
+    concluded = _conclude(estimate, initial, searched, classifier)
     return Verdict(
-        said.word,
-        said.reason,
+        concluded.word,
+        concluded.reason,
         estimate.camera_from_lidar,
         moved(initial, estimate.camera_from_lidar),
         covariance=estimate.covariance,
         used=estimate.frames,
         skipped=estimate.skipped,
-        within=said.within,
-        advice=said.advice,
+        within=concluded.within,
+        advice=concluded.advice,
     )
 
 
-class _Said(NamedTuple):
+class _Conclusion(NamedTuple):
     """The word of a verdict, the reason, what to do next, and the tolerance that the result is within."""
 
     word: Word
@@ -69,43 +69,43 @@ class _Said(NamedTuple):
     within: Tolerance | None = None
 
 
-def _said(
+def _conclude(
     estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
-) -> _Said:
+) -> _Conclusion:
     used, skipped = estimate.frames, len(estimate.skipped)
     if 2 * skipped >= used + skipped:
-        return _Said(REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}")
+        return _Conclusion(REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}")
     turned, shifted = moved(initial, estimate.camera_from_lidar)
     if reach(initial, estimate.camera_from_lidar, searched).share > MARGIN:
-        return _Said(
+        return _Conclusion(
             REJECTED,
             f"The result lies {turned:.2g}° and {shifted:.0f} cm from the start, outside the range searched "
             f"({searched.label}).",
             out_of_range(searched),
         )
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
-        return _Said(
+        return _Conclusion(
             CANNOT_TELL,
             f"The frames determine the extrinsic only to {estimate.rotation_deg:.2g}° and "
             f"{estimate.translation_cm:.0f} cm (1σ).",
             SCATTER,
         )
     if isinstance(classifier, str):
-        return _Said(CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}")
+        return _Conclusion(CANNOT_TELL, f"{used} frames agree, but how reliable that is cannot be judged. {classifier}")
     moments = min(used, len({look.position for look in estimate.looks}) or used)
     if moments < FEWEST_JUDGED:
         of_them = "" if moments == used else f" of {number_of(moments, 'moment')}"
         few = f"A drive is judged by at least {FEWEST_JUDGED} frames of different moments"
-        return _Said(CANNOT_TELL, f"{few}; this one has {number_of(used, 'frame')}{of_them}.", MORE_PLACES)
+        return _Conclusion(CANNOT_TELL, f"{few}; this one has {number_of(used, 'frame')}{of_them}.", MORE_PLACES)
     predictors = drive_predictors(estimate)
     if predictors is None:
-        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
+        return _Conclusion(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
     within = classifier.finest(predictors, DRIVE_TOLERANCES)
     if within == DRIVE_LIMITS:
-        return _Said(ACCEPTED, f"{used} frames agree.", within=within)
+        return _Conclusion(ACCEPTED, f"{used} frames agree.", within=within)
     wrong = classifier(predictors)
     if math.isnan(wrong):
-        return _Said(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
+        return _Conclusion(CANNOT_TELL, "Its frames hold too little information to judge the drive.", RICHER_SCENE)
     halves, aligned = halves_cm(estimate.looks), aligned_cm(estimate)
     why = [f"the halves of the drive differ by {halves:.0f} cm"] if halves > HALVES_CM else []
     if aligned > ALIGNED_CM:
@@ -113,7 +113,7 @@ def _said(
     certain = f"not certain to be within {DRIVE_LIMITS}"
     if within is not None:
         certain = f"within {within}, but perhaps not within {DRIVE_LIMITS}"
-    return _Said(
+    return _Conclusion(
         CANNOT_TELL,  # not rejected: many drives beyond the limits are only a little beyond them
         f"The result of {used} frames is {certain} (probability of a larger error: {wrong:.0%})"
         f"{''.join(f'; {one}' for one in why)}.",

@@ -1,9 +1,9 @@
 """Fitting matches with more than a pose: also with another focal length, principal point or lens model.
 
 With a wrong camera matrix matches fit an implausible pose: a focal length that is too long looks like a camera farther
-back. The range that was searched is a prior that holds the pose near the guess. Fitting one property of the lens
-together with the pose, and comparing the costs, shows which property is wrong. The fit is the weighted Gauss-Newton of
-`calibnet.network.pose`, with the same weights.
+back. The range of the stage is a prior that holds the pose near where the look started. Fitting one property of the
+lens together with the pose, and comparing the costs, shows which property is wrong. The fit is the weighted
+Gauss-Newton of `calibnet.network.pose`, with the same weights.
 """
 
 from __future__ import annotations
@@ -64,29 +64,24 @@ class Fit:
     """Matches fitted by a pose and a lens.
 
     Attributes:
-        lens: what was fitted.
         camera_from_lidar: 4x4.
         focal: fitted focal length relative to that of the calibration.
         center: ``[2]`` fitted principal point minus that of the calibration, in pixels.
         radial: fitted coefficient k1.
-        cost: negative log posterior: all residuals, and the distance from the guess.
-        sigma: ``[P]`` standard deviations of the pose and of what was fitted with it, in the order of `Lens`.
+        cost: negative log posterior: all residuals, and the distance from where the look started.
     """
 
-    lens: Lens
     camera_from_lidar: Extrinsic = field(repr=False)
     focal: float
     center: Floats
     radial: float
     cost: float
-    sigma: Floats = field(repr=False)
 
 
 def fit(
     matches: Matches,
     before: Extrinsic,
     camera: PinholeCamera,
-    guess: Extrinsic,
     prior: Matrix6,
     lens: Lens = PINHOLE,
     start: Fit | None = None,
@@ -97,8 +92,7 @@ def fit(
         matches: of the look.
         before: ``camera_from_lidar`` that the look started from, 4x4.
         camera: of the stage.
-        guess: ``camera_from_lidar`` that the run started from.
-        prior: information ``[6, 6]`` about the guess.
+        prior: information ``[6, 6]`` about ``before``.
         lens: what to fit in addition to the pose.
         start: another fit of the same matches, whose pose is the starting point; iterations stop as soon as they
             cannot get below its cost any more. None to start from ``before``.
@@ -115,7 +109,6 @@ def fit(
     information[6:, 6:] = np.diag(LENS_SIGMA**-2)
     information = information[np.ix_(chosen, chosen)]
 
-    from_guess = before @ invert(guess)
     pose, extra = np.eye(4) if start is None else start.camera_from_lidar @ invert(before), np.zeros(4)
 
     buffer = np.empty((10, 2, len(points)))
@@ -126,7 +119,7 @@ def fit(
         residual = target - seen.T
         size = np.sqrt(scale**2 + residual**2)
         weight = ahead * INDEPENDENT / (scale * size)
-        offset = np.concatenate([pose_vector(pose @ from_guess), extra])[chosen]
+        offset = np.concatenate([pose_vector(pose), extra])[chosen]
         cost = INDEPENDENT * float((ahead * (size / scale - 1)).sum()) + 0.5 * offset @ information @ offset
         derivatives = jacobian.T[chosen].reshape(len(chosen), -1)  # a row each, of x and then of y
         weighted = derivatives * weight.reshape(-1)
@@ -147,15 +140,7 @@ def fit(
         pose, extra, (normal, gradient, cost) = further, more, tried
         if gained < SETTLED * cost or (start is not None and cost - gained * left > start.cost):
             break
-    return Fit(
-        lens,
-        pose @ before,
-        float(np.exp(extra[0])),
-        extra[1:3] * focal,
-        float(extra[3]),
-        cost,
-        np.sqrt(np.diag(np.linalg.inv(normal))),
-    )
+    return Fit(pose @ before, float(np.exp(extra[0])), extra[1:3] * focal, float(extra[3]), cost)
 
 
 def view(

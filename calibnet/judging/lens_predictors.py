@@ -76,7 +76,7 @@ class LensFits:
         if matches is None or not len(matches.points):
             return None
         alone, focal, center, radial, equidistant = (
-            fit(matches, origin, look.camera, origin, prior, lens) for lens in (PINHOLE, *LENSES)
+            fit(matches, origin, look.camera, prior, lens) for lens in (PINHOLE, *LENSES)
         )
         return cls(alone, focal, center, radial, equidistant, look.camera.width)
 

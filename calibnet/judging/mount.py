@@ -106,11 +106,13 @@ def mount_over(findings: Sequence[Finding], excess: float = USUAL_EXCESS) -> Mou
     kept = list(range(len(findings)))
     apart: list[int] = []
     while kept:
-        said = _Said([findings[at] for at in kept], excess)
-        stays = said.stays()
+        segmentation = _Segmentation([findings[at] for at in kept], excess)
+        stays = segmentation.stays()
         odd = min((stop - start, start) for start, stop in stays[1:-1] or [(0, FEWEST)])
         if odd[0] >= FEWEST:
-            found = [replace(stay, members=tuple(kept[at] for at in stay.members)) for stay in map(said.stay, stays)]
+            found = [
+                replace(stay, members=tuple(kept[at] for at in stay.members)) for stay in map(segmentation.stay, stays)
+            ]
             return Mount(tuple(found), tuple(sorted(apart)))
         apart.append(kept.pop(odd[1]))
     return Mount()
@@ -122,8 +124,8 @@ def difference(one: Stay, other: Stay) -> tuple[float, float]:
     return error.rotation_deg, error.translation_cm
 
 
-class _Said:
-    """The estimates of drives relative to one of them, with running sums of their normal equations."""
+class _Segmentation:
+    """Segments the estimates of drives, by running sums of their normal equations relative to one of them."""
 
     def __init__(self, findings: Sequence[Finding], excess: float) -> None:
         self.origin = findings[len(findings) // 2].camera_from_lidar

@@ -7,7 +7,6 @@ says what each of them adds.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from calibnet.geometry import MiscalibrationRange, euler_xyz, invert
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.correlated_errors import correlated_covariance
-from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit
+from calibnet.judging.lens import LENSES, fit
 from calibnet.trace import CascadeTrace, StageTrace
 
 AXIS_NAMES = ("pitch", "yaw", "roll", "across the view", "along the image's height", "along the view")
@@ -97,7 +96,7 @@ def lens_gain(alone: float, bent: float) -> float:
     return math.log(max(bent, LEAST) / max(alone, LEAST))
 
 
-def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, float]:
+def misfits(stage: StageTrace) -> tuple[float, float]:
     """Mean cost per match of a stage's last look, at the pose that fits its matches best; NaN without matches.
 
     It varies between frames as much as with faults of the input, but for one frame it is lowest with the right lens.
@@ -109,8 +108,8 @@ def misfits(stage: StageTrace, lenses: Sequence[Lens] = LENSES) -> tuple[float, 
     matches, prior, origin = stage.matches, stage.range.information, stage.looked_from
     if matches is None or not len(matches.points):
         return math.nan, math.nan
-    alone = fit(matches, origin, stage.camera, origin, prior, PINHOLE)
-    bent = [fit(matches, origin, stage.camera, origin, prior, lens, start=alone).cost for lens in lenses]
+    alone = fit(matches, origin, stage.camera, prior)
+    bent = [fit(matches, origin, stage.camera, prior, lens, start=alone).cost for lens in LENSES]
     return alone.cost / len(matches.points), min(alone.cost, *bent, math.inf) / len(matches.points)
 
 

@@ -113,16 +113,16 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
             CANNOT_TELL, f"The calibration seems to be off by {off}, but the uncertainty of that is unknown."
         )
     offset = pose_vector(given @ invert(estimate))
-    off = _said(error, offset, found.covariance)
+    off = _in_words(error, offset, found.covariance)
     tolerances = [one for one in standard.tolerances if found.within is None or one >= found.within]
     certain = None if found.within is None else tolerances[-1]
-    still = np.zeros(6)
-    told = next(
-        (one for one in tolerances if probability_within(still, found.covariance, one, certain) >= PROBABLE),
+    no_offset = np.zeros(6)
+    resolved = next(
+        (one for one in tolerances if probability_within(no_offset, found.covariance, one, certain) >= PROBABLE),
         tolerances[-1],
     )
-    if _is_beyond(error, offset, found.covariance, told):
-        return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {told}.", advice=CORRECT_IT)
+    if _is_beyond(error, offset, found.covariance, resolved):
+        return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {resolved}.", advice=CORRECT_IT)
     for tolerance in tolerances:
         share = probability_within(offset, found.covariance, tolerance, certain)
         if share >= PROBABLE:
@@ -212,7 +212,7 @@ def _is_beyond(error: PoseError, offset: Vector6, covariance: Matrix6, tolerance
     )
 
 
-def _said(error: PoseError, offset: Vector6, covariance: Matrix6) -> str:
+def _in_words(error: PoseError, offset: Vector6, covariance: Matrix6) -> str:
     """The error with its uncertainty, and the axes with the largest shares of it."""
     turn = float(np.degrees(BAND * _deviation(offset[ROTATION], covariance[ROTATION, ROTATION])))
     shift = float(100 * BAND * _deviation(offset[TRANSLATION], covariance[TRANSLATION, TRANSLATION]))

@@ -1,8 +1,8 @@
 """Pose estimation (paper section 3.4): two heads with one interface.
 
-`RegressionHead` is the paper's: translation and unit quaternion from the volume. `GeometricHead`
-solves a weighted perspective-n-point problem with the displacement field, so that intrinsics and
-depths are inputs of the solution instead of being learned for one rig.
+`RegressionHead` is the paper's: translation and unit quaternion, regressed from what the volumes were decoded to.
+`GeometricHead` solves a weighted perspective-n-point problem with the displacement field, so that intrinsics and depths
+are inputs of the solution instead of being learned for one rig.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class FleetProgress:
-    """A bar that counts drives and their verdicts, with a line for each that failed."""
+    """A bar that counts drives and their verdicts, with a line for each that failed; in a log, a line for each."""
 
     def __init__(self, progress: Progress, task: TaskID) -> None:
         self._progress, self._task = progress, task
@@ -27,9 +27,11 @@ class FleetProgress:
         self._counts[row.verdict] += 1
         said = ", ".join(f"{count} {word}" for word, count in sorted(self._counts.items()))
         self._progress.update(self._task, advance=1, said=said)
-        if row.verdict == "failed":
-            text = f"Failed: {row.name}: {row.reason}"
-            self._progress.console.print(text, style="yellow")
+        console, failed = self._progress.console, row.verdict == "failed"
+        if failed:
+            console.print(f"Failed: {row.name}: {row.reason}", style="yellow")
+        elif not console.is_terminal:  # a bar that nobody sees grow tells a log nothing
+            console.print(f"{row.name}: {row.verdict}")
 
 
 @contextmanager

@@ -5,7 +5,7 @@ import pytest
 
 from calibnet.geometry import miscalibration, pose_error
 from calibnet.geometry.se3 import pose_from_vector, transform_points
-from calibnet.judging.lens import LENSES, PINHOLE, Lens, fit, view
+from calibnet.judging.lens import LENSES, PINHOLE, fit, view
 from tests.support.drive import REFERENCE
 from tests.support.matches import CAMERA, matches
 
@@ -30,10 +30,10 @@ def test_derivatives_are_those_of_finite_differences(equidistant: bool) -> None:
 
 def test_the_pose_alone_is_found_and_no_lens_gains_where_the_lens_is_right() -> None:
     found = matches(CORRECTION, noise=1.0)
-    alone = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, PINHOLE)
+    alone = fit(found, REFERENCE, CAMERA, PRIOR, PINHOLE)
     error = pose_error(alone.camera_from_lidar, CORRECTION @ REFERENCE)
     assert error.translation_cm < 1.5 and error.rotation_deg < 0.03
-    gains = [alone.cost - fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, lens).cost for lens in LENSES]
+    gains = [alone.cost - fit(found, REFERENCE, CAMERA, PRIOR, lens).cost for lens in LENSES]
     assert max(gains) < 1.0
 
 
@@ -57,7 +57,7 @@ def equidistant(places: np.ndarray) -> np.ndarray:
 )
 def test_the_lens_that_is_wrong_gains_most_and_is_measured(name, bend, found) -> None:  # type: ignore[no-untyped-def]
     bad = matches(CORRECTION, bend, noise=0.5)
-    fits = {lens.name: fit(bad, REFERENCE, CAMERA, REFERENCE, PRIOR, lens) for lens in (PINHOLE, *LENSES)}
+    fits = {lens.name: fit(bad, REFERENCE, CAMERA, PRIOR, lens) for lens in (PINHOLE, *LENSES)}
     assert min(fits, key=lambda key: fits[key].cost) == name
     assert fits[""].cost - fits[name].cost > 5
     value, expected, within = found(fits[name])
@@ -67,17 +67,10 @@ def test_the_lens_that_is_wrong_gains_most_and_is_measured(name, bend, found) ->
     assert right.translation_cm < wrong.translation_cm
 
 
-def test_standard_deviations_are_of_the_pose_and_of_what_is_fitted_besides() -> None:
-    found = matches(CORRECTION, noise=1.0)
-    assert fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, PINHOLE).sigma.shape == (6,)
-    both = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, Lens("both", focal=True, radial=True))
-    assert both.sigma.shape == (8,) and (both.sigma > 0).all()
-
-
 def test_a_fit_that_starts_from_the_pose_alone_comes_to_the_same_and_is_given_up_where_it_cannot_win() -> None:
     found = matches(CORRECTION, noise=1.0)
-    alone = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, PINHOLE)
+    alone = fit(found, REFERENCE, CAMERA, PRIOR, PINHOLE)
     for lens in LENSES:
-        afresh = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, lens).cost
-        warm = fit(found, REFERENCE, CAMERA, REFERENCE, PRIOR, lens, start=alone).cost
+        afresh = fit(found, REFERENCE, CAMERA, PRIOR, lens).cost
+        warm = fit(found, REFERENCE, CAMERA, PRIOR, lens, start=alone).cost
         assert warm == pytest.approx(afresh, rel=3e-4) if afresh <= alone.cost else warm > alone.cost

@@ -274,6 +274,15 @@ def test_bars_are_named_by_foreign_text() -> None:
         progress.advance(row_of(Drive("a[/b]", "c[/d]", "folder", "/x"), verdict="failed", reason="e[/f]"))
 
 
+def test_a_log_has_a_line_for_every_drive_of_a_fleet(capsys: pytest.CaptureFixture[str]) -> None:
+    drives = [Drive("car", name, "folder", "/x") for name in ("one", "two")]
+    with fleet_progress(2) as progress:
+        progress.advance(row_of(drives[0], verdict="cannot tell"))
+        assert capsys.readouterr().err.strip() == "car/one: cannot tell", "at once, not at the end"
+        progress.advance(row_of(drives[1], verdict="failed", reason="It is cut short."))
+    assert "Failed: car/two: It is cut short." in capsys.readouterr().err
+
+
 def test_variables_of_libraries_that_change_what_they_do_are_taken_out() -> None:
     given = {"OPENCV_IO_MAX_IMAGE_PIXELS": "abc", "RERUN_FLUSH_NUM_BYTES": "-1", "RERUN_CHUNK_MAX_ROWS": "1"}
     kept = {"RERUN_STRICT": "0", "RUST_LOG": "info", "HOME": "/"}
