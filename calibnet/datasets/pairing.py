@@ -23,10 +23,15 @@ WORTH_A_WARNING_MS = 20.0
 """Time between image and scan above which the user is warned, in which a car at 50 km/h moves 28 cm."""
 CLOCK_DIGITS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}
 """Unit in seconds of a time since 1970, by its number of digits."""
-TIME_IN_NAME = re.compile(r"(?:.*[^\d.])?(\d{13}|\d{16}|\d{19}|\d{10}[._]\d{3,9})|(\d{10,19}|\d{9,10}[._]\d+)")
-"""A time since 1970 as a file name or, for milliseconds and finer, at its end, as in nuScenes."""
-DATE = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[ T_-](\d\d)[:-]?(\d\d)[:-]?(\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
-"""A date as a time or a file name, as in KITTI and ISO 8601, with up to nine digits of a second."""
+TIME_IN_NAME = re.compile(
+    r"(?:.*[^\d.])?(\d{13}|\d{16}|\d{19}|\d{10}[._]\d{3,9})|(\d{10,19}|\d{9,10}_\d+|\d{1,10}\.\d{3,})"
+)
+"""A time since 1970 as a file name or, for milliseconds and finer, at its end, as in nuScenes; or a clock's seconds."""
+DATE = re.compile(
+    r"(\d{4})[-_]?(\d\d)[-_]?(\d\d)[ T_-](\d\d)[:_-]?(\d\d)[:_-]?(\d\d)"
+    r"(?:[.,](\d+)|[_-](\d{3}|\d{6}|\d{9}))?(Z|[+-]\d\d:?\d\d)?"
+)
+"""A date as a time or a file name, as in KITTI, ISO 8601 and ``20260301_140506_123``."""
 NEWEST = 4e9
 """Largest time in seconds since 1970."""
 
@@ -215,8 +220,9 @@ def _by_file(lines: list[str], files: Mapping[str, Path]) -> list[str] | None:
 
 def _in_name(stem: str) -> float | None:
     """The time that a file name is, or ends with."""
-    if "." in stem and (seconds := _of_date(stem)) is not None:
-        return seconds
+    date = re.sub(r"^\D+", "", stem)
+    if (parts := DATE.fullmatch(date)) is not None and (parts[7] or parts[8]):
+        return _of_date(date)
     match = TIME_IN_NAME.fullmatch(stem)
     return None if match is None else _seconds((match[1] or match[2]).replace("_", "."))
 
@@ -225,10 +231,12 @@ def _seconds(word: str) -> float | None:
     """Seconds of a time in any of the usual forms."""
     if re.fullmatch(r"\d+", word) and (unit := CLOCK_DIGITS.get(len(word))) is not None:
         return int(word) * unit if int(word) * unit < NEWEST else None
+    if DATE.fullmatch(word) is not None:  # first, since Python reads 2026_03_01_14_05_06 as a number
+        return _of_date(word)
     try:
         number = float(word)
     except ValueError:
-        return _of_date(word)
+        return None
     return number if np.isfinite(number) and abs(number) < NEWEST else None
 
 
@@ -237,11 +245,11 @@ def _of_date(word: str) -> float | None:
     match = DATE.fullmatch(word)
     if match is None:
         return None
-    year, month, day, hour, minute, second, fraction, zone = match.groups()
+    year, month, day, hour, minute, second, fraction, further, zone = match.groups()
     leap = second == "60"
     text = f"{year}-{month}-{day}T{hour}:{minute}:{'59' if leap else second}{zone or '+00:00'}"
     try:
         whole = datetime.datetime.fromisoformat(text).timestamp()
     except ValueError:
         return None
-    return whole + leap + float(fraction or 0)
+    return whole + leap + float(f"0.{fraction or further or 0}")

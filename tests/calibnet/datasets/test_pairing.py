@@ -175,6 +175,8 @@ def test_times_that_are_asked_for_and_missing(write_layout):
     [
         ["2026-03-01T14:05:06.1+09:00", "2026-03-01T05:05:07.1Z", "2026-03-01 05:05:09.1"],
         ["20260301T050506.100", "20260301T050507.100", "20260301T050509.100"],
+        ["2026-03-01 05:05:06,25", "2026-03-01T14:05:07,25+09:00", "2026-03-01 05:05:09,25"],
+        ["2026-03-01T05:05:06-0100", "2026-03-01T05:05:07.000-01:00", "2026_03_01_06_05_09_000"],
         ["2016-12-31 23:59:60.5", "2017-01-01 00:00:01.5", "2017-01-01 00:00:03.5"],
         ["-1.5", "-0.5", "1.5"],
     ],
@@ -187,10 +189,21 @@ def test_dates_of_other_forms_are_times(times, write_layout):
     assert_allclose([frame.timestamp for frame in layout.open(max_time_difference=5)], [0, 1, 3], atol=1e-6)
 
 
-def test_names_that_are_dates_are_times(write_layout):
+@pytest.mark.parametrize(
+    "name",
+    [
+        "2026-03-01_14-05-0{}.12{}",
+        "20260301_14050{}_12{}",
+        "2026_03_01_14_05_0{}_12{}000",
+        "2026-03-01-14-05-0{}-12{}",
+        "front_20260301T14050{}.12{}",
+        "0{}.12{}",
+    ],
+)
+def test_names_that_are_dates_are_times(write_layout, name):
     layout = write_layout("folder")
     for files, late in ((layout.images, 0), (layout.scans, 4)):
-        stems = [f"2026-03-01_14-05-0{second}.12{late}" for second in (6, 7, 9)]
+        stems = [name.format(second, late) for second in (6, 7, 9)]
         files[:] = [path.rename(path.parent / f"{stem}{path.suffix}") for path, stem in zip(files, stems, strict=True)]
     sequence = layout.open()
     assert sequence.notes == ("Paired by time: 3 frames, image and scan up to 4 ms apart.",)
