@@ -68,6 +68,8 @@ def read_autoware(content: Mapping[Any, Any], path: Path, wanted: Wanted) -> Cal
 def _items(content: Any) -> list[Any]:
     if isinstance(content, Mapping) and isinstance(content.get("transforms"), list):
         content = content["transforms"]
+    if isinstance(content, Mapping) and any(key in content for key in CHILDREN):
+        return [content]  # a single message, as in Apollo's files
     return content if isinstance(content, list) else []
 
 

@@ -48,7 +48,7 @@ NAMES: tuple[tuple[str, tuple[str, ...]], ...] = (
     (WHOLE, (r"binning[xy]?|roi\w*|crop\w*|[xy]offset|offset[xy]", r"resiz\w*|(image|picture)?scale\w*|downsampl\w*")),
     (INVERSE, (rf"({_A}?{_LIDAR}(from|in)|{_A}{_LIDAR}){_CAM}{_OF}", rf"{_A}?{_CAM}(to|2){_LIDAR}{_OF}")),
     (EXTRINSIC, (rf"{_A}?{_CAM}(from)?{_LIDAR}{_OF}", rf"{_A}?{_LIDAR}(to|2)?{_CAM}{_OF}", rf"extrinsics?{_OF}")),
-    (EXTRINSIC, (r"t|tf|tr|rt|pose|transform\w*", rf"t({_CAM}|{_LIDAR}|bs|body|imu|base|ic|vehicle)\w*")),
+    (EXTRINSIC, (r"[rpt]cl", r"t|tf|tr|rt|pose|transform\w*", rf"t({_CAM}|{_LIDAR}|bs|body|imu|base|ic|vehicle)\w*")),
     (EXTRINSIC, (r"r|q|[tq][wxyz]|[rt]vecs?|rpy|roll|pitch|yaw|euler", r"(rot|trans)(ation|lation)?s?|quaternions?")),
 )  # fmt: skip
 """The right keys instead of names that match these patterns, in lower case and without ``_``; the first match

@@ -198,6 +198,9 @@ def test_transforms_between_frames(write):
     assert_allclose(found.camera_from_lidar, EXTRINSIC, atol=1e-12)
     by_hand = "- {parent: velodyne, child: cam_optical, translation: [0.2, 0, -0.1], rpy_deg: [-90, 0, -90]}\n"
     assert_allclose(read_calibration(write(by_hand)).camera_from_lidar, EXTRINSIC, atol=1e-12)
+    alone = "header: {seq: 0, frame_id: velodyne64}\nchild_frame_id: front_camera\ntransform:\n"
+    alone += "  translation: {x: 0.2, y: 0.0, z: -0.1}\n  rotation: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}\n"
+    assert_allclose(read_calibration(write(alone)).camera_from_lidar, EXTRINSIC, atol=1e-12)
 
 
 def test_frames_are_named_where_their_names_do_not_tell(write):

@@ -24,7 +24,10 @@ NUMBERS = "[0.1, -0.2, 0.3, 0.4]"
     [
         (MATRIX, "K K_02 intrinsics camera_intrinsics cameraMatrix Camera-Matrix fx fy cx cy focal_length camera_info"),
         (LENS, "D dist_coeffs distCoeffs distortion_coeff distortion_coeffs distortion_coefficients distorsion k1"),
-        (EXTRINSIC, "extrinsic extrinsics T_cam_lidar T_cam0_velo Tr_velo_to_cam lidar_to_camera lidar2cam rvec T"),
+        (
+            EXTRINSIC,
+            "extrinsic extrinsics T_cam_lidar T_cam0_velo Tr_velo_to_cam lidar_to_camera lidar2cam rvec T Rcl Pcl",
+        ),
         (EXTRINSIC, "Camera_From_Lidar rotation translation quaternion T_camera_from_lidar lidar_camera_extrinsics"),
         (INVERSE, "T_lidar_cam T_lidar_camera camera_to_lidar cam2lidar"),
         (SIZE, "image_width image_height image_size resolution Width"),
