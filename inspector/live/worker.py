@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +12,7 @@ from typing import Any
 
 from calibnet.errors import CalibnetError
 
-GRACE_S, GRACE_STEPS = 0.6, 12
+GRACE_S = 0.6
 """Seconds by which jobs that can wait are put off after every answer, so that a slider that moves on is served
 first."""
 
@@ -62,6 +63,7 @@ class Worker:
         self._next: Job | None = None
         self._later: list[Job] = []
         self._task: asyncio.Task[None] | None = None
+        self._asked = asyncio.Event()
         self._stop = threading.Event()
         self.busy = ""
         self.progress: tuple[int, int] | None = None
@@ -69,6 +71,7 @@ class Worker:
     def ask(self, job: Job) -> None:
         """Run a job as soon as the running one ends; jobs that waited before are dropped."""
         self._next = job
+        self._asked.set()
         self._wake()
 
     def ask_later(self, job: Job) -> None:
@@ -99,9 +102,10 @@ class Worker:
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         while self._next is not None or self._later:
-            for _ in range(GRACE_STEPS):
-                if self._next is None:
-                    await asyncio.sleep(GRACE_S / GRACE_STEPS)
+            if self._next is None:
+                self._asked.clear()
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._asked.wait(), GRACE_S)
             if self._next is None and not self._later:
                 break  # closed meanwhile
             can_wait = self._next is None

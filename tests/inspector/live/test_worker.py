@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from inspector.live.worker import Job, Worker
 
 
@@ -133,3 +135,27 @@ def test_a_fault_is_said_and_the_next_job_runs() -> None:
     done, problems = run(scenario)
     assert done == ["good"]
     assert problems == ["Internal error in calib-inspect (ZeroDivisionError: by zero). Please report it."]
+
+
+def test_who_asks_while_a_job_is_put_off_is_served_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inspector.live.worker.GRACE_S", 3600.0)
+
+    async def scenario() -> list[str]:
+        done: list[str] = []
+        worker = Worker(_nothing, _nothing)
+        worker.ask_later(job("later", done))
+        await asyncio.sleep(0.01)
+        worker.ask(job("now", done))
+        async with asyncio.timeout(60):
+            while not done:
+                await asyncio.sleep(0.01)
+        worker.close()
+        for task in asyncio.all_tasks() - {asyncio.current_task()}:
+            task.cancel()
+        return done
+
+    assert asyncio.run(scenario()) == ["now"]
+
+
+async def _nothing(_: str = "") -> None:
+    """Do nothing: nobody listens."""
