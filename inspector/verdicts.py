@@ -43,8 +43,15 @@ def _is_told(text: str, reason: str) -> bool:
     return text.rstrip(".").casefold() in reason.casefold()
 
 
-def title(verdict: Verdict) -> str:
-    """The word, and the tolerance that the extrinsic is within, where one is certain."""
+def title(verdict: Verdict, of: str = "") -> str:
+    """The word, and the tolerance that the extrinsic is within, where one is certain.
+
+    Args:
+        verdict: the verdict.
+        of: what it is a verdict on, where that is not the result of the run.
+    """
+    if of:
+        return f"{of}: {title(verdict).lower()}"
     word = verdict.word.capitalize()
     return word if verdict.within is None else f"{word} · within {verdict.within}"
 
@@ -63,8 +70,7 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
         verdict: the verdict.
         of: what it is a verdict on, where that is not the result of the run.
     """
-    heading = f"{of}: {title(verdict).lower()}" if of else title(verdict)
-    lines = [f"# {heading}", "", verdict.reason, ""]
+    lines = [f"# {title(verdict, of)}", "", verdict.reason, ""]
     lines += [f"- **{cause.name}**: {_once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
     lines += [""] if verdict.causes else []
     lines += [verdict.advice, ""] if verdict.advice else []

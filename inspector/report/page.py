@@ -13,9 +13,9 @@ from inspector.report.charts import charts
 from inspector.report.files import AS_ONE, LEFT
 from inspector.report.metrics import DISTANCE_M, Figures
 from inspector.report.tables import axes_table, stages_table
-from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
+from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template, with_code
 from inspector.report.verdict import ROTATION, TRANSLATION, Finding, count, findings, headline, verdict
-from inspector.verdicts import title
+from inspector.verdicts import OF_GIVEN, title
 
 SETTING_NAMES = {
     "sequence": "data",
@@ -97,7 +97,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
         title=f"{name}: calibration report",
         kind="Camera–LiDAR calibration report",
         word=run.verdict.word,
-        verdict=title(run.verdict),
+        verdict=title(run.verdict, OF_GIVEN if run.given_verdict else ""),
         reasons=_items(verdict(run)),
         headline=headline(figures),
         findings=f'{warning}<ul class="verdict">\n{_items(findings(figures))}\n</ul>',
@@ -108,7 +108,7 @@ def make_page(figures: Figures, examples: Sequence[Example], recording: str, rec
 
 
 def _items(found: Sequence[Finding]) -> str:
-    return "\n".join(f'<li class="{finding.grade}">{escape(finding.sentence)}</li>' for finding in found)
+    return "\n".join(f'<li class="{finding.grade}">{with_code(finding.sentence)}</li>' for finding in found)
 
 
 def _coloring(run: RecordedRun) -> Coloring:

@@ -12,7 +12,7 @@ from inspector import entities
 from inspector.read.rig import RecordedRig
 from inspector.report.files import PICTURES, RECORDING
 from inspector.report.pictures import draw_overlay
-from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template
+from inspector.report.template import Head, Side, figure, report_page, scale_of_depth, template, with_code
 from inspector.report.verdict import GRADES
 from inspector.report.write import write_files
 from inspector.rig_result import CameraResult
@@ -84,7 +84,7 @@ def _reasons(cameras: tuple[CameraResult, ...]) -> Iterator[str]:
         named.setdefault(explained(camera.verdict), []).append(camera)
     for reason, of in named.items():
         names = "" if len(of) == len(cameras) else f"{', '.join(camera.name for camera in of)}: "
-        yield f'<li class="{GRADES[of[0].verdict.word]}">{escape(names + reason)}</li>'
+        yield f'<li class="{GRADES[of[0].verdict.word]}">{with_code(names + reason)}</li>'
 
 
 def _table(columns: list[str], rows: list[list[str]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from html import escape
 from importlib import resources
@@ -115,6 +116,11 @@ def figure(caption: str, left: Side, right: Side) -> str:
 <div class="handle"></div>
 </div>
 </figure>"""
+
+
+def with_code(sentence: str) -> str:
+    """A sentence as HTML, with what stands between backticks as code."""
+    return re.sub("`(.+?)`", r"<code>\1</code>", escape(sentence))
 
 
 def scale_of_depth() -> str:

@@ -77,6 +77,13 @@ def test_rejected_frames_are_told(record: Callable[..., Any], tmp_path: Path) ->
         assert f'<p class="word {reason.grade}">{word}</p>' in page
 
 
+def test_the_page_of_a_verification_is_headed_by_what_is_judged(known: RecordedRun, tmp_path: Path) -> None:
+    given = Verdict("rejected", "It is off; run without `verify` & look.", np.eye(4), (1.0, 20.0))
+    page = page_of(replace(known, given_verdict=given), tmp_path)
+    assert '<p class="word bad">Calibration as given: rejected</p>' in page
+    assert '<li class="bad">It is off; run without <code>verify</code> &amp; look.</li>' in page
+
+
 def test_the_drive_leads_where_it_is_believed(known: RecordedRun) -> None:
     reference = known.frames[0].reference
     assert reference is not None
