@@ -242,7 +242,8 @@ class Cascade:
             estimate = solve([*wider, *self.stages])
         estimate = estimate.inflated(self.coefficients.inflation)
         classifier = self.coefficients.for_drive(self.stages[-1].range)
-        return replace(estimate, verdict=judge_drive(estimate, initial, self.stages[0].range, classifier))
+        lens, searched = self.coefficients.drive_lens, self.stages[0].range
+        return replace(estimate, verdict=judge_drive(estimate, initial, searched, classifier, lens))
 
     def _calibrated(
         self, frame: Frame, start: Extrinsic, pose_prior: PosePrior | None, clock: Clock, detail: bool = False

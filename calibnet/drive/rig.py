@@ -212,7 +212,7 @@ class _LastLook:
                 consensus.add(trace.correction, trace.information)
                 look = drive_look(frame, position, trace)
                 self.of_camera[camera.name].append(look)
-                self.looks.append(in_rig(look, place))
+                self.looks.append(replace(in_rig(look, place), camera=camera.name))
                 if due.reached(position):
                     self.terms.append(InRig(gather(frame, looks.extrinsic), place))
         finally:

@@ -17,7 +17,7 @@ from calibnet.geometry import MiscalibrationRange, is_finest
 from calibnet.geometry.prior import PosePrior
 from calibnet.geometry.se3 import pose_vector
 from calibnet.geometry.types import Extrinsic, Matrix6
-from calibnet.judging.predictors import lens_gain, misfits
+from calibnet.judging.drive_lens import lens_reading
 from calibnet.trace import DriveEstimate, DriveLook, Estimate, StageTrace
 from calibnet.verdict import BadFrame
 
@@ -124,10 +124,9 @@ def solve_drive(
 
 def drive_look(frame: Frame, position: int, look: StageTrace) -> DriveLook:
     """The result of one look at one frame, as kept for the drive."""
-    lens = lens_gain(*misfits(look))
     offset, error_px = pose_vector(look.correction), look.match_error_px
     in_image = look.in_image(error_px, frame.camera)
-    return DriveLook(frame.index, position, offset, look.information, error_px, lens, in_image)
+    return DriveLook(frame.index, position, offset, look.information, error_px, lens_reading(look), in_image)
 
 
 class FrameLook(NamedTuple):

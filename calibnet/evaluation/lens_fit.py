@@ -1,4 +1,4 @@
-"""Fits the regression that names faults of the lens to frames with known faults."""
+"""Fits the regressions that name faults of the lens to frames, and to drives, with known faults."""
 
 from __future__ import annotations
 
@@ -11,25 +11,36 @@ from scipy.special import softmax
 from calibnet.errors import CalibrationError
 from calibnet.evaluation.corruptions import Corruption
 from calibnet.evaluation.logistic import left_out, regression
+from calibnet.evaluation.verdict_drives import DriveStream
 from calibnet.evaluation.verdict_fit import rounded
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
+from calibnet.judging.drive_lens import drive_lens_predictors, median_reading
 from calibnet.judging.lens_causes import BENT, CENTER, FAULTS, FOCAL, LensOdds
 from calibnet.judging.lens_predictors import lens_fits, lens_predictors
-from calibnet.trace import CascadeTrace
+from calibnet.trace import CascadeTrace, DriveEstimate
 
-CLASSES = {"focal-length": FOCAL, "principal-point": CENTER, "distorted": BENT, "equidistant": BENT}
+CLASSES = {
+    "focal-length": FOCAL,
+    "principal-point": CENTER,
+    "shifted": CENTER,
+    "distorted": BENT,
+    "equidistant": BENT,
+}
 """Name of each fault of the battery; runs with other faults count as runs without a fault of the lens."""
 TOO_WEAK = (
     ("focal-length", "+2 %"),
     ("focal-length", "-2 %"),
     ("principal-point", "+20, +0 px"),
     ("principal-point", "-20, +0 px"),
-    ("principal-point", "+0, +60 px"),
+    ("shifted", "+20 px"),
     ("distorted", "k1 -0.1"),
     ("distorted", "k1 0.1"),
 )
-"""Faults left out of the fit: those that hardly show in a frame, and a principal point moved down, which looks like a
-pitch."""
+"""Faults left out of the fit, as they hardly show."""
+PITCH = ("principal-point", "+0, +60 px")
+"""A fault that looks like a pitch in a frame, but not in a drive."""
+LATE = "late-scan"
+"""A fault that is not of the lens, but looks much like another focal length."""
 RIDGE = 1.0
 """Penalty of `calibnet.evaluation.logistic.regression`."""
 WRONG_NAMES = 0.05
@@ -47,8 +58,26 @@ class LensStream(RunStream):
         return None if looks is None else asdict(lens_predictors(looks))
 
     def has(self, fault: Corruption) -> bool:
-        """Whether a fault is one of the lens and strong enough to be recognised."""
-        return fault.name in CLASSES and (fault.name, fault.strength) not in TOO_WEAK
+        """Whether a fault is one of the lens and strong enough to be recognised in a frame."""
+        return is_of_lens(fault) and (fault.name, fault.strength) != PITCH
+
+
+class DriveLensStream(DriveStream):
+    """A `DriveStream` whose faults are of the lens, or late scans."""
+
+    def predictors_of(self, estimate: DriveEstimate) -> dict[str, float] | None:
+        """The predictors from all frames, whatever the verdict."""
+        found = median_reading(estimate.looks)
+        return None if found is None else asdict(drive_lens_predictors(found))
+
+    def has(self, fault: Corruption) -> bool:
+        """Whether a fault is a late scan, or one of the lens and strong enough to be recognised."""
+        return fault.name == LATE or is_of_lens(fault)
+
+
+def is_of_lens(fault: Corruption) -> bool:
+    """Whether a fault is one of the lens, and not too weak."""
+    return fault.name in CLASSES and (fault.name, fault.strength) not in TOO_WEAK
 
 
 @dataclass(frozen=True)
@@ -73,7 +102,7 @@ class LensFigures:
 
 
 def fit_lens(runs: Sequence[VerdictRun]) -> tuple[LensOdds, LensFigures]:
-    """Fit the regression to runs of `LensStream`.
+    """Fit a regression to runs of `LensStream` or `DriveLensStream`.
 
     Raises:
         CalibrationError: too few runs with one of the faults, or without any.

@@ -22,6 +22,7 @@ from calibnet.geometry import invert, sample_miscalibration
 from calibnet.geometry.se3 import pose_vector
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.judging.drive_predictors import drive_predictors
+from calibnet.trace import DriveEstimate
 from calibnet.verdict import ACCEPTED, DRIVE_LIMITS
 
 MOST = 16
@@ -56,24 +57,34 @@ class DriveStream:
         real, donor = self.sequences[which], self.sequences[(which + 1) % len(self.sequences)]
         sequence = Virtual(real, number, self.seed) if generator.random() < VIRTUAL_SHARE else real
         positions = part(len(sequence), generator)
-        fault = PLAIN if generator.random() < PLAIN_SHARE else drawn_fault(sequence, generator)
+        fault = PLAIN if generator.random() < PLAIN_SHARE else self.drawn_fault(sequence, generator)
         try:
             drive = Faulty(sequence, positions, None if fault is PLAIN else fault, [donor[0]])
             searched = self.cascade.stages[0].range
             guess = sample_miscalibration(searched, generator) @ sequence[positions[0]].camera_from_lidar
-            return measured(self.cascade, drive, guess, number, real.name, fault)
+            estimate = self.cascade.calibrate_drive(drive, guess)
+            return measured(estimate, drive, number, real.name, fault, self.predictors_of(estimate))
         except CalibnetError:
             return None
 
+    def predictors_of(self, estimate: DriveEstimate) -> dict[str, float] | None:
+        """The predictors of a run; None if the verdict needs none."""
+        found = drive_predictors(estimate)
+        asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
+        return asdict(found) if asked and found is not None else None
 
-def drawn_fault(sequence: FrameSequence, generator: np.random.Generator) -> Corruption:
-    """A random fault that can be applied to a drive, except a far start; all names are equally probable."""
-    named: dict[str, list[Corruption]] = {}
-    for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
-        if fault.farther == 1:
-            named.setdefault(fault.name, []).append(fault)
-    strengths = named[str(generator.choice(list(named)))]
-    return strengths[int(generator.integers(len(strengths)))]
+    def has(self, fault: Corruption) -> bool:
+        """Whether this stream draws a fault; none draws a far start."""
+        return True
+
+    def drawn_fault(self, sequence: FrameSequence, generator: np.random.Generator) -> Corruption:
+        """A random fault that can be applied to a drive; all names are equally probable."""
+        named: dict[str, list[Corruption]] = {}
+        for fault in (*corruptions(sequence, len(sequence) // 2, [sequence[0]]), *two_mounts(second=True)):
+            if fault.farther == 1 and self.has(fault):
+                named.setdefault(fault.name, []).append(fault)
+        strengths = named[str(generator.choice(list(named)))]
+        return strengths[int(generator.integers(len(strengths)))]
 
 
 def part(length: int, generator: np.random.Generator) -> list[int]:
@@ -88,18 +99,16 @@ def part(length: int, generator: np.random.Generator) -> list[int]:
 
 
 def measured(
-    cascade: Cascade, drive: Faulty, guess: np.ndarray, number: int, sequence: str, fault: Corruption
-) -> VerdictRun | None:
-    """Solve a drive, and compute its predictors and its error, the largest one over its frames.
-
-    Raises:
-        CalibrationError: no frame could be calibrated.
-    """
-    estimate = cascade.calibrate_drive(drive, guess)
+    estimate: DriveEstimate,
+    drive: Faulty,
+    number: int,
+    sequence: str,
+    fault: Corruption,
+    predictors: dict[str, float] | None,
+) -> VerdictRun:
+    """The run of a drive, with its error, the largest one over its frames."""
     there = estimate.camera_from_lidar
     error = farthest(there, drive)
-    found = drive_predictors(estimate)
-    asked = estimate.verdict is not None and estimate.verdict.word == ACCEPTED and found is not None
     return VerdictRun(
         number,
         sequence,
@@ -109,7 +118,7 @@ def measured(
         error.rotation_deg,
         error.translation_cm,
         DRIVE_LIMITS.holds(error),
-        asdict(found) if asked and found is not None else None,
+        predictors,
         pose_vector(there @ invert(next(readable(drive)).camera_from_lidar)).tolist(),
         np.linalg.inv(estimate.covariance).tolist(),
         float("nan"),

@@ -18,9 +18,10 @@ from annotated_types import Interval
 
 from calibnet.datasets.frame import Sequence
 from calibnet.errors import ConfigError
-from calibnet.evaluation.lens_fit import LensStream
+from calibnet.evaluation.lens_fit import DriveLensStream, LensStream
 from calibnet.evaluation.verdict_drives import DriveStream
 from calibnet.evaluation.verdict_runs import RunStream, VerdictRun
+from calibnet.judging.drive_lens import DriveLensPredictors
 from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.judging.lens_predictors import LensPredictors
 from calibnet.judging.predictors import Predictors
@@ -28,12 +29,18 @@ from calibnet.runtime.reading import MEGABYTE, read_text
 from calibnet.runtime.schema import validated
 from calibnet.runtime.writing import check_output
 
+PREDICTORS = (Predictors, LensPredictors, DrivePredictors, DriveLensPredictors)
 BATCH = 8
 """Runs per process in a batch; the time limit is checked between batches."""
 LARGEST = 256 * MEGABYTE
 """Largest size of a log in bytes; a run takes 2 kB."""
-Kind = Literal["frames", "lenses", "drives"]
-STREAMS: dict[Kind, type[RunStream | DriveStream]] = {"frames": RunStream, "lenses": LensStream, "drives": DriveStream}
+Kind = Literal["frames", "lenses", "drives", "drive-lenses"]
+STREAMS: dict[Kind, type[RunStream | DriveStream]] = {
+    "frames": RunStream,
+    "lenses": LensStream,
+    "drives": DriveStream,
+    "drive-lenses": DriveLensStream,
+}
 SYNTHETIC_SEED, SYNTHETIC_LENGTH = 901, 10
 """Seed of the first synthetic drive, and frames of each. Training uses other seeds."""
 
@@ -47,7 +54,7 @@ class Source:
         data: texts that `calibnet.training.data.open_data` reads.
         synthetic: number of synthetic drives to add.
         seed: seed of all random numbers.
-        kind: runs on single frames with any fault, on frames with faults of the lens, or on drives.
+        kind: runs on single frames or on drives, with any fault or with faults of the lens.
     """
 
     preset: str
@@ -131,7 +138,7 @@ def whole(run: VerdictRun) -> VerdictRun:
     axes = [6] if run.information is None else [6, *map(len, run.information)]
     if len(run.offset) != 6 or axes not in ([6], [6] * 7):
         raise KeyError(f"run {run.number} has other axes")
-    known = [{one.name for one in fields(kind)} for kind in (Predictors, LensPredictors, DrivePredictors)]
+    known = [{one.name for one in fields(kind)} for kind in PREDICTORS]
     if run.predictors is not None and run.predictors.keys() not in known:
         raise KeyError(f"run {run.number} was made with other predictors")
     return run

@@ -15,6 +15,7 @@ from calibnet.errors import ConfigError, WeightsError
 from calibnet.geometry import MiscalibrationRange
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.covariance import CovarianceModel
+from calibnet.judging.drive_lens import DriveLensPredictors
 from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.judging.lens_causes import FAULTS, LensOdds
 from calibnet.judging.lens_predictors import LensPredictors
@@ -43,6 +44,7 @@ class Coefficients:
         covariance: covariance model of frames.
         lens: regression that names faults of the lens; None if it was not fitted, so that none is named.
         drive: classifier of drives; None if it was not fitted.
+        drive_lens: regression that names faults of the lens of a drive; None if it was not fitted.
         inflation: factor on the stated covariance of a drive that makes it as large as errors are.
         weights: fingerprints of the stages that were run in the fit, by range. Only runs that end with the finest of
             them can be judged.
@@ -54,6 +56,7 @@ class Coefficients:
     covariance: CovarianceModel = field(default_factory=CovarianceModel)
     lens: LensOdds | None = None
     drive: Classifier | None = None
+    drive_lens: LensOdds | None = None
     inflation: float = 1.0
     weights: Mapping[MiscalibrationRange, str] = field(default_factory=dict)
     missing: str = "The verdict has not been fitted to these networks."
@@ -89,6 +92,7 @@ class Coefficients:
             "covariance": asdict(self.covariance),
             **({} if self.lens is None else {"lens": asdict(self.lens)}),
             **({} if self.drive is None else {"drive": _content(self.drive) | {"inflation": self.inflation}}),
+            **({} if self.drive_lens is None else {"drive_lens": asdict(self.drive_lens)}),
             "fitted": dict(self.fitted),
         }
         write_whole(path, (HEAD + tomli_w.dumps(content)).encode())
@@ -146,6 +150,7 @@ class _File:
     covariance: CovarianceModel
     lens: LensOdds | None = None
     drive: _Drive | None = None
+    drive_lens: LensOdds | None = None
     fitted: dict[str, Any] = field(default_factory=dict)
 
 
@@ -155,8 +160,9 @@ def _read(path: Path) -> Coefficients:
         content = parse_toml(read_text(path, "File of a verdict's coefficients", error=WeightsError, remedy=remedy))
         read = validated(_File, content, origin, WeightsError, remedy)
         _require_known(read.frame, Predictors)
-        if read.lens is not None:
-            _require_faults(read.lens)
+        for odds, predictors in ((read.lens, LensPredictors), (read.drive_lens, DriveLensPredictors)):
+            if odds is not None:
+                _require_faults(odds, predictors)
         drive = None
         if read.drive is not None:
             _require_known(read.drive, DrivePredictors)
@@ -165,14 +171,16 @@ def _read(path: Path) -> Coefficients:
     except (ValueError, ConfigError) as error:
         raise WeightsError(f"{origin}: {error}; {remedy}.") from None
     inflation = 1.0 if read.drive is None else read.drive.inflation
-    return Coefficients(read.frame, read.covariance, read.lens, drive, inflation, weights, "", read.fitted)
+    return Coefficients(
+        read.frame, read.covariance, read.lens, drive, read.drive_lens, inflation, weights, "", read.fitted
+    )
 
 
-def _require_faults(odds: LensOdds) -> None:
+def _require_faults(odds: LensOdds, predictors: type[DataclassInstance]) -> None:
     if not set(FAULTS) == odds.intercepts.keys() == odds.weights.keys():
         raise ValueError(f"faults of the lens are {', '.join(FAULTS)}")
     for weights in odds.weights.values():
-        _require_predictors(weights, LensPredictors)
+        _require_predictors(weights, predictors)
 
 
 def _require_known(classifier: Classifier, predictors: type[DataclassInstance]) -> None:

@@ -9,7 +9,9 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.advice import MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
 from calibnet.judging.classifier import Classifier
+from calibnet.judging.drive_lens import drive_lens_causes
 from calibnet.judging.drive_predictors import aligned_cm, drive_predictors, halves_cm
+from calibnet.judging.lens_causes import LensOdds
 from calibnet.judging.predictors import reach
 from calibnet.runtime.text import number_of
 from calibnet.trace import MARGIN, DriveEstimate
@@ -19,6 +21,7 @@ from calibnet.verdict import (
     DRIVE_LIMITS,
     DRIVE_TOLERANCES,
     REJECTED,
+    Cause,
     Tolerance,
     Verdict,
     Word,
@@ -36,7 +39,11 @@ them; rotations are converted as in `calibnet.judging.drive_predictors`."""
 
 
 def judge_drive(
-    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
+    estimate: DriveEstimate,
+    initial: Extrinsic,
+    searched: MiscalibrationRange,
+    classifier: Classifier | str,
+    lens: LensOdds | None = None,
 ) -> Verdict:
     """Whether the extrinsic that was solved from a drive is good.
 
@@ -45,13 +52,16 @@ def judge_drive(
         initial: ``camera_from_lidar`` that the drive started from.
         searched: range that was to be searched around the initial extrinsic.
         classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
+        lens: names a fault of the lens, see `calibnet.judging.drive_lens`; without it none is named.
     """
-    concluded = _conclude(estimate, initial, searched, classifier)
+    causes = drive_lens_causes(estimate.looks, lens, FEWEST_JUDGED)
+    concluded = _conclude(estimate, initial, searched, classifier, causes)
     return Verdict(
         concluded.word,
         concluded.reason,
         estimate.camera_from_lidar,
         moved(initial, estimate.camera_from_lidar),
+        causes,
         covariance=estimate.covariance,
         used=estimate.frames,
         skipped=estimate.skipped,
@@ -70,11 +80,17 @@ class _Conclusion(NamedTuple):
 
 
 def _conclude(
-    estimate: DriveEstimate, initial: Extrinsic, searched: MiscalibrationRange, classifier: Classifier | str
+    estimate: DriveEstimate,
+    initial: Extrinsic,
+    searched: MiscalibrationRange,
+    classifier: Classifier | str,
+    causes: tuple[Cause, ...],
 ) -> _Conclusion:
     used, skipped = estimate.frames, len(estimate.skipped)
     if 2 * skipped >= used + skipped:
         return _Conclusion(REJECTED, f"Only {used} of {used + skipped} frames could be used. {estimate.skipped[0].why}")
+    if causes:
+        return _Conclusion(REJECTED, f"Its frames show a fault of the lens. {causes[0].text}")
     turned, shifted = moved(initial, estimate.camera_from_lidar)
     if reach(initial, estimate.camera_from_lidar, searched).share > MARGIN:
         return _Conclusion(

@@ -40,7 +40,7 @@ def drive_predictors(estimate: DriveEstimate) -> DrivePredictors | None:
     return DrivePredictors(
         match_error=math.log(max(float(np.median([look.match_error_px for look in looks])), LEAST)),
         aligned=math.log(max(aligned_cm(estimate), LEAST)),
-        lens=float(np.median([look.lens for look in looks])),
+        lens=float(np.median([math.nan if look.lens is None else look.lens.gain for look in looks])),
     )
 
 

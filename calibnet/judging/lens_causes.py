@@ -1,6 +1,6 @@
-"""Which fault of the lens the matches of a run indicate, and with which probability.
+"""Which fault of the lens the matches of a run or of a drive indicate, and with which probability.
 
-No network runs again: `calibnet.judging.lens_predictors` fits the matches of two looks with other lenses besides the
+No network runs again: `calibnet.judging.lens_predictors` fits the matches of looks with other lenses besides the
 pose, and a multinomial logistic regression turns these numbers into the probability of each fault, and of none. It is
 fitted to frames with such faults by `calib-inspect fit-verdict`.
 """
@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
-from calibnet.judging.lens_predictors import LensFits, LensPredictors, lens_fits, lens_predictors
-from calibnet.trace import CascadeTrace
+from calibnet.judging.lens_predictors import lens_fits, lens_predictors
+from calibnet.trace import CascadeTrace, LensReading
 from calibnet.verdict import Cause
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 FOCAL, CENTER, BENT = "focal-length", "principal-point", "distortion"
 FAULTS = (FOCAL, CENTER, BENT)
@@ -34,8 +38,12 @@ class LensOdds:
     intercepts: dict[str, float]
     weights: dict[str, dict[str, float]]
 
-    def __call__(self, predictors: LensPredictors) -> dict[str, float]:
-        """The probability of each fault; the remainder to 1 is the probability of no fault."""
+    def __call__(self, predictors: DataclassInstance) -> dict[str, float]:
+        """The probability of each fault; the remainder to 1 is the probability of no fault.
+
+        Args:
+            predictors: those that it was fitted to, of a frame or of a drive.
+        """
         numbers = asdict(predictors)
         odds = {
             name: intercept + sum(weight * numbers[of] for of, weight in self.weights[name].items())
@@ -56,30 +64,46 @@ def lens_causes(trace: CascadeTrace, odds: LensOdds | None) -> tuple[Cause, ...]
     looks = lens_fits(trace) if odds else None
     if odds is None or looks is None:
         return ()
-    found, fits = odds(lens_predictors(looks)), looks[0]
-    name = max(found, key=lambda one: found[one])
-    if found[name] < odds.named_from:
+    fine = looks[0].reading._replace(down=0.0)  # in a frame, up and down look like a pitch
+    return cause_of(odds, lens_predictors(looks), fine)
+
+
+def cause_of(odds: LensOdds, predictors: DataclassInstance, found: LensReading) -> tuple[Cause, ...]:
+    """The most probable fault, if it is probable enough to be named.
+
+    Args:
+        odds: the fitted regression.
+        predictors: those that it was fitted to.
+        found: fitted values of the lens, which have the right sign, and underestimate rather than overestimate.
+    """
+    probable = odds(predictors)
+    name = max(probable, key=lambda one: probable[one])
+    if probable[name] < odds.named_from:
         return ()
-    evidence = f"probability {found[name]:.0%}, by a regression fitted to frames with such faults"
+    evidence = f"probability {probable[name]:.0%}, by a regression fitted to input with such faults"
     if name == BENT:
         text = (
             "The image looks barrel-distorted: either its distortion was not removed, or it was taken with a fisheye "
             "lens (equidistant)."
         )
         return tuple(Cause(one, text, evidence) for one in (BENT, FISHEYE))
-    return (Cause(name, _focal_length(fits) if name == FOCAL else _principal_point(fits), evidence),)
+    return (Cause(name, _focal_length(found) if name == FOCAL else _principal_point(found), evidence),)
 
 
-def _focal_length(fits: LensFits) -> str:
-    longer = fits.focal.focal - 1  # the finest look has the right sign, and underestimates rather than overestimates
+def _focal_length(found: LensReading) -> str:
+    longer = math.exp(found.focal) - 1
     return (
         f"The image looks as if its focal length were more than {abs(longer):.1%} "
         f"{'longer' if longer > 0 else 'shorter'} than camera_matrix says."
     )
 
 
-def _principal_point(fits: LensFits) -> str:
+def _principal_point(found: LensReading) -> str:
+    if abs(found.right) >= abs(found.down):
+        offset, where = found.right, "to the right" if found.right > 0 else "to the left"
+    else:
+        offset, where = found.down, "down" if found.down > 0 else "up"
     return (
-        f"The image looks as if its principal point lay more than {abs(fits.aside):.1%} of the width farther to the "
-        f"{'right' if fits.aside > 0 else 'left'} than camera_matrix says, or as if it were shifted."
+        f"The image looks as if its principal point lay more than {abs(offset):.1%} of the width farther {where} than "
+        "camera_matrix says, or as if it were shifted."
     )

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 from calibnet.judging.lens import LENSES, PINHOLE, Fit, fit
-from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.trace import CascadeTrace, LensReading, StageTrace
 
 COARSE = 3
 """The coarse look is that of the third stage from the end, whose window covers a whole distortion."""
@@ -81,9 +81,20 @@ class LensFits:
         return cls(alone, focal, center, radial, equidistant, look.camera.width)
 
     @property
-    def aside(self) -> float:
-        """Offset of the principal point to the right, in widths of the image."""
-        return float(self.center.center[0]) / self.width
+    def reading(self) -> LensReading:
+        """Costs and fitted values in the form that drives keep."""
+        right, down = self.center.center / self.width
+        return LensReading(
+            cost=self.alone.cost,
+            focal_cost=self.focal.cost,
+            center_cost=self.center.cost,
+            radial_cost=self.radial.cost,
+            equidistant_cost=self.equidistant.cost,
+            focal=math.log(self.focal.focal),
+            right=float(right),
+            down=float(down),
+            radial=self.radial.radial,
+        )
 
     def gain(self, other: Fit) -> float:
         """The share of the cost that a lens saves; negative if it increases the cost."""
@@ -92,15 +103,15 @@ class LensFits:
     @property
     def numbers(self) -> tuple[float, ...]:
         """This look's part of `LensPredictors`, in its order."""
-        focal = math.log(self.focal.focal)
+        reading = self.reading
         return (
             self.gain(self.focal),
-            focal,
-            abs(focal),
+            reading.focal,
+            abs(reading.focal),
             self.gain(self.center),
-            abs(self.aside),
+            abs(reading.right),
             self.gain(self.radial),
-            self.radial.radial,
+            reading.radial,
             max(self.gain(self.equidistant), LEAST_GAIN),
         )
 

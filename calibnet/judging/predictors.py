@@ -82,18 +82,13 @@ def predictors(trace: CascadeTrace) -> Predictors:
     They are computed from the last look of the last stage.
     """
     last = trace.stages[-1]
-    alone, _ = costs = misfits(last)
+    alone, bent = misfits(last)
     return Predictors(
         match_error=math.log(last.match_error_px),
         misfit=math.log(max(alone, LEAST)),
-        lens=lens_gain(*costs),
+        lens=math.log(max(bent, LEAST) / max(alone, LEAST)),
         correlated=_correlated(last, trace.stages[0].range),
     )
-
-
-def lens_gain(alone: float, bent: float) -> float:
-    """Logarithm of how much another lens lowers the cost of a look's matches, of what `misfits` returns."""
-    return math.log(max(bent, LEAST) / max(alone, LEAST))
 
 
 def misfits(stage: StageTrace) -> tuple[float, float]:

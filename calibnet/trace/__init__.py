@@ -5,7 +5,7 @@ are those of a stage's input camera (`StageTrace.camera`), whose image is the fr
 rolled, turned upright.
 """
 
-from calibnet.trace.drives import DriveEstimate, DriveLook, Estimate
+from calibnet.trace.drives import DriveEstimate, DriveLook, Estimate, LensReading
 from calibnet.trace.frames import MARGIN, CascadeTrace, Matches, ScaleTrace, StageDetail, StageTrace
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "DriveEstimate",
     "DriveLook",
     "Estimate",
+    "LensReading",
     "Matches",
     "ScaleTrace",
     "StageDetail",

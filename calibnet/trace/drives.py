@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -47,6 +47,35 @@ class Estimate:
         return replace(self, camera_from_lidar=extrinsic, covariance=rotated(self.covariance, rotation))
 
 
+class LensReading(NamedTuple):
+    """What the matches of one look say of the lens, see `calibnet.judging.lens`.
+
+    Attributes:
+        cost: cost of the matches, fitted by a pose alone.
+        focal_cost, center_cost, radial_cost: cost with another focal length, principal point or radial distortion.
+        equidistant_cost: cost with an equidistant fisheye lens.
+        focal: logarithm of the fitted focal length relative to that of the calibration.
+        right, down: offset of the fitted principal point, in widths of the image.
+        radial: the fitted coefficient k1.
+    """
+
+    cost: float
+    focal_cost: float
+    center_cost: float
+    radial_cost: float
+    equidistant_cost: float
+    focal: float
+    right: float
+    down: float
+    radial: float
+
+    @property
+    def gain(self) -> float:
+        """Logarithm of how much another lens lowers the cost; 0 if none does."""
+        bent = min(self.cost, self.focal_cost, self.center_cost, self.radial_cost, self.equidistant_cost)
+        return math.log(bent / self.cost) if bent > 0 else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class DriveLook:
     """The result of one frame of a drive in the last look, which starts from the same extrinsic for all frames.
@@ -57,8 +86,9 @@ class DriveLook:
         offset: ``[6]``, ``(translation m, rotation rad)`` from that extrinsic to the frame's own result.
         information: inverse covariance ``[6, 6]`` of the offset as the network states it, or None.
         match_error_px: the error that the network expects of its matches, in pixels of the stage's camera.
-        lens: logarithm of how much another lens lowers the cost of its matches, see `calibnet.judging.predictors`.
+        lens: what its matches say of the lens; None without matches.
         image_error_px: that error in pixels of the frame's image, as results state it.
+        camera: name of the camera on its rig; empty for a drive of one camera.
     """
 
     frame: int
@@ -66,8 +96,9 @@ class DriveLook:
     offset: Vector6 = field(repr=False)
     information: Matrix6 | None = field(default=None, repr=False)
     match_error_px: float = math.nan
-    lens: float = math.nan
+    lens: LensReading | None = None
     image_error_px: float = math.nan
+    camera: str = ""
 
     def rotated(self, rotation: Rotation) -> DriveLook:
         """The estimate for a camera turned by ``rotation [3, 3]``."""

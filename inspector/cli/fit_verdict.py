@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from calibnet.evaluation.lens_fit import LensFigures
     from calibnet.evaluation.verdict_fit import FitFigures
     from calibnet.evaluation.verdict_runs import VerdictRun
+    from calibnet.judging.lens_causes import LensOdds
 
 
 MOST_WORKERS = 8
@@ -54,6 +55,13 @@ MOST_WORKERS = 8
 )
 @click.option("--drives", type=click.IntRange(0), default=80, show_default=True, help="Number of runs on drives.")
 @click.option(
+    "--drive-lenses",
+    type=click.IntRange(0),
+    default=120,
+    show_default=True,
+    help="Number of runs on drives with faults of the lens.",
+)
+@click.option(
     "--minutes",
     type=NumberRange(0, min_open=True),
     help="Stop after this time even if --runs and --drives are not finished; the runs made so far are kept for the "
@@ -79,6 +87,7 @@ def fit_verdict(
     runs: int,
     lenses: int,
     drives: int,
+    drive_lenses: int,
     minutes: float | None,
     seed: int,
     stages: tuple[int, ...],
@@ -137,36 +146,41 @@ def fit_verdict(
 
     of_frames = made(source, runs, "frames")
     classifier, covariance, figures = fit_frames(of_frames, (min(ranges), max(ranges)))
-    fitted = {
+    fitted: dict[str, object] = {
         "data": [short(spec) for spec in of_drive.data],
         "synthetic": synthetic,
         "seed": seed,
         "frames": figures.as_dict(),
     }
-    coefficients = Coefficients(classifier, covariance, weights=marks, missing="", fitted=fitted)
+    coefficients = Coefficients(classifier, covariance, weights=marks, missing="")
     for line in figure_lines(figures):
         console.print(line)
-    of_lenses = made(replace(source, kind="lenses"), lenses, "lenses") if lenses else []
-    try:
-        lens, lens_figures = fit_lens(of_lenses)
-    except CalibrationError as error:
-        console.print(f"Faults of the lens will not be named. {error}", style="yellow")
-    else:
-        fitted = {**fitted, "lenses": asdict(lens_figures)}
-        coefficients = replace(coefficients, lens=lens, fitted=fitted)
-        for line in lens_figure_lines(lens_figures):
+
+    def named(source: Source, count: int, of: str) -> LensOdds | None:
+        """The regression that names faults of the lens, fitted to this many runs; None if they are too few."""
+        try:
+            odds, figures = fit_lens(made(source, count, f"lenses of {of}") if count else [])
+        except CalibrationError as error:
+            console.print(f"Faults of the lens of {of} will not be named. {error}", style="yellow")
+            return None
+        fitted[source.kind] = asdict(figures)
+        for line in lens_figure_lines(figures):
             console.print(line)
+        return odds
+
+    lens = named(replace(source, kind="lenses"), lenses, "frames")
     of_drives = made(of_drive, drives, "drives") if drives else []
     try:
         drive, inflation, figures = fit_drives(of_drives)
     except CalibrationError as error:
         console.print(f"Drives will not be accepted. {error}", style="yellow")
     else:
-        fitted = {**fitted, "drives": figures.as_dict()}
-        coefficients = replace(coefficients, drive=drive, inflation=inflation, fitted=fitted)
+        fitted["drives"] = figures.as_dict()
+        coefficients = replace(coefficients, drive=drive, inflation=inflation)
         for line in figure_lines(figures, "drives"):
             console.print(line)
-    coefficients.write(path)
+    drive_lens = named(replace(of_drive, kind="drive-lenses"), drive_lenses, "drives")
+    replace(coefficients, lens=lens, drive_lens=drive_lens, fitted=fitted).write(path)
     say(path)
 
 

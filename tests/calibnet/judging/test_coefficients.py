@@ -23,6 +23,8 @@ CLASSIFIER = Classifier(-1.5, {"match_error": 2.0, "misfit": 0.25}, 0.25, 0.75, 
 DRIVE = Classifier(0.5, {"aligned": 1.5}, 0.1, 0.9, Classifier(0.25, {"aligned": 1.0}, 0.2, 0.9))
 LENS = LensOdds(0.7, dict.fromkeys(FAULTS, -1.0), {name: {"fine_focal_gain": 2.5} for name in FAULTS})
 
+DRIVE_LENS = LensOdds(0.8, dict.fromkeys(FAULTS, -2.0), {name: {"focal_gain": 1.5} for name in FAULTS})
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -30,7 +32,9 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "five").write_bytes(b"of stage 5")
     MANIFEST.write(tmp_path / "mine.toml")
     marks = fingerprints("mine", tmp_path, [RANGES[3], RANGES[4]])
-    whole = Coefficients(CLASSIFIER, CovarianceModel(0.1, 0.05, 0.3), LENS, DRIVE, 1.25, marks, "", {"runs": 90})
+    whole = Coefficients(
+        CLASSIFIER, CovarianceModel(0.1, 0.05, 0.3), LENS, DRIVE, DRIVE_LENS, 1.25, marks, "", {"runs": 90}
+    )
     whole.write(coefficients_path("mine", tmp_path))
     return tmp_path
 
@@ -40,7 +44,7 @@ def test_they_are_read_as_they_were_written(folder: Path) -> None:
     assert coefficients.for_frame(RANGES[4]) == CLASSIFIER and coefficients.missing == ""
     assert coefficients.covariance == CovarianceModel(0.1, 0.05, 0.3) and coefficients.fitted == {"runs": 90}
     assert coefficients.for_drive(RANGES[4]) == DRIVE and coefficients.inflation == 1.25
-    assert coefficients.lens == LENS
+    assert coefficients.lens == LENS and coefficients.drive_lens == DRIVE_LENS
     without = replace(coefficients, drive=None).for_drive(RANGES[4])
     assert without == "The verdict on drives has not been fitted."
     other = coefficients.for_frame(RANGES[3])

@@ -11,12 +11,13 @@ from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.drive_predictors import apart, drive_predictors, halves_cm
-from calibnet.trace import MARGIN, DriveEstimate, DriveLook
+from calibnet.trace import MARGIN, DriveEstimate, DriveLook, LensReading
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame
 from tests.support.boxes import REFERENCE
 
 CLASSIFIER = Classifier(-1.0, {"match_error": 2.0}, 0.6, 0.8)
 """Accepts match errors of less than 2 px."""
+READING = LensReading(100.0, 90.0, 95.0, 99.0, 200.0, 0.001, 0.0, 0.0, 0.0)
 
 
 def estimate(
@@ -32,7 +33,7 @@ def estimate(
     sigma = [centimetres / 100] * 3 + [float(np.radians(degrees))] * 3
     skipped = tuple(BadFrame(frame, "It is cut short.") for frame in range(bad))
     looks = tuple(
-        DriveLook(frame, frame, np.array([0, 0, halves / 100 * (frame > 4), 0, 0, 0]), None, error, -0.1)
+        DriveLook(frame, frame, np.array([0, 0, halves / 100 * (frame > 4), 0, 0, 0]), None, error, READING)
         for frame in range(10)
     )
     there = miscalibration([0, 0, yaw], [0, 0, ahead]) @ REFERENCE
@@ -125,7 +126,7 @@ def test_by_no_coefficients_no_drive_is_accepted() -> None:
 def test_predictors_of_a_drive() -> None:
     found = drive_predictors(estimate(yaw=2.5, halves=24))
     assert found is not None
-    assert vars(found) == pytest.approx({"match_error": np.log(1.5), "aligned": np.log(1e-6), "lens": -0.1})
+    assert vars(found) == pytest.approx({"match_error": np.log(1.5), "aligned": np.log(1e-6), "lens": np.log(0.9)})
     assert halves_cm(estimate(halves=24).looks) == pytest.approx(24)
     assert apart(np.zeros(6), np.array([0, 0, 0, 0, np.radians(0.3), 0])) == pytest.approx(8.0)
     silent = replace(estimate(), looks=())

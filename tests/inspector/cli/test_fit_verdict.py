@@ -17,7 +17,7 @@ from calibnet.judging.drive_predictors import DrivePredictors
 from calibnet.weights.manifest import load_manifest
 from inspector.cli.errors import run
 from inspector.cli.main import cli
-from tests.calibnet.evaluation.test_lens_fit import lens_runs
+from tests.calibnet.evaluation.test_lens_fit import OF_DRIVES, SHOWS_IN_DRIVES, lens_runs
 from tests.calibnet.evaluation.test_verdict_fit import runs
 
 
@@ -28,7 +28,12 @@ class Known:
 
     def __init__(self, kind: verdict_log.Kind) -> None:
         self.kind = kind
-        self.runs = lens_runs(120, 6.0) if kind == "lenses" else runs(300, CovarianceModel(), seed=1)
+        if kind == "lenses":
+            self.runs = lens_runs(120, 6.0)
+        elif kind == "drive-lenses":
+            self.runs = lens_runs(120, 6.0, 1, OF_DRIVES, SHOWS_IN_DRIVES)
+        else:
+            self.runs = runs(300, CovarianceModel(), seed=1)
 
     def run(self, number: int) -> VerdictRun:
         Known.made += 1
@@ -61,11 +66,13 @@ def test_coefficients_come_to_lie_beside_the_weights_and_belong_to_them(weights:
     assert coefficients.fitted["frames"]["false_accept_rate"] == pytest.approx(1 / 300)  # at most 0.5 %
     assert coefficients.drive is not None and coefficients.drive.weights["match_error"] > 1
     assert coefficients.lens is not None and coefficients.fitted["lenses"]["runs"] == 120
+    assert coefficients.drive_lens is not None and coefficients.fitted["drive-lenses"]["runs"] == 120
+    assert set(coefficients.drive_lens.weights["focal-length"]) == set(OF_DRIVES)
     assert "120 runs on 5 sequences, 60 of them with a fault of the lens." in result.stderr
     assert "80 runs of drives on 7 sequences." in result.stderr
     before = (weights / "compact-verdict.toml").read_bytes()
     assert CliRunner().invoke(cli, arguments, catch_exceptions=False).exit_code == 0
-    assert Known.made == 300 + 120 + 80 and (weights / "compact-verdict.toml").read_bytes() == before
+    assert Known.made == 300 + 120 + 80 + 120 and (weights / "compact-verdict.toml").read_bytes() == before
     (weights / load_manifest("compact").file(RANGES[4])).write_bytes(b"trained on")
     assert load_coefficients(load_manifest("compact", weights), weights).frame is None
 
