@@ -1,4 +1,4 @@
-"""What to do next about a result that is not accepted; each sentence was tried (docs/own-sensors.md, "Cannot tell")."""
+"""What to do next about a result that is not accepted; docs/own-sensors.md, "It says cannot tell", has what helped."""
 
 from __future__ import annotations
 
@@ -17,10 +17,13 @@ SUSPECTS = "check the camera matrix, the lens and the time stamps"
 """What makes frames contradict one another, and results leave the range."""
 SCATTER = f"Add frames of other places; if that does not help, {SUSPECTS}."
 """For a drive whose frames contradict one another."""
-
-
 CORRECT_IT = "Correct it: run the same command without `verify`, and export the result (calib-inspect export)."
 """For a calibration that is off from a result which is certain."""
+LOOK_AT_BOTH = (
+    "Look at both in a recording (--save FILE.rrd); if the result fits better, run the same command without `verify` "
+    "and export it."
+)
+"""For a calibration that is far from a result which is not certain itself."""
 NARROWER = "More frames of different places make the result more certain."
 """For a calibration that may be within the tolerance or not."""
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Extrinsic, Floats, Matrix6, Vector6
-from calibnet.judging.advice import CORRECT_IT, NARROWER
+from calibnet.judging.advice import CORRECT_IT, LOOK_AT_BOTH, NARROWER
 from calibnet.judging.drive import FEWEST_JUDGED
 from calibnet.verdict import (
     ACCEPTED,
@@ -100,7 +100,7 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
         apart = f"{error.rotation_deg:.1f}° and {error.translation_cm:.0f} cm"
         if few is None and _is_far(error, found, standard):
             reason = f"The calibration is off by about {apart}, or the input is wrong; the exact amount is uncertain."
-            return verdict(REJECTED, f"{reason} {found.reason}")
+            return verdict(REJECTED, f"{reason} {found.reason}", advice=LOOK_AT_BOTH)
         if few is None and found.word == CANNOT_TELL:
             reason = f"The calibration differs by {apart} from the result, which is too uncertain to judge it by."
             return verdict(CANNOT_TELL, f"{reason} {found.reason}")

@@ -11,7 +11,7 @@ from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
-from calibnet.judging.advice import CORRECT_IT, NARROWER
+from calibnet.judging.advice import CORRECT_IT, LOOK_AT_BOTH, NARROWER
 from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, probability_within, unfit, verify
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
@@ -135,6 +135,7 @@ def test_what_is_far_off_is_rejected_by_a_drive_that_is_not_sure_how_far(
 ) -> None:
     verdict = verify(given, of_drive, DRIVE)
     assert verdict.word == word and verdict.reason.endswith("They agree on too little.")
+    assert verdict.advice == (LOOK_AT_BOTH if word == "rejected" else of_drive.advice)
     assert verify(given, of_drive, FRAME).word == "cannot tell", "a single frame may have gone anywhere"
 
 
