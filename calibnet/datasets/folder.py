@@ -31,6 +31,7 @@ from calibnet.geometry.camera_model import CameraModel
 from calibnet.geometry.prior import Prior, parse_angle, parse_axes, parse_length
 from calibnet.geometry.rectification import central
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.text import one_line
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm")
 CALIBRATION_SUFFIXES = (".yaml", ".yml", ".json", ".xml")
@@ -38,6 +39,8 @@ DEPTHS_LOOKED_AT = 6
 """Number of images of a drive from which the camera's bit depth is found."""
 PERIOD = 0.1
 """Seconds between two frames of a folder without times."""
+FEW_NAMES = 6
+"""Number of a folder's names in a message."""
 LARGEST_NUMBER = 10**10
 """Smallest number in a file name that is taken for a time rather than a frame number."""
 
@@ -71,10 +74,11 @@ class Folder(PairedSequence):
         root = Path(root)
         layout = "a data folder holds images/, clouds/ and calibration.yaml"
         require_folder(root, layout)
-        images = files_by_stem(require_folder(root / "images", layout), IMAGE_SUFFIXES, "images")
-        scans = files_by_stem(
-            require_folder(root / "clouds" if clouds is None else clouds, layout), SCAN_SUFFIXES, "scans"
-        )
+        images_at, scans_at = root / "images", root / "clouds" if clouds is None else clouds
+        if not (images_at.is_dir() and scans_at.is_dir()):
+            layout = f"{layout}, this one {contents(root)}"
+        images = files_by_stem(require_folder(images_at, layout), IMAGE_SUFFIXES, "images")
+        scans = files_by_stem(require_folder(scans_at, layout), SCAN_SUFFIXES, "scans")
         pairing = pair(images, scans, max_time_difference)
         self.calibration = read_folder(root, Wanted(camera, frames, next(iter(images.values()))), guess)
         assert self.calibration.camera is not None and self.calibration.camera_from_lidar is not None
@@ -98,6 +102,13 @@ class Folder(PairedSequence):
     def _image(self, files: FrameFiles) -> RectifiedImage:
         camera = self._lens.camera
         return self._lens(read_image(files.needed.image, (camera.width, camera.height), self._development))
+
+
+def contents(folder: Path) -> str:
+    """The first few names in a folder, those of folders with a slash, as words."""
+    paths = sorted(folder.iterdir())
+    names = [f"{path.name}/" if path.is_dir() else path.name for path in paths[:FEW_NAMES]]
+    return one_line(", ".join(names) or "nothing", 200) + (" and more" if len(paths) > FEW_NAMES else "")
 
 
 def development_of(images: list[Path], camera: CameraModel, bayer: str | None) -> Development:

@@ -313,3 +313,10 @@ def test_a_camera_is_named_in_whichever_file_holds_several(write_layout, tmp_pat
         Folder(layout.root, guess=guess)
     with pytest.raises(DatasetError, match=r"calibration\.yaml has one camera, which is not called 2"):
         Folder(layout.root, camera="2")
+
+
+def test_a_folder_of_another_layout_is_told_by_what_it_has(write_layout):
+    layout = write_layout("folder")
+    (layout.root / "clouds").rename(layout.root / "lidar")
+    with pytest.raises(DatasetError, match=r"clouds does not exist; .*, this one .*images/, lidar/\."):
+        layout.open()
