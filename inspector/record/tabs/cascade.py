@@ -31,8 +31,6 @@ from inspector.record.tabs.views import (
 
 NAME = "Cascade"
 
-MOST_LARGE, WIDE = 4, 2.0
-"""Largest number of images on a page, and smallest aspect ratio, at which they are large enough for large points."""
 ARROW_SPACING = (2, 3)
 """Smallest and largest distance between arrows of the displacement field, in cells; long arrows are farther apart."""
 ARROW_COLOR = (20, 20, 20)
@@ -83,8 +81,7 @@ def view(layout: Layout) -> View:
         shown |= {
             f"After {uncapitalized(stage.title)}": entities.overlay_stage(stage.number) for stage in layout.stages
         }
-        small = _are_small(layout, len(shown))
-        overlays = [frame_view(layout, name, path, small=small) for name, path in shown.items()]
+        overlays = [frame_view(layout, name, path, small=True) for name, path in shown.items()]
         columns = 2 if len(overlays) > 1 else 1
         current = frame_view(
             layout,
@@ -117,18 +114,11 @@ def _stage_page(stage: StageLayout, layout: Layout) -> View:
         earlier = layout.stages[: layout.stages.index(stage)]
         name = f"Before: after stage {earlier[-1].number}" if earlier else f"Before: {layout.start.lower()}"
         path = entities.overlay_stage(earlier[-1].number) if earlier else entities.OVERLAY_MISCALIBRATED
-        small = _are_small(layout, images=4)
         after = frame_view(
-            layout, "After: " + uncapitalized(stage.title), entities.overlay_stage(stage.number), small=small
+            layout, "After: " + uncapitalized(stage.title), entities.overlay_stage(stage.number), small=True
         )
-        rows.insert(0, rrb.Horizontal(frame_view(layout, name, path, small=small), after))
+        rows.insert(0, rrb.Horizontal(frame_view(layout, name, path, small=True), after))
     return rrb.Vertical(*rows, map_legends(), row_shares=[1.0] * len(rows) + [0.25], name=stage.title)
-
-
-def _are_small(layout: Layout, images: int) -> bool:
-    """Whether so many images on one page, two in a row, are small: tall ones, or more than two rows."""
-    width, height = layout.image
-    return images > MOST_LARGE or width < WIDE * height
 
 
 def _log_overlays(rec: Subtree, observation: Observation, contents: Contents) -> None:

@@ -18,8 +18,8 @@ SCREEN_WIDTH, SCREEN_HEIGHT = 1920.0, 980.0
 LEGEND_HEIGHT, TITLE_HEIGHT = 64.0, 36.0
 LEGEND_SHARE = 0.06
 """Share of a page's height for its legend."""
-SMALL_POINT = 0.8
-"""Radius, in points of the screen, of points over a small picture."""
+SMALL_POINT = 1 / 600
+"""Radius of points over a small picture, relative to the image's width: they cover the same share of it at any size."""
 DIMMED = 0.65
 """Opacity of the image under points, so that points stand out."""
 COLORED_BY = {
@@ -50,13 +50,13 @@ def overlay_view(
         image: size of the image, so that points outside do not widen the view.
         figures: whether captions have errors, which a recording without a reference has not.
         image_of: entity of the image.
-        small: whether to draw smaller points, all of one size; points have a fixed size on the screen, and would cover
-            a small picture.
+        small: whether the size of points follows that of the picture, and is the same for all. It is fixed on the
+            screen where the picture is large on any, so that zooming separates points.
     """
     bounds = rrb.VisualBounds2D(x_range=(0.0, image[0]), y_range=(-caption_strip(image, figures).height, image[1]))
     overrides: dict[Any, Any] = {f"/{image_of}": rr.EncodedImage.from_fields(opacity=DIMMED)}
     if small:
-        overrides[f"/{points}"] = rr.Points2D.from_fields(radii=rr.Radius.ui_points(SMALL_POINT))
+        overrides[f"/{points}"] = rr.Points2D.from_fields(radii=SMALL_POINT * image[0])
     return rrb.Spatial2DView(
         origin="/",
         contents=[f"/{image_of}", f"/{points}/**"],
