@@ -4,10 +4,11 @@ import { colours } from "./colours.js";
 import { extrinsicOf, figures, off } from "./poses.js";
 
 const NEAREST = 0.1; // metres before the camera
+const MOST_COVERED = 0.35; // share of the image that points cover at first, at most: below more of them it cannot be seen
 const RETRY_MILLISECONDS = 2000; // milliseconds until an image that did not arrive is requested again
 const canvas = at("canvas"), context = canvas.getContext("2d");
 let scan = null, image = null, loaded = -1;
-let buffer = null, pixels = null, depths = null, layer = null, due = false;
+let buffer = null, pixels = null, depths = null, layer = null, due = false, sized = false;
 
 // Fetch the current frame, unless it is loaded.
 export async function showFrame() {
@@ -114,11 +115,13 @@ function draw() {
   const colour = colours(live.hello.palettes, at("color").value, scan);
   pixels.fill(0);
   depths.fill(Infinity);
+  let drawn = 0;
   for (let i = 0; i < scan.count; i++) {
     const seen = project(m, i, camera);
     if (!seen) continue;
     const left = Math.round((seen[0] + 0.5) * scale) - half, top = Math.round((seen[1] + 0.5) * scale) - half;
     if (left < 0 || top < 0 || left + size > width || top + size > height) continue;
+    drawn += 1;
     const paint = colour(i, seen[2], seen[0], seen[1]), depth = seen[2];
     for (let y = top; y < top + size; y++)
       for (let place = y * width + left, end = place + size; place < end; place++)
@@ -136,6 +139,11 @@ function draw() {
   context.globalAlpha = 1;
   context.drawImage(layer, 0, 0);
   caption(m);
+  if (!sized && drawn * size * size > MOST_COVERED * width * height) {
+    at("size").value = at("size").min;
+    redraw();
+  }
+  sized = true;
 }
 
 function caption(m) {

@@ -369,6 +369,18 @@ def test_what_is_rejected_is_asked_about_before_it_is_written(
     assert "rejected" in file.read_text()
 
 
+def test_points_are_smaller_at_first_where_they_would_hide_the_image(
+    browser: Browser, make: Callable[..., LiveSession], serve: Open
+) -> None:
+    address = serve(make())
+    size = "document.getElementById('size').value"
+    assert opened(browser, address).evaluate(size) == "2"
+    small = patient(browser.new_page(viewport={"width": 300, "height": 600}, bypass_csp=True))
+    small.goto(address)
+    small.wait_for_function(f"{size} === '1'")
+    small.wait_for_function("live.timing.draws > 1")
+
+
 @pytest.mark.parametrize("color", ["intensity", "edge", "error"])
 def test_every_colouring_is_drawn_with_its_legend(
     browser: Browser, make: Callable[..., LiveSession], serve: Open, color: str
