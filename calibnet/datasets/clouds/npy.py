@@ -79,9 +79,9 @@ def _columns(arrays: Mapping[str, NDArray[Any]]) -> Columns:
     for name, array in arrays.items():
         if array.dtype.names:
             continue
-        if array.ndim == 1 or array.shape == (len(array), 1):
+        if array.ndim == 1 or (array.ndim == 2 and array.shape[1] == 1):
             columns.setdefault(name.lower(), array.ravel())
-        elif name.lower() in POSITIONS and array.shape == (len(array), 3):
+        elif name.lower() in POSITIONS and array.ndim == 2 and array.shape[1] == 3:
             columns |= {axis: array[:, place] for place, axis in enumerate("xyz")}
     return columns
 
@@ -90,7 +90,7 @@ def _points(array: NDArray[Any]) -> NDArray[np.float32]:
     if array.dtype.names:
         columns = _columns({name: np.asarray(array.ravel()[name]) for name in array.dtype.names})
         return points_of(columns)
-    if array.ndim == 3 and _is_table(array[0]):
+    if array.ndim == 3 and 3 <= array.shape[2] <= WIDEST:
         array = array.reshape(-1, array.shape[2])
     if array.ndim == 2 and 3 <= array.shape[0] <= 8 and array.shape[1] > 8:
         raise CloudError(f"it is an array {array.shape}, which seems to be transposed; save [N, 4], one point per row")

@@ -228,7 +228,7 @@ def in_folder(layout, name: str, write: Callable[[Path, np.ndarray], None]) -> n
 
 WAYS: dict[str, Callable[[Path, np.ndarray], None]] = {
     "0001.npy": lambda path, rows: np.save(path, with_fields(rows)),
-    "0001.npz": lambda path, rows: np.savez(path, points=rows, label="a drive"),
+    "0001.npz": lambda path, rows: np.savez(path, points=rows, label="a drive", stamp=np.float64(3.0)),
     "0001.Npz": lambda path, rows: np.savez(path.open("wb"), xyz=rows[:, :3], intensity=rows[:, 3:], rgb=rows[:, :3]),
     "0001.Npy": lambda path, rows: np.save(path.open("wb"), rows.reshape(40, 100, 4)),
     "0001.nPy": lambda path, rows: np.save(path.open("wb"), rows.view([("xyz", "<f4", 3), ("intensity", "<f4")])),
@@ -247,6 +247,8 @@ def test_clouds_as_numpy_saves_them(name, write_layout):
         ({"a": scan(), "b": scan()}, r"not have exactly one array \[N, 4\] among a \(4000, 6\), b \(4000, 6\)"),
         ({"x": np.zeros(5), "y": np.zeros(4), "z": np.zeros(5)}, "its x, y and z have different lengths"),
         ({}, r"exactly one array \[N, 4\] among none"),
+        ({"stamp": np.float64(3.0)}, r"exactly one array \[N, 4\] among stamp \(\)"),
+        ({"xyz": np.zeros((0, 3)), "intensity": np.zeros((0, 1))}, "is empty"),
     ],
 )
 def test_an_archive_without_one_cloud_says_what_it_holds(arrays, problem, write_layout):
