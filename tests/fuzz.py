@@ -152,14 +152,19 @@ def _seeds_of_scans(suffix: str) -> tuple[bytes, ...]:
     contents = {
         ".pcd": [clouds.pcd(kept, form) for form in ("ascii", "binary", "binary_compressed")],
         ".ply": [clouds.ply(kept, form) for form in ("ascii", "binary_little_endian")],
-        ".npy": [clouds.npy(kept), npy(with_fields(kept))],
-        ".npz": [npz(kept)],
+        ".npy": [clouds.npy(kept), npy(with_fields(kept)), npy(kept.reshape(2, 6, 4))],
+        ".npz": [npz(kept), npz(kept[:, :3], intensity=kept[:, 3:], stamp=np.array(3.0))],
         ".las": [clouds.LAS],
         ".laz": [clouds.LAZ],  # unpacked by a process of its own, so that few are tried
         ".bin": [kept.tobytes(), np.tile(clouds.POINTS, (1, 1))[:200].tobytes()],
         ".feather": [clouds.FEATHER],
         ".parquet": [clouds.PARQUET],
-        ".csv": [clouds.CSV[:500], clouds.CSV[16:500].replace(b",", b" "), b"//X;Y;Z\n1,5;2,5;3,5\n"],
+        ".csv": [
+            clouds.CSV[:500],
+            clouds.CSV[16:500].replace(b",", b" "),
+            b"//X;Y;Z\n1,5;2,5;3,5\n",
+            b"x (mm),Y1 [mm],z_mm,i\n12\n1,2,3,4\n",
+        ],
     }
     return tuple(contents[suffix])
 

@@ -53,10 +53,10 @@ def npy(array: Values) -> bytes:
     return file.getvalue()
 
 
-def npz(array: Values) -> bytes:
-    """A ``.npz`` file of one array."""
+def npz(array: Values, **others: Values) -> bytes:
+    """A ``.npz`` file of an array of points, and of others."""
     file = io.BytesIO()
-    np.savez(file, points=array)
+    np.savez(file, points=array, **others)  # type: ignore[arg-type]  # numpy's own options come after arrays
     return file.getvalue()
 
 
