@@ -118,7 +118,7 @@ def test_without_a_root_it_says_how_to_get_one(invoke: Invoke, command: tuple[st
     [
         (("--range", "5/0.5", "--miscalibrate", "1,1,1,0,0,0"), "not both"),
         (("--miscalibrate", "1,1,1,0,0,0", "--per-frame"), "--per-frame"),
-        (("--save", "."), "not a file"),
+        (("--save", "."), "names a folder"),
         (("--connect", "rerun+http://127.0.0.1:1/proxy"), "No viewer listens"),
         (("--frames", "7:9"), "select nothing"),
     ],
