@@ -71,13 +71,13 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
         of: what it is a verdict on, where that is not the result of the run.
     """
     lines = [f"# {title(verdict, of)}", "", verdict.reason, ""]
-    lines += [f"- **{cause.name}**: {_once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
+    lines += [f"- **{cause.name}**: {once(cause, verdict)}*({cause.evidence})*" for cause in verdict.causes]
     lines += [""] if verdict.causes else []
     lines += [verdict.advice, ""] if verdict.advice else []
     return [*lines, certainty(verdict), ""] if certainty(verdict) else lines
 
 
-def _once(cause: Cause, verdict: Verdict) -> str:
+def once(cause: Cause, verdict: Verdict) -> str:
     """A cause's sentence and a space, unless the reason contains it already."""
     return "" if _is_told(cause.text, verdict.reason) else f"{cause.text} "
 

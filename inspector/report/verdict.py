@@ -22,7 +22,7 @@ from calibnet.verdict import (
 )
 from inspector.read.run import RecordedRun
 from inspector.report.metrics import Figures, State
-from inspector.verdicts import certainty
+from inspector.verdicts import certainty, once
 
 Grade = Literal["good", "fair", "bad", "note"]
 
@@ -114,7 +114,7 @@ def verdict(run: RecordedRun) -> list[Finding]:
     """The reason of the run's verdict, likely causes, what to do next, the uncertainty, and the skipped frames."""
     found = run.verdict
     lines = [Finding(GRADES[found.word], found.reason)]
-    lines += [Finding("bad", f"{cause.name.capitalize()}: {cause.text} ({cause.evidence})") for cause in found.causes]
+    lines += [Finding("bad", f"{one.name.capitalize()}: {once(one, found)}({one.evidence})") for one in found.causes]
     lines += [Finding("note", found.advice)] if found.advice else []
     lines += [Finding("note", certainty(found))] if certainty(found) else []
     return lines + [Finding("note", f"Frame {bad.frame} was skipped: {bad.why}") for bad in found.skipped]

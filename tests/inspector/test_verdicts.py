@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 from calibnet.verdict import CANNOT_TELL, REJECTED, Cause, Verdict
 from inspector.read.verdict import read_verdict
+from inspector.report.verdict import verdict
 from inspector.verdicts import explained, markdown_lines, verdict_line
 from tests.support.fakes import REFERENCE
 
@@ -26,7 +28,9 @@ def test_a_cause_that_the_reason_ends_with_is_not_said_again() -> None:
     told = "Image and scan do not fit: the camera lies on its side; invert the extrinsic."
     ending = Verdict(REJECTED, told, REFERENCE, causes=(INVERSE,))
     assert explained(ending) == told and f"- **axes**: *({INVERSE.evidence})*" in markdown_lines(ending)
+    assert [one.sentence for one in verdict(SimpleNamespace(verdict=ending))] == [told, f"Axes: ({INVERSE.evidence})"]
     other = Verdict(REJECTED, "Image and scan do not fit.", REFERENCE, causes=(INVERSE, INVERSE))
+    assert verdict(SimpleNamespace(verdict=other))[1].sentence == f"Axes: {INVERSE.text} ({INVERSE.evidence})"
     assert explained(other) == f"Image and scan do not fit. {INVERSE.text}"
     assert f"- **axes**: *({INVERSE.evidence})*" in markdown_lines(
         Verdict(REJECTED, told, REFERENCE, causes=(INVERSE,))
