@@ -121,7 +121,7 @@ FOREIGN = {
         "nested": b"\x93NUMPY\x01\x00\xf0\xff" + b"(" * 65520,
         "a version of the future": npy(POINTS).replace(b"NUMPY\1", b"NUMPY\7"),
         "two columns": npy(POINTS[:, :2]),
-        "three dimensions": npy(POINTS.reshape(20, 20, 4)),
+        "four dimensions": npy(POINTS.reshape(4, 10, 10, 4)),
         "complex": npy(POINTS.astype(np.complex64)),
         "texts": npy(POINTS.astype("U12")),
         "times": npy(POINTS.astype("M8[s]")),
