@@ -243,7 +243,7 @@ class Cascade:
         estimate = estimate.inflated(self.coefficients.inflation)
         classifier = self.coefficients.for_drive(self.stages[-1].range)
         lens, searched = self.coefficients.drive_lens, self.stages[0].range
-        return replace(estimate, verdict=judge_drive(estimate, initial, searched, classifier, lens))
+        return estimate.judged(judge_drive(estimate, initial, searched, classifier, lens))
 
     def _calibrated(
         self, frame: Frame, start: Extrinsic, pose_prior: PosePrior | None, clock: Clock, detail: bool = False

@@ -108,6 +108,7 @@ def measured(
 ) -> VerdictRun:
     """The run of a drive, with its error, the largest one over its frames."""
     there = estimate.camera_from_lidar
+    _, before_verdict = estimate.history[-1]
     error = farthest(there, drive)
     return VerdictRun(
         number,
@@ -120,6 +121,6 @@ def measured(
         DRIVE_LIMITS.holds(error),
         predictors,
         pose_vector(there @ invert(next(readable(drive)).camera_from_lidar)).tolist(),
-        np.linalg.inv(estimate.covariance).tolist(),
+        np.linalg.inv(before_verdict.covariance).tolist(),
         float("nan"),
     )

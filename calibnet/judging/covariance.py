@@ -1,8 +1,8 @@
-"""The covariance of a single frame's result: that stated by the last stage, made as large as actual errors.
+"""The covariance of a result: that of a single frame, made as large as actual errors, and that of one known better.
 
-The inverse of the stage's information treats every match as independent and ignores errors that the whole image has
-in common. It is therefore inflated by one factor, and a common part is added. Both are fitted to one set of weights,
-see `calibnet.judging.coefficients`.
+The inverse of the last stage's information treats every match as independent and ignores errors that the whole image
+has in common. It is therefore inflated by one factor, and a common part is added. Both are fitted to one set of
+weights, see `calibnet.judging.coefficients`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.prior import inverse
 from calibnet.geometry.types import Floats, Matrix6
 from calibnet.trace import CascadeTrace, StageTrace
+from calibnet.verdict import Tolerance
 
 UNSTATED = 1 / 3
 """Share of its range by which a look that states no information is taken to err."""
@@ -73,3 +74,20 @@ def covariance(trace: CascadeTrace, model: CovarianceModel) -> Matrix6 | None:
     if last.information is None:
         return None
     return model.covariance(last.information, last.range, trace.stages[0].range, last.match_error_px)
+
+
+def known_within(covariance: Matrix6, tolerance: Tolerance) -> Matrix6:
+    """The covariance ``[6, 6]`` of an error that is certain to be within a tolerance.
+
+    Of errors with the given covariance, only those within the tolerance remain. A normal distribution that is cut off
+    at ``k`` standard deviations in three dimensions keeps ``P(chi2_5 < k^2) / P(chi2_3 < k^2)`` of its variance.
+    Rotation and translation are cut off one by one, each as if it were alike along all axes.
+    """
+    from scipy.special import gammainc
+
+    shares = np.empty(6)
+    for axes, limit in ((slice(3), tolerance.translation_cm / 100), (slice(3, 6), np.radians(tolerance.rotation_deg))):
+        half = limit**2 / (2 * np.trace(covariance[axes, axes]) / 3)
+        shares[axes] = gammainc(2.5, half) / gammainc(1.5, half)
+    scale = np.sqrt(shares)
+    return np.asarray(scale[:, None] * covariance * scale, np.float64)

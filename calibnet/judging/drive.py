@@ -9,6 +9,7 @@ from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
 from calibnet.judging.advice import MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
 from calibnet.judging.classifier import Classifier
+from calibnet.judging.covariance import known_within
 from calibnet.judging.drive_lens import drive_lens_causes
 from calibnet.judging.drive_predictors import aligned_cm, drive_predictors, halves_cm
 from calibnet.judging.lens_causes import LensOdds
@@ -56,16 +57,17 @@ def judge_drive(
     """
     causes = drive_lens_causes(estimate.looks, lens, FEWEST_JUDGED)
     concluded = _conclude(estimate, initial, searched, classifier, causes)
+    within, covariance = concluded.within, estimate.covariance
     return Verdict(
         concluded.word,
         concluded.reason,
         estimate.camera_from_lidar,
         moved(initial, estimate.camera_from_lidar),
         causes,
-        covariance=estimate.covariance,
+        covariance=covariance if within is None else known_within(covariance, within),
         used=estimate.frames,
         skipped=estimate.skipped,
-        within=concluded.within,
+        within=within,
         advice=concluded.advice,
     )
 

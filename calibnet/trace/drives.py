@@ -112,7 +112,7 @@ class DriveEstimate(Estimate):
 
     Attributes:
         history: estimates from more and more frames of the last pass, each with the number of its latest frame; the
-            last one is the result.
+            last one is the result, with its covariance before the verdict.
         skipped: frames that could not be read, or calibrated in the last look.
         verdict: verdict on the estimate; None from a method without verdicts.
         networks: estimate of the networks alone, if edges were aligned afterwards; its covariance has the scatter of
@@ -142,6 +142,11 @@ class DriveEstimate(Estimate):
             looks=tuple(look.rotated(rotation) for look in self.looks),
             looked_from=None if self.looked_from is None else turn @ self.looked_from,
         )
+
+    def judged(self, verdict: Verdict) -> Self:
+        """The estimate with its verdict, and the verdict's covariance: one that is certain of the result narrows it."""
+        covariance = self.covariance if verdict.covariance is None else verdict.covariance
+        return replace(self, verdict=verdict, covariance=covariance)
 
     def inflated(self, factor: float) -> Self:
         """The estimate with every covariance multiplied by ``factor``."""

@@ -61,7 +61,28 @@ def test_the_word_and_its_reason(drive: DriveEstimate, word: str, reason: str) -
     assert verdict.word == word and reason in verdict.reason
     assert verdict.used == drive.frames and verdict.skipped == drive.skipped
     np.testing.assert_array_equal(verdict.camera_from_lidar, drive.camera_from_lidar)
-    np.testing.assert_array_equal(verdict.covariance, drive.covariance)
+    if word != "accepted":  # an accepted one is known better, see below
+        np.testing.assert_array_equal(verdict.covariance, drive.covariance)
+
+
+def test_who_is_certain_of_a_result_knows_it_to_within_that_tolerance() -> None:
+    doubted = estimate(degrees=0.15, centimetres=5.0)  # 0.26 degrees and 8.7 cm over all axes
+    verdict = judge_drive(doubted, REFERENCE, RANGES[2], CLASSIFIER)
+    assert verdict.word == "accepted" and verdict.covariance is not None
+    generator = np.random.default_rng(0)
+    errors = generator.multivariate_normal(np.zeros(6), doubted.covariance, 400_000)
+    turns, shifts = np.linalg.norm(errors[:, 3:], axis=1), np.linalg.norm(errors[:, :3], axis=1)
+    kept = errors[(turns < np.radians(DRIVE_LIMITS.rotation_deg)) & (shifts < DRIVE_LIMITS.translation_cm / 100)]
+    np.testing.assert_allclose(np.sqrt(np.diag(verdict.covariance)), kept.std(axis=0), rtol=0.01)
+    assert 100 * np.sqrt(np.trace(verdict.covariance[:3, :3])) < 6
+    judged = doubted.judged(verdict)
+    assert judged.verdict is verdict and judged.covariance is verdict.covariance
+
+
+def test_of_a_result_that_is_stated_far_within_the_tolerance_nothing_more_is_known() -> None:
+    sure = estimate(degrees=0.02, centimetres=0.5)
+    covariance = judge_drive(sure, REFERENCE, RANGES[2], CLASSIFIER).covariance
+    np.testing.assert_allclose(covariance, sure.covariance, rtol=1e-6)
 
 
 def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
