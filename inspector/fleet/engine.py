@@ -259,7 +259,7 @@ def _client(engine: Engine) -> Iterator[Client]:
             _register(client, _worker_plugin(engine.prepare, 0, ours=False))
         else:
             environment = {name: str(engine.threads) for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS")}
-            environment["MALLOC_TRIM_THRESHOLD_"] = "65536"  # return memory to the system after a large drive
+            # not Dask's MALLOC_TRIM_THRESHOLD_, which halves the speed of networks; a drive returns memory at its end
             stack.enter_context(dask.config.set({**SETTINGS, "distributed.nanny.pre-spawn-environ": environment}))
             cluster = stack.enter_context(
                 LocalCluster(
