@@ -30,6 +30,7 @@ from calibnet.runtime.schema import validated
 from calibnet.runtime.writing import check_output
 
 PREDICTORS = (Predictors, LensPredictors, DrivePredictors, DriveLensPredictors)
+"""The kinds of predictors that a run in a log may have."""
 BATCH = 8
 """Runs per process in a batch; the time limit is checked between batches."""
 LARGEST = 256 * MEGABYTE
