@@ -17,6 +17,7 @@ from tests.hostile import (
     foxglove,
     guesses,
     kinds,
+    messages,
     names,
     odd,
     options,
@@ -44,6 +45,7 @@ ROWS = list(
         foxglove.rows(),
         guesses.rows(),
         kinds.rows(),
+        messages.rows(),
         training.rows(),
         odd.rows(),
     )

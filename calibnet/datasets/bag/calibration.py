@@ -79,7 +79,8 @@ def _of_info(bag: BagRecording, asked: str | None, image: str) -> tuple[CameraMo
             f"Bag {bag} has no CameraInfo of {image}; give the camera's calibration with --guess FILE, or its topic "
             "with --info."
         )
-    content, where = camera_info_of(bag.message(info).content), Path(f"{bag}, {info}")
+    where = Path(f"{bag}, {info}")
+    content = ros.as_stored(camera_info_of(bag.message(info).content), where)
     rectified = is_rectified(image)
     camera = ros.camera(content, where, rectified)
     projection, rotation = np.array(content["P"]), np.array(content["R"])

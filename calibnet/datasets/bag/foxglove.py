@@ -12,6 +12,7 @@ from operator import index
 from types import SimpleNamespace
 from typing import Any
 
+from calibnet.datasets.calibration_files.ros import REGION
 from calibnet.errors import DatasetError
 
 POINT_TYPES = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
@@ -34,7 +35,7 @@ def _bytes(data: bytes | str) -> bytes:
 
 
 def _compressed(message: Any) -> SimpleNamespace:
-    return SimpleNamespace(header=_header(message), data=_bytes(message.data))
+    return SimpleNamespace(header=_header(message), data=_bytes(message.data), format=getattr(message, "format", ""))
 
 
 def _raw(message: Any) -> SimpleNamespace:
@@ -91,7 +92,7 @@ def _camera(message: Any) -> SimpleNamespace:
         p=[float(value) for value in message.P],
         binning_x=0,
         binning_y=0,
-        roi=SimpleNamespace(x_offset=0, y_offset=0),
+        roi=SimpleNamespace(**dict.fromkeys(REGION, 0)),
     )
 
 

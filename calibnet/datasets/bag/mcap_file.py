@@ -72,17 +72,19 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         """Open a file and read its summary."""
-        from mcap.reader import make_reader
+        from mcap.reader import NonSeekingReader, make_reader
 
         self.stack: Any = path.open("rb")
         self._make: Callable[[], Any] = lambda: make_reader(_rewound(self.stack), validate_crcs=True)
         counts: dict[int, int] = {}
         channels: dict[int, tuple[Any, Any]] = {}
         summary = self._make().get_summary()
+        if summary is not None and not summary.channels:  # they are optional there, but the seeking reader needs them
+            self._make = lambda: NonSeekingReader(_rewound(self.stack), validate_crcs=True)
         if summary is not None and summary.statistics is not None and summary.channels:
             counts = dict(summary.statistics.channel_message_counts)
             channels = {key: (one, summary.schemas.get(one.schema_id)) for key, one in summary.channels.items()}
-        else:  # it was not closed properly
+        else:  # it was not closed properly, or has no statistics
             for schema, channel, _ in self._make().iter_messages():
                 counts[channel.id] = counts.get(channel.id, 0) + 1
                 channels[channel.id] = (channel, schema)

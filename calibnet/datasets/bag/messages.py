@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibnet.datasets.calibration_files.frames import Link
+from calibnet.datasets.calibration_files.ros import REGION
 from calibnet.datasets.clouds.columns import MOST_POINTS, CloudError, Columns
-from calibnet.datasets.images.development import ImageError, Levels
+from calibnet.datasets.images.development import BAYER, ImageError, Levels
 from calibnet.datasets.images.files import decode_levels
 from calibnet.geometry import transform
 from calibnet.geometry.types import Rotation
@@ -54,6 +55,10 @@ CHANNELS: dict[str, tuple[type[np.generic], int, int | None]] = {
     "yuyv": (np.uint8, 2, cv2.COLOR_YUV2RGB_YUY2),
 }
 """Encodings of raw images: type and number of a pixel's values, and OpenCV's conversion to RGB."""
+MOSAIC = re.compile(r"bayer_(rggb|bggr|gbrg|grbg)(?:8|16); *\w+ compressed *")
+"""Format of a compressed image that still has a Bayer pattern; that of others ends with the encoding packed."""
+DEPTH = "compressedDepth"
+"""Format of compressed depth images, and the last part of their topics' names; their type is that of images."""
 POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """NumPy types of the fields of a PointCloud2."""
 
@@ -75,7 +80,7 @@ def levels_of(message: Any) -> Levels:
         ImageError: it is damaged, or its encoding is not supported.
     """
     if not hasattr(message, "encoding"):
-        return decode_levels(bytes(message.data))
+        return _decompressed(bytes(message.data), str(message.format))
     encoding = str(message.encoding)
     known = CHANNELS.get(encoding) or CHANNELS.get(encoding.lower())
     if known is None:
@@ -90,6 +95,16 @@ def levels_of(message: Any) -> Levels:
     pixels = pixels.astype(dtype.newbyteorder("="), copy=False)
     rgb = pixels if code is None else cv2.cvtColor(pixels if channels > 1 else pixels[..., 0], code)
     return np.ascontiguousarray(rgb)
+
+
+def _decompressed(data: bytes, form: str) -> Levels:
+    if DEPTH in form:
+        raise ImageError("has depths, not colours or grey levels; give the topic of the camera's images")
+    levels = decode_levels(data)
+    mosaic = MOSAIC.fullmatch(form)
+    if mosaic is None or not (levels == levels[..., :1]).all():
+        return levels
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(levels[..., 0]), BAYER[mosaic[1]]))
 
 
 def columns_of(message: Any) -> Columns:
@@ -140,7 +155,7 @@ def camera_info_of(message: Any) -> dict[str, Any]:
         "P": np.asarray(message.p if lower else message.P, np.float64).tolist(),
         "binning_x": int(message.binning_x),
         "binning_y": int(message.binning_y),
-        "roi": {"x_offset": int(roi.x_offset), "y_offset": int(roi.y_offset)},
+        "roi": {key: int(getattr(roi, key)) for key in REGION},
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from calibnet.datasets.bag.messages import IMAGES, INFOS, PACKETS, POINTS
+from calibnet.datasets.bag.messages import DEPTH, IMAGES, INFOS, PACKETS, POINTS
 from calibnet.datasets.bag.recording import BagRecording, Topic
 from calibnet.errors import DatasetError
 
@@ -13,8 +13,6 @@ SUFFIXES = ("/compressed", "/image_raw", "/image_color", "/image_rect_color", "/
 """Suffixes of image topics after the camera's name, which are removed one after the other."""
 RECTIFIED = re.compile(r"(?<![a-z])rect(ified)?(?![a-z])", re.IGNORECASE)
 """Pattern in the names of topics of rectified images, such as ``image_rect_color``."""
-DEPTH = "/compressedDepth"
-"""Suffix of topics of compressed depth images, which have the type of images."""
 
 
 def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], option: str, what: str) -> str:
@@ -25,12 +23,11 @@ def found_topic(bag: BagRecording, asked: str | None, types: Sequence[str], opti
     Raises:
         DatasetError: there is none, or there are several to choose from; the message lists them.
     """
-    found = bag.of_type(types)
+    found = [topic for topic in bag.of_type(types) if not topic.name.endswith(f"/{DEPTH}")]
     if asked is not None:
         if asked in [topic.name for topic in found]:
             return asked
         raise DatasetError(f"Bag {bag} has no {what} in {asked!r}; {_listed(found, what, bag)}.")
-    found = [topic for topic in found if not topic.name.endswith(DEPTH)]
     compressed = {topic.name.removesuffix("/compressed") for topic in found if topic.name.endswith("/compressed")}
     found = [topic for topic in found if topic.name not in compressed]
     if len(found) == 1:

@@ -12,9 +12,8 @@ from rosbags.typesys import get_types_from_msg
 
 from calibnet.conformance import check_dataset
 from calibnet.datasets.bag import Bag, BagOptions
-from calibnet.datasets.bag.messages import columns_of, levels_of
+from calibnet.datasets.bag.messages import columns_of
 from calibnet.datasets.calibration_files import FrameChoice
-from calibnet.datasets.images.development import Development
 from calibnet.errors import DatasetError
 from tests.support.bags import BagWriter, assert_holds, write_bag
 from tests.support.fakes import make_frame
@@ -202,42 +201,6 @@ def test_a_bag_that_defines_messages_otherwise_is_one_sentence(other: bytes, tmp
     file.write_bytes(content.replace(b"uint32 point_step", other))
     with pytest.raises(DatasetError, match=r"defines sensor_msgs/msg/PointCloud2 without point_step, or differently"):
         Bag([file])
-
-
-RGB = FRAMES[1].image
-
-
-@pytest.mark.parametrize(
-    ("encoding", "stored"),
-    [
-        ("rgb8", RGB),
-        ("bgr8", RGB[..., ::-1]),
-        ("bgra8", np.dstack([RGB[..., ::-1], RGB[..., 0]])),
-        ("rgb16", RGB.astype(np.uint16) << 8),
-    ],
-)
-def test_raw_images_of_colour(encoding: str, stored: np.ndarray, tmp_path: Path) -> None:
-    message = BagWriter(tmp_path / "a", "mcap").raw(stored, encoding, 1.0)
-    assert_array_equal(Development()(levels_of(message)), RGB)
-
-
-@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
-def test_bayer_patterns_have_the_names_of_ros(pattern: str, tmp_path: Path) -> None:
-    """A red image: only the red cells of the pattern are bright."""
-    mosaic = np.zeros((32, 32), np.uint8)
-    row, column = divmod(pattern.index("r"), 2)
-    mosaic[row::2, column::2] = 200
-    picture = levels_of(BagWriter(tmp_path / "a", "mcap").raw(mosaic, f"bayer_{pattern}8", 1.0))
-    assert_allclose(picture[4:-4, 4:-4].reshape(-1, 3).mean(axis=0), [200, 0, 0], atol=1)
-
-
-def test_a_grey_image_of_twelve_bits(tmp_path: Path) -> None:
-    grey = (np.arange(64, dtype=np.uint16) * 64).reshape(8, 8)
-    bag = BagWriter(tmp_path / "a", "mcap")
-    expected = np.repeat((grey >> 4).astype(np.uint8)[..., None], 3, axis=2)
-    assert_array_equal(Development()(levels_of(bag.raw(grey, "mono16", 1.0))), expected)
-    other_way_round = bag.raw(grey.astype(">u2"), "mono16", 1.0, bigendian=True)
-    assert_array_equal(Development()(levels_of(other_way_round)), expected)
 
 
 def test_points_in_rows_with_something_behind_them(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from calibnet.datasets.bag import Bag, BagOptions
+from calibnet.datasets.calibration_files.ros import REGION
 from calibnet.errors import DatasetError
 from tests.support.bags import BagWriter
 from tests.support.fakes import make_frame
@@ -64,7 +65,45 @@ def test_rectified_images_without_their_matrix_are_refused(tmp_path: Path) -> No
 
 def test_a_camera_that_nobody_calibrated_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="the camera matrix is zero, which drivers write"):
-        Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, k=np.zeros(9))])
+        Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, k=np.zeros(9), width=0, height=0)])
+
+
+WHOLE = {"width": 300, "height": 140, "k": np.array([90.0, 0, 150, 0, 91, 70, 0, 0, 1])}
+"""Of a sensor of which the images, 128x48, are a part."""
+
+
+@pytest.mark.parametrize(
+    ("region", "binning", "expected"),
+    [
+        ((40, 30, 128, 48), 0, [[90.0, 0.0, 110.0], [0.0, 91.0, 40.0], [0.0, 0.0, 1.0]]),
+        ((0, 0, 256, 96), 2, [[45.0, 0.0, 75.0], [0.0, 45.5, 35.0], [0.0, 0.0, 1.0]]),
+        ((44, 44, 0, 0), 2, [[45.0, 0.0, 53.0], [0.0, 45.5, 13.0], [0.0, 0.0, 1.0]]),
+    ],
+)
+def test_images_that_are_a_part_of_the_sensor_or_binned(
+    region: tuple[int, ...], binning: int, expected: list[list[float]], tmp_path: Path
+) -> None:
+    roi = BagWriter(tmp_path / "a", "mcap").make(
+        "sensor_msgs/msg/RegionOfInterest", **dict(zip(REGION, region, strict=True)), do_rectify=False
+    )
+    said = {"roi": roi, "binning_x": binning, "binning_y": binning}
+    path = bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, **said, **WHOLE)
+    frame = Bag([path])[0]
+    assert frame.original is not None
+    assert (frame.original.camera.width, frame.original.camera.height) == (128, 48)
+    assert_allclose(frame.original.camera.matrix, expected)
+    assert_allclose(frame.original.camera.coefficients, RAW)
+    rectified = {**said, **WHOLE, "p": np.array([90.0, 0, 150, 0, 0, 91, 70, 0, 0, 0, 1, 0])}
+    path = bag_of(tmp_path / "rectified", {"/cam/image_rect": "/cam/camera_info"}, **rectified)
+    assert_allclose(Bag([path])[0].camera.matrix, expected)
+
+
+def test_a_part_that_is_not_of_the_sensor_is_one_sentence(tmp_path: Path) -> None:
+    roi = BagWriter(tmp_path / "a", "mcap").make(
+        "sensor_msgs/msg/RegionOfInterest", x_offset=40, y_offset=0, width=128, height=48, do_rectify=False
+    )
+    with pytest.raises(DatasetError, match=r"the region 128x48 at \(40, 0\) is not within 128x48"):
+        Bag([bag_of(tmp_path / "drive", {"/cam/image_raw": "/cam/camera_info"}, roi=roi)])
 
 
 def test_a_matrix_of_larger_images_is_a_suspect(tmp_path: Path) -> None:
@@ -111,7 +150,12 @@ def test_images_of_depth_are_none(tmp_path: Path) -> None:
     bag.write("/cam/camera_info", bag.info(FRAME, "plumb_bob", RAW), 10.0)
     bag.write("/points", bag.cloud(FRAME.points, 10.0), 10.0)
     bag.write("/tf_static", bag.transforms(FRAME.camera_from_lidar), 10.0)
-    assert Bag([bag.close()]).image == "/cam/image_raw"
+    path = bag.close()
+    assert Bag([path]).image == "/cam/image_raw"
+    with pytest.raises(
+        DatasetError, match=r"no images in '/depth/image_raw/compressedDepth'; there are: /cam/image_raw"
+    ):
+        Bag([path], BagOptions(image="/depth/image_raw/compressedDepth"))
 
 
 def test_a_file_that_is_named_holds_rather_than_what_is_found(tmp_path: Path) -> None:

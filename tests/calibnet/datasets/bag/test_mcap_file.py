@@ -30,7 +30,13 @@ def test_frames_are_those_that_were_recorded(encoding: str, tmp_path: Path) -> N
     assert_holds(bag, FRAMES)
 
 
-def test_a_file_that_nobody_closed_is_read_to_its_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("encoding", ["json", "protobuf"])
+def test_a_file_whose_summary_has_no_channels(encoding: str, tmp_path: Path) -> None:
+    bag = ForeignMcap(tmp_path / "drive.mcap", encoding, summary=False)
+    assert_holds(Bag([write_foxglove(bag.path, encoding, FRAMES, bag)]), FRAMES)
+
+
+def test_a_file_that_was_cut_is_one_sentence(tmp_path: Path) -> None:
     path = written(tmp_path / "drive.mcap", "protobuf")
     whole = path.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: whole.rindex(b"/lidar")])

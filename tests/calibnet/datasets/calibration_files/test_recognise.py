@@ -141,8 +141,12 @@ def test_camera_info_as_it_is_echoed(write):
     check_camera(read_calibration(write(ROS_ECHO)), "ROS's camera_info", "equidistant", [0.1, -0.03, 0.001, 0.0])
     old = ROS_ECHO.replace("d: [", "D: [").replace("k: [", "K: [").replace("equidistant", "plumb_bob")
     check_camera(read_calibration(write(old)), "ROS's camera_info", "plumb_bob", [0.1, -0.03, 0.001, 0.0])
-    with pytest.raises(DatasetError, match=r"cropped or binned \(binning_x, roi\.y_offset\)"):
-        read_calibration(write(ROS_ECHO.replace("binning_x: 0", "binning_x: 2").replace("y_offset: 0", "y_offset: 8")))
+    part = ROS_ECHO.replace("binning_x: 0", "binning_x: 2").replace("y_offset: 0", "y_offset: 8")
+    found = read_calibration(write(part)).camera
+    assert found is not None and (found.width, found.height) == (640, 712)
+    assert_allclose(found.matrix, [[450.0, 0.0, 319.75], [0.0, 905.0, 351.5], [0.0, 0.0, 1.0]])
+    with pytest.raises(DatasetError, match="binning_x is -1; give a whole number"):
+        read_calibration(write(ROS_ECHO.replace("binning_x: 0", "binning_x: -1")))
 
 
 def test_camchain_of_kalibr(write):
