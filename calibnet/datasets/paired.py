@@ -29,7 +29,7 @@ from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
-from calibnet.runtime.text import one_line
+from calibnet.runtime.text import number_of, one_line
 
 SCANS_LOOKED_AT = 4
 """Number of scans of a drive from which the scale of intensity is found."""
@@ -198,21 +198,33 @@ def _in_order(path: Path) -> tuple[list[str | int], str]:
     return [int(part) if place % 2 else part for place, part in enumerate(parts)], path.name
 
 
-def check_paired(images: dict[str, Path], scans: dict[str, Path]) -> None:
-    """Check that every image has a scan of the same name and vice versa.
+class Partners(NamedTuple):
+    """The images that have a scan of the same name, by stem, and sentences on what is left out."""
+
+    images: dict[str, Path]
+    notes: tuple[str, ...]
+
+
+def with_partners(images: dict[str, Path], scans: dict[str, Path]) -> Partners:
+    """Leave out what has no partner: KITTI itself lacks some scans, and a download may lack more.
 
     Raises:
-        DatasetError: they differ; the message says how many and names the first stems.
+        DatasetError: no image has a scan.
     """
-    unpaired = [("scan", sorted(images.keys() - scans.keys())), ("image", sorted(scans.keys() - images.keys()))]
-    problems = [
-        f"no {what} for {', '.join(stems[:3])}{f' and {len(stems) - 3} more' if len(stems) > 3 else ''}"
-        for what, stems in unpaired
-        if stems
-    ]
-    if problems:
+    if not images.keys() & scans.keys():
         image_folder, scan_folder = (next(iter(files.values())).parent for files in (images, scans))
         raise DatasetError(
-            f"{image_folder} has {len(images)} images and {scan_folder} {len(scans)} scans, which do not pair: "
-            f"{'; '.join(problems)}; add the missing files or remove the others."
+            f"No image of {image_folder} has a scan of the same name in {scan_folder} (their first are "
+            f"{next(iter(images))} and {next(iter(scans))}); unpack both."
         )
+    alone = {
+        "image": [stem for stem in images if stem not in scans],
+        "scan": [stem for stem in scans if stem not in images],
+    }
+    notes = [
+        f"{number_of(len(stems), what)} without a partner {'is' if len(stems) == 1 else 'are'} left out "
+        f"({', '.join(stems[:3])}{' and so on' if len(stems) > 3 else ''})."
+        for what, stems in alone.items()
+        if stems
+    ]
+    return Partners({stem: path for stem, path in images.items() if stem in scans}, tuple(notes))

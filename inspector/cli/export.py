@@ -12,7 +12,7 @@ import click
 from calibnet.runtime.text import file_name
 from inspector.cli.errors import ExitCode
 from inspector.cli.options import FOLDER
-from inspector.cli.output import OUTPUT_FILE, overwrite_option, say, write
+from inspector.cli.output import OUTPUT_FILE, hold, overwrite_option, say, write
 from inspector.cli.recordings import RECORDING, open_run
 from inspector.export.registry import FORMATS, export_as, kind_of_export, suffix_of
 
@@ -131,11 +131,14 @@ def export_rig(
         raise click.UsageError(
             f"--output {output} is not a folder; give a folder for all cameras, or choose one with --camera."
         )
-    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{file_name(solved.name)}.{suffix_of(form)}" for solved in rig.solved.cameras]
+    for file in files:
+        hold(file)
     codes = []
-    for solved, said in zip(rig.solved.cameras, ros_names([one.name for one in rig.solved.cameras]), strict=True):
+    said_names = ros_names([one.name for one in rig.solved.cameras])
+    for solved, said, file in zip(rig.solved.cameras, said_names, files, strict=True):
         named = replace(exported_camera(solved), frames=frames._replace(camera=f"{said}_{frames.camera}"))
-        codes.append(put_out(named, form, force, folder / f"{file_name(solved.name)}.{suffix_of(form)}"))
+        codes.append(put_out(named, form, force, file))
     return max(codes)
 
 

@@ -79,15 +79,31 @@ def say(text: object, err: bool = False) -> None:
 
 
 def prepare(file: Path | None, kind: Kind) -> None:
-    """Create the folder of an output, so that a path that cannot be written fails before the work.
+    """Check and `hold` an output, so that a path that cannot be written fails before the work.
 
     Raises:
-        OutputError: the output must not replace what is there.
-        OSError: its folder cannot be made.
+        OutputError: the output must not replace what is there, cannot be written, or is being written by another run.
     """
     if file is not None:
         check_output(file, kind)
-        file.parent.mkdir(parents=True, exist_ok=True)
+        hold(file)
+
+
+def hold(file: Path) -> None:
+    """Let no other run write an output until the command ends, so that all outputs of a command are of one run.
+
+    A drive of a fleet is no command; its folder is its own.
+
+    Raises:
+        OutputError: another run has it, or it cannot be written.
+    """
+    from calibnet.runtime.claim import locked
+
+    context = click.get_current_context(silent=True)
+    if context is None or file in (held := context.meta.setdefault(__name__, set())):
+        return
+    context.with_resource(locked(file))
+    held.add(file)
 
 
 def prepare_json(json_file: str | None) -> None:

@@ -26,7 +26,7 @@ from calibnet.datasets.kitti.calibration import (
     read_times,
     times_of,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder, with_partners
 from calibnet.datasets.plausibility import of_camera, of_extrinsic, refuse
 from calibnet.errors import DatasetError
 from calibnet.geometry import CameraModel, invert, transform
@@ -62,13 +62,7 @@ class Kitti360(PairedSequence):
         images = files_by_stem(images_at, IMAGE_SUFFIXES, "images")
         velodyne = require_folder(scans_at / "velodyne_points", LAYOUT)
         scans = files_by_stem(require_folder(velodyne / "data", LAYOUT), (".bin",), "scans")
-        both = {stem: path for stem, path in images.items() if stem in scans}
-        if not both:
-            raise DatasetError(
-                f"No image of {images_at} has a scan of the same number in {velodyne / 'data'}; unpack both."
-            )
-        left_out = len(images) + len(scans) - 2 * len(both)
-        self.notes = (f"{left_out} images and scans have no partner and are left out.",) if left_out else ()
+        both, self.notes = with_partners(images, scans)
         found = camera_of(root / "calibration", camera)
         extrinsic = camera_from_lidar(root / "calibration", camera)
         where = f"Calibration of camera {camera} in {root / 'calibration'}"

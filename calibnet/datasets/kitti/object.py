@@ -13,7 +13,7 @@ from calibnet.datasets.kitti.calibration import (
     read_calibration_file,
     rectified_calibration,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder, with_partners
 from calibnet.errors import DatasetError
 from calibnet.geometry import transform
 from calibnet.runtime.reading import read_lines
@@ -34,7 +34,7 @@ class KittiObject(PairedSequence):
             camera: 2, or another whose images are there.
 
         Raises:
-            DatasetError: a folder or file is missing, or images and scans do not pair.
+            DatasetError: a folder or file is missing, or nothing pairs.
         """
         root = Path(root)
         layout = "a KITTI object root holds training/image_2, training/velodyne and training/calib"
@@ -53,7 +53,7 @@ class KittiObject(PairedSequence):
                         f"{root / 'ImageSets' / split}.txt lists {stem[:60]!r}, which {folder} does not have; "
                         "get the frame or remove it from the list."
                     )
-        check_paired(images, scans)
+        images, self.notes = with_partners(images, scans)
         times = {stem: NOMINAL_PERIOD * position for position, stem in enumerate(images)}
         files = frame_files(images, scans, times)
         super().__init__(f"kitti-object/{split}", f"KITTI object detection, camera {camera}", files)

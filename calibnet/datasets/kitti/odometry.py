@@ -19,7 +19,7 @@ from calibnet.datasets.kitti.calibration import (
     rectified_calibration,
     times_of,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder, with_partners
 from calibnet.geometry import transform
 
 
@@ -35,14 +35,14 @@ class KittiOdometry(PairedSequence):
             camera: 0 to 3, as far as the folder has them.
 
         Raises:
-            DatasetError: a folder or file is missing, malformed or does not pair.
+            DatasetError: a folder or file is missing, malformed, or nothing pairs.
         """
         sequence = str(sequence).zfill(2)
         folder = _sequence_folder(Path(root), sequence)
         images = files_by_stem(camera_folder(folder, "image_", camera), IMAGE_SUFFIXES, "images")
         velodyne = require_folder(folder / "velodyne", "unpack KITTI's velodyne zip there")
         scans = files_by_stem(velodyne, (".bin",), "scans")
-        check_paired(images, scans)
+        paired, self.notes = with_partners(images, scans)
         rows = read_calibration_file(folder / "calib.txt", {f"P{camera}": 12, "Tr": 12})
         camera0_from_lidar = rows["Tr"].reshape(3, 4)
         self._fixed = rectified_calibration(
@@ -51,7 +51,7 @@ class KittiOdometry(PairedSequence):
         times = folder / "times.txt"
         # own data may have no times; a broken link is an error
         seconds = read_times(times, float) if os.path.lexists(times) else []
-        files = frame_files(images, scans, times_of(images, seconds, times))
+        files = frame_files(paired, scans, times_of(images, seconds, times))
         date = DATE_OF_FOCAL_LENGTH.get(float(self._fixed.matrix[0, 0]))
         rig = f"KITTI {date}" if date else f"KITTI odometry layout, sequence {sequence}"
         super().__init__(f"kitti-odometry/{sequence}", f"{rig}, camera {camera}", files)

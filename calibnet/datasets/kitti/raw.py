@@ -23,7 +23,7 @@ from calibnet.datasets.kitti.calibration import (
     rectified_calibration,
     times_of,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder, with_partners
 from calibnet.errors import DatasetError
 from calibnet.runtime.text import one_line
 
@@ -32,9 +32,6 @@ CALIBRATION_ROWS = {
     "calib_velo_to_cam.txt": {"R": 9, "T": 3},
     "calib_imu_to_velo.txt": {"R": 9, "T": 3},
 }
-
-KNOWN_GAPS = {"2011_09_26_drive_0009_sync": {f"{number:010d}" for number in range(177, 181)}}
-"""Images whose scans KITTI never published, by drive, which are left out."""
 
 
 class KittiRaw(PairedSequence):
@@ -50,15 +47,13 @@ class KittiRaw(PairedSequence):
             camera: 0 to 3, as far as the drive has them.
 
         Raises:
-            DatasetError: a folder or file is missing, malformed or does not pair.
+            DatasetError: a folder or file is missing, malformed, or nothing pairs.
         """
         root, drive = Path(root), str(drive).zfill(4)
         folder = _drive_folder(root, date, drive)
         images = files_by_stem(_data_folder(camera_folder(folder, "image_0", camera)), IMAGE_SUFFIXES, "images")
         scans = files_by_stem(_data_folder(folder / "velodyne_points"), (".bin",), "scans")
-        without_scan = KNOWN_GAPS.get(folder.name, set()) - scans.keys()
-        paired_images = {stem: image for stem, image in images.items() if stem not in without_scan}
-        check_paired(paired_images, scans)
+        paired, self.notes = with_partners(images, scans)
         for name, rows in CALIBRATION_ROWS.items():
             read_calibration_file(root / date / name, rows)
         kitti = _open(root, date, drive)
@@ -66,7 +61,7 @@ class KittiRaw(PairedSequence):
             getattr(kitti.calib, f"P_rect_{camera}0"), kitti.calib.R_rect_00 @ kitti.calib.T_cam0_velo_unrect
         )
         seconds = [(time - kitti.timestamps[0]).total_seconds() for time in kitti.timestamps]
-        files = frame_files(paired_images, scans, times_of(images, seconds, kitti.timestamp_file))
+        files = frame_files(paired, scans, times_of(images, seconds, kitti.timestamp_file))
         super().__init__(f"kitti-raw/{date}_drive_{drive}", f"KITTI {date}, camera {camera}", files)
 
     def _calibration(self, files: FrameFiles) -> Calibration:

@@ -14,11 +14,8 @@ from calibnet.datasets.kitti.calibration import (
     read_calibration_file,
     rectified_calibration,
 )
-from calibnet.datasets.paired import FrameFiles, PairedSequence, check_paired, files_by_stem, require_folder
+from calibnet.datasets.paired import FrameFiles, PairedSequence, files_by_stem, require_folder, with_partners
 from calibnet.geometry import transform
-
-KNOWN_GAPS = {"0001": {f"{number:06d}" for number in range(177, 181)}}
-"""Images whose scans KITTI never published, by sequence, which are left out."""
 
 
 class KittiTracking(PairedSequence):
@@ -34,7 +31,7 @@ class KittiTracking(PairedSequence):
             part: ``"training"`` or ``"testing"``.
 
         Raises:
-            DatasetError: a folder or file is missing, malformed or does not pair.
+            DatasetError: a folder or file is missing, malformed, or nothing pairs.
         """
         sequence = str(sequence).zfill(4)
         layout = (
@@ -47,9 +44,7 @@ class KittiTracking(PairedSequence):
         images_at = require_folder(camera_folder(folder, "image_0", camera) / sequence, layout)
         images = files_by_stem(images_at, IMAGE_SUFFIXES, "images")
         scans = files_by_stem(scans_at, (".bin",), "scans")
-        gaps = KNOWN_GAPS.get(sequence, set()) - scans.keys()
-        images = {stem: path for stem, path in images.items() if stem not in gaps}
-        check_paired(images, scans)
+        images, self.notes = with_partners(images, scans)
         projection = f"P{camera}"
         rows = read_calibration_file(
             folder / "calib" / f"{sequence}.txt", {projection: 12, "R_rect": 9, "Tr_velo_cam": 12}

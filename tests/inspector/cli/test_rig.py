@@ -21,6 +21,7 @@ from calibnet.drive.rig import CameraEstimate, RigEstimate
 from calibnet.errors import DatasetError
 from calibnet.geometry import invert, miscalibration, rotation_from_vector, transform
 from calibnet.geometry.se3 import adjoint
+from calibnet.runtime.claim import locked
 from calibnet.trace import DriveEstimate
 from calibnet.verdict import Verdict, Word, moved
 from inspector import entities
@@ -236,6 +237,14 @@ def test_a_rig_is_exported_a_file_a_camera(rig: Path, invoke: Invoke) -> None:
         in invoke("export", "rig.rrd", "--format", "ros", "--camera", "up")[2]
     )
     assert invoke("export", "rig.rrd", "--format", "ros", "--frame", "1", "--camera", "left")[0] == 2
+
+
+def test_all_files_of_a_rig_are_of_one_run(rig: Path, invoke: Invoke) -> None:
+    invoke(str(rig), "--rigid", "--save", "rig.rrd", "--headless")
+    with locked(Path("found/right.yaml")):
+        code, _, err = invoke("export", "rig.rrd", "--format", "yaml", "--output", "found")
+    assert (code, [path.name for path in Path("found").glob("*.yaml")]) == (3, [])
+    assert "right.yaml is being written by another run" in err
 
 
 def test_every_camera_has_a_file_of_its_own_whatever_it_is_called(rig: Path, invoke: Invoke) -> None:

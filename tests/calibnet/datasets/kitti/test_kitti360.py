@@ -45,7 +45,7 @@ def test_images_and_scans_without_partner_are_counted(write_layout):
     layout.scans[1].unlink()
     sequence = layout.open()
     assert [frame.index for frame in sequence] == [3, 9]
-    assert sequence.notes == ("1 images and scans have no partner and are left out.",)
+    assert sequence.notes == ("1 image without a partner is left out (0000000006).",)
 
 
 def test_all_drives_and_cameras_are_found(write_layout):
