@@ -101,13 +101,17 @@ def export(
 def put_out(exported: Exported, form: str, force: bool, output: str | Path | None) -> int:
     """Write a calibration to a file or to stdout, unless it is rejected; returns the exit code."""
     file: Path | None = None if output is None else OUTPUT_FILE.convert(output, None, None)
-    if not may_be_written(exported, force):
+    may_be_written = force or exported.verdict is None or exported.verdict.word != "rejected"
+    if may_be_written:
+        text = export_as(form, exported)
+        if file is None:
+            click.echo(text, nl=False)
+        else:
+            write(file, text.encode(), kind_of_export(text))
+    warn(exported, "It was written." if may_be_written else "Nothing was written; --force writes it.")
+    if not may_be_written:
         return ExitCode.CHECK_FAILED
-    text = export_as(form, exported)
-    if file is None:
-        click.echo(text, nl=False)
-    else:
-        write(file, text.encode(), kind_of_export(text))
+    if file is not None:
         say(f"Saved {file}: {exported.origin.removesuffix('.')}.", err=True)
     return ExitCode.OK
 
@@ -148,17 +152,13 @@ def ros_names(names: list[str]) -> list[str]:
     return [one if said.count(one) == 1 else f"{one}_{number}" for number, one in enumerate(said)]
 
 
-def may_be_written(exported: Exported, force: bool) -> bool:
-    """Warn on stderr of a calibration that is not accepted; returns whether it may be written."""
-    verdict = exported.verdict
-    if verdict is None or verdict.word == "accepted":
-        return True
+def warn(exported: Exported, what: str) -> None:
+    """Warn on stderr of a calibration that is not accepted, and say what was done."""
     from inspector.verdicts import explained
 
-    written = force or verdict.word != "rejected"
-    what = "It was written." if written else "Nothing was written; --force writes it."
-    say(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
-    return written
+    verdict = exported.verdict
+    if verdict is not None and verdict.word != "accepted":
+        say(f"calib-inspect: {verdict.word.capitalize()}. {explained(verdict)} {what}", err=True)
 
 
 def selected_calibration(

@@ -167,6 +167,8 @@ def test_what_cannot_be_told_is_exported_with_a_warning_in_the_file(
     assert capsys.readouterr().err.startswith(f"calib-inspect: Cannot tell. {UNSURE} It was written.\n")
     (line,) = [line for line in out.read_text().splitlines() if UNSURE in line]
     assert "frame 0; cannot tell: " in line and (form == "json" or line.startswith("#"))
+    assert run(cli, ["export", str(file), "--format", form, "--frame", "0", "--output", str(file)]) == 3
+    assert "It was written" not in capsys.readouterr().err
 
 
 def test_json_is_the_median_unless_a_frame_is_named(
