@@ -30,6 +30,7 @@ CHANGES: dict[str, tuple[int, tuple[str, ...], str, dict[str, Any]]] = {
     "a mosaic that has colours": (FINE, (), IMAGE, {"format": "bayer_rggb8; png compressed "}),
     "a mosaic of noise": (BAD, ("not an image",), IMAGE, {"format": "bayer_rggb8; png compressed ", "data": NOISE}),
     "depths": (BAD, ("has depths",), IMAGE, {"format": "16UC1; compressedDepth png"}),
+    "a video": (BAD, ("part of a video (H265)",), IMAGE, {"format": "H265", "data": NOISE}),
     "a format of escapes": (FINE, (), IMAGE, {"format": "\x1b[2J; compressed"}),
 }
 """Code, words, topic, and what is changed in its messages."""

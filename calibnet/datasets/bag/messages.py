@@ -59,6 +59,8 @@ MOSAIC = re.compile(r"bayer_(rggb|bggr|gbrg|grbg)(?:8|16); *\w+ compressed *")
 """Format of a compressed image that still has a Bayer pattern; that of others ends with the encoding packed."""
 DEPTH = "compressedDepth"
 """Format of compressed depth images, and the last part of their topics' names; their type is that of images."""
+VIDEO = re.compile(r"h\.?26[45]|hevc|av1|vp[89]", re.IGNORECASE)
+"""Format of what was compressed as a video, whose images depend on earlier ones."""
 POINT_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """NumPy types of the fields of a PointCloud2."""
 
@@ -100,6 +102,8 @@ def levels_of(message: Any) -> Levels:
 def _decompressed(data: bytes, form: str) -> Levels:
     if DEPTH in form:
         raise ImageError("has depths, not colours or grey levels; give the topic of the camera's images")
+    if (video := VIDEO.search(form)) is not None:
+        raise ImageError(f"is part of a video ({video[0]}), which is not supported; record it as JPEG, PNG or rgb8")
     levels = decode_levels(data)
     mosaic = MOSAIC.fullmatch(form)
     if mosaic is None or not (levels == levels[..., :1]).all():

@@ -81,3 +81,8 @@ def test_a_mosaic_that_was_developed_before_it_was_packed_stays_as_it_is(tmp_pat
 def test_depths_are_not_an_image(tmp_path: Path) -> None:
     with pytest.raises(ImageError, match="has depths, not colours"):
         compressed(tmp_path, np.ones((8, 8), np.uint16), "16UC1; compressedDepth png")
+
+
+def test_a_video_is_not_an_image(tmp_path: Path) -> None:
+    with pytest.raises(ImageError, match=r"part of a video \(h264\)"):
+        compressed(tmp_path, RGB, "h264")
