@@ -5,6 +5,7 @@ The server is uvicorn and the apps are Starlette's, both of which handle ranges,
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import threading
 import time
@@ -15,6 +16,7 @@ from types import TracebackType
 
 import uvicorn
 from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from calibnet.errors import CalibnetError, ConfigError
 from calibnet.runtime.text import one_line
@@ -22,6 +24,7 @@ from inspector.serving.guard import LOCALHOST, Guard, inline_scripts, new_token
 
 PATIENCE_S = 10.0
 KEEP_ALIVE_S = 15
+"""Seconds that a client may take for its first request, and between requests."""
 MOST_CONNECTIONS = 64
 """Largest number of open connections; further ones are told to try again."""
 
@@ -59,6 +62,20 @@ def host_of(address: IPv4Address | IPv6Address) -> str:
     return name
 
 
+class Punctual(H11Protocol):
+    """A connection that is closed if its client sends no request in time; uvicorn waits for the first one forever."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
+        """Begin to wait."""
+        super().connection_made(transport)
+        self.loop.call_later(self.timeout_keep_alive, self._hang_up)
+
+    def _hang_up(self) -> None:
+        still_open = self in self.connections  # and not a websocket by now
+        if still_open and not self.cycle:
+            self.transport.close()
+
+
 class PageServer:
     """A context manager that serves an app.
 
@@ -86,6 +103,7 @@ class PageServer:
         only_here, scripts = host if here.is_loopback else None, inline_scripts(*pages)
         config = uvicorn.Config(
             Guard(app, port, token, only_here=only_here, data=data, scripts=scripts),
+            http=Punctual,
             lifespan="off",
             log_config=None,
             access_log=False,

@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 
 from inspector.serving.browser import opened_page
 from inspector.serving.guard import inline_scripts
-from inspector.serving.server import PageServer
+from inspector.serving.server import MOST_CONNECTIONS, PageServer
 
 
 async def page(request: Request) -> PlainTextResponse:
@@ -162,3 +162,19 @@ def test_the_token_is_on_no_command_line(monkeypatch: pytest.MonkeyPatch) -> Non
         assert "http://127.0.0.1:1/secret/" in file.read_text()
         assert stat.S_IMODE(file.stat().st_mode) == 0o600 and stat.S_IMODE(file.parent.stat().st_mode) == 0o700
     assert not file.exists()
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: "])
+def test_clients_that_send_no_request_do_not_keep_others_out(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("inspector.serving.server.KEEP_ALIVE_S", 1)
+    with PageServer(Starlette(routes=[WebSocketRoute("/live", echo), Route("/{path:path}", page)])) as server:
+        address = urlsplit(server.address)
+        place = (str(address.hostname), address.port or 0)
+        with connect(f"{server.address.replace('http', 'ws')}live") as live:
+            idle = [socket.create_connection(place, timeout=10) for _ in range(MOST_CONNECTIONS)]
+            for one in idle:
+                one.sendall(sent)
+            assert [one.recv(1) for one in idle] == [b""] * MOST_CONNECTIONS  # the server has hung up
+            assert status(server) == 200
+            live.send("still here")
+            assert live.recv(10) == "still here"
