@@ -13,6 +13,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibnet.calibrator import Calibrator, DriveCalibrator
 from calibnet.datasets.frame import Frame
@@ -33,6 +34,8 @@ MOST_SEARCHED = 24
 REACH_PX = 12.0
 """Largest distance of a point from a click, in pixels."""
 Progress = Callable[[int, int], None]
+Xyz = NDArray[np.float32]
+"""A point in the LiDAR frame, in metres."""
 
 
 class Answers:
@@ -187,7 +190,7 @@ class Answers:
         self._worker.ask(Job("looking for the worst frame", compute, finish))
 
     def look(
-        self, made: Try, under: Extrinsic, pixel: tuple[float, float], found: Callable[[float], Awaitable[None]]
+        self, made: Try, under: Extrinsic, pixel: tuple[float, float], found: Callable[[Xyz], Awaitable[None]]
     ) -> None:
         """Move the search windows of the newest try to the point at a pixel of the image.
 
@@ -195,7 +198,7 @@ class Answers:
             made: the newest try.
             under: ``camera_from_lidar`` that the image shows.
             pixel: ``(u, v)``.
-            found: called with the distance of the point in metres.
+            found: called with the point.
 
         Raises:
             ConfigError: the try is not the newest one of this frame or is still being recorded, or there is no point.
@@ -214,7 +217,7 @@ class Answers:
 
         async def finish(_: object) -> None:
             await self.recorded()
-            await found(float(np.linalg.norm(observation.frame.points[point, :3])))
+            await found(observation.frame.points[point, :3])
 
         self._worker.ask(Job("looking there", compute, finish))
 

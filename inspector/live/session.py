@@ -15,7 +15,7 @@ from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.reading import parse_json
 from calibnet.runtime.text import one_line
 from inspector.live.accept import Target, doubts, verdict_on
-from inspector.live.answers import Answers
+from inspector.live.answers import Answers, Xyz
 from inspector.live.payload import palettes
 from inspector.live.pose import Pose
 from inspector.live.stream import TryRecording, TryStream
@@ -232,10 +232,11 @@ class LiveSession:
     async def _look(self, message: dict[str, Any]) -> None:
         """Move the search windows of the newest try to the point at a pixel of the image, under one of its steps."""
         under = np.array(message["under"], float).reshape(4, 4) if "under" in message else self._step(message)
-        pixel = float(message["pixel"][0]), float(message["pixel"][1])
+        pixel, position = (float(message["pixel"][0]), float(message["pixel"][1])), self.workspace.position
 
-        async def found(metres: float) -> None:
-            await self.tell({"is": "said", "text": f"Search windows moved to a point {metres:.1f} m away."})
+        async def found(point: Xyz) -> None:
+            text = f"Search windows moved to the ringed point, {np.linalg.norm(point):.1f} m away."
+            await self.tell({"is": "said", "text": text, "ring": {"position": position, "point": point.tolist()}})
 
         self._answers.look(self.workspace.tries[int(message["try"])], under, pixel, found)
 

@@ -40,7 +40,11 @@ const heard = {
     answered();
     walk(message.number);
   },
-  said: (message) => say(message.text),
+  said(message) {
+    if (message.ring) live.ring = message.ring;
+    say(message.text);
+    redraw();
+  },
   problem(message) {
     live.held = null;
     say(message.text, true);

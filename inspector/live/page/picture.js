@@ -101,8 +101,10 @@ function shownExtrinsic() {
   return steps[step].extrinsic;
 }
 
-function project(m, i, [fx, fy, cx, cy]) {
-  const x = scan.xyz[3 * i], y = scan.xyz[3 * i + 1], z = scan.xyz[3 * i + 2];
+const project = (m, i, camera) => seenAt(m, scan.xyz[3 * i], scan.xyz[3 * i + 1], scan.xyz[3 * i + 2], camera);
+
+// The pixel and the depth at which an extrinsic shows a point; null if it is behind the camera.
+function seenAt(m, x, y, z, [fx, fy, cx, cy]) {
   const depth = m[8] * x + m[9] * y + m[10] * z + m[11];
   if (depth < NEAREST) return null;
   return [(fx * (m[0] * x + m[1] * y + m[2] * z + m[3])) / depth + cx, (fy * (m[4] * x + m[5] * y + m[6] * z + m[7])) / depth + cy, depth];
@@ -138,12 +140,25 @@ function draw() {
   context.drawImage(image, 0, 0, width, height);
   context.globalAlpha = 1;
   context.drawImage(layer, 0, 0);
+  ring(m, camera, scale);
   caption(m);
   if (!sized && drawn * size * size > MOST_COVERED * width * height) {
     at("size").value = at("size").min;
     redraw();
   }
   sized = true;
+}
+
+// A ring about the point whose search windows the viewer shows.
+function ring(m, camera, scale) {
+  const { ring, state } = live, seen = ring?.position === state.frame.position && seenAt(m, ...ring.point, camera);
+  if (!seen) return;
+  for (const [color, width] of [["#000", 6], ["#ff00c8", 3]]) {
+    context.beginPath();
+    context.arc((seen[0] + 0.5) * scale, (seen[1] + 0.5) * scale, canvas.width / 90, 0, 2 * Math.PI);
+    Object.assign(context, { strokeStyle: color, lineWidth: (width * canvas.width) / 1000 });
+    context.stroke();
+  }
 }
 
 function caption(m) {

@@ -7,6 +7,7 @@ export const live = {
   held: null, // the pose being set, until the server has it: other messages must not move the sliders
   tries: [], current: -1, // the tries, and the one that is shown
   step: 0, // of the shown try: 0 the pose of the sliders, then after each stage; or "reference"
+  ring: null, // the point that was clicked, in the LiDAR frame, and the position of its frame
   timing: { draws: 0, draw: 0, answer: 0 }, // milliseconds of the last draw and the last answer
   get shown() { return [this.current, this.step]; },
 };

@@ -321,6 +321,14 @@ def test_what_a_method_cannot_do_is_not_offered(
     counts(page, "#single button", 3)
 
 
+RINGED = """([u, v]) => {
+  const canvas = document.getElementById("canvas"), away = canvas.width / 90;
+  const colour = (dx) => canvas.getContext("2d").getImageData(u * canvas.width + dx, v * canvas.height, 1, 1).data;
+  return [-away, away].some((dx) => colour(dx).join() === "255,0,200,255");
+}"""
+"""Whether there is a ring about a place of the large picture, given in shares of its sides."""
+
+
 def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., LiveSession], serve: Open) -> None:
     session = make()
     page = opened(browser, serve(session))
@@ -333,7 +341,8 @@ def test_a_click_in_the_picture_asks_why(browser: Browser, make: Callable[..., L
     box, (width, height) = page.locator("#canvas").bounding_box(), (400, 120)
     assert box is not None
     page.mouse.click(box["x"] + (u + 0.5) / width * box["width"], box["y"] + (v + 0.5) / height * box["height"])
-    says(page, "#said", re.compile("^Search windows moved"))
+    says(page, "#said", re.compile("^Search windows moved to the ringed point"))
+    page.wait_for_function(RINGED, arg=[(u + 0.5) / width, (v + 0.5) / height])
     frame.wait_for_function("window.given.length === 2")
     # the same from the viewer, whose selection names the overlay and the pixel
     event = {

@@ -117,7 +117,9 @@ def test_a_click_moves_the_windows_to_that_point(make: Make, heard_after: HeardA
     pixel = seen.pixels[nearest].tolist()
     heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": pixel})
     distance = float(np.linalg.norm(make_frame(4).points[seen.index[nearest], :3]))
-    assert told(heard, "said")[0]["text"] == f"Search windows moved to a point {distance:.1f} m away."
+    (said,) = told(heard, "said")
+    assert said["text"] == f"Search windows moved to the ringed point, {distance:.1f} m away."
+    assert said["ring"] == {"position": 0, "point": make_frame(4).points[seen.index[nearest], :3].tolist()}
     assert len(session.stream) == 2
     heard = heard_after(session, {"do": "look", "try": 0, "step": 3, "pixel": [-500, -500]})
     assert "There is no point of the scan here" in told(heard, "problem")[0]["text"]
