@@ -124,7 +124,7 @@ def frustum(
 
 
 def _scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> rrb.Spatial3DView:
-    """The cloud, seen from behind the camera.
+    """The cloud, seen from above and behind the camera, with the horizon near the upper edge, above which is nothing.
 
     Args:
         name: name of the view.
@@ -143,8 +143,8 @@ def _scene_view(name: str, through: str, cameras: list[str], layout: Layout) -> 
         name=name,
         overrides={f"/{CLOUD}": [rr.Points3D.from_fields().visualizer(mappings=[mapping])]},
         eye_controls=rrb.EyeControls3D(
-            position=_seen_from(layout, ahead=-5.0, left=1.5, up=2.8),
-            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-1.8),
+            position=_seen_from(layout, ahead=-4.5, left=1.0, up=4.0),
+            look_target=_seen_from(layout, ahead=12.0, left=0.0, up=-2.7),
             eye_up=(0.0, 0.0, 1.0),
         ),
         line_grid=rrb.LineGrid3D(visible=False),
