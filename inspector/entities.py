@@ -85,6 +85,11 @@ RIG = "rig/solved"
 RIG_JSON = "rig_json"
 """Component of `RIG`: a JSON object as text, see `inspector.read.rig`."""
 
+WATCH_TEXT = "watch/result"
+"""Whether the mount moved, in words."""
+FAILURE = "sentence"
+"""Why a run failed, in words."""
+
 TRAINING_APPLICATION_ID = "calib_inspect_training"
 TRAINING = "training"
 """Parent entity of a training run's losses; that of its errors on held-out frames is the next."""

@@ -77,6 +77,15 @@ def markdown_lines(verdict: Verdict, of: str = "") -> list[str]:
     return [*lines, certainty(verdict), ""] if certainty(verdict) else lines
 
 
+def found_lines(found: Verdict, given: Verdict | None) -> list[str]:
+    """The verdict on the result, to stand below that on the verified calibration, if any, without its reason again."""
+    if given is None:
+        return markdown_lines(found)
+    if (found.reason, found.causes) == (given.reason, given.causes):
+        found = replace(found, reason="For the same reason.", causes=(), advice="")
+    return markdown_lines(found, OF_RESULT)
+
+
 def once(cause: Cause, verdict: Verdict) -> str:
     """A cause's sentence and a space, unless the reason contains it already."""
     return "" if _is_told(cause.text, verdict.reason) else f"{cause.text} "

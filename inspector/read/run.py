@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 
 SAME_MOUNT = 1e-6  # references of one mount differ by less, in metres and in entries of the rotation
 PICTURES = (entities.IMAGE, entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_CORRECTED)
+OTHERS = {
+    entities.RIG: "the recording of a rig; only report, export and pictures take one",
+    entities.WATCH_TEXT: "a recording of watch; open it with rerun, or get its result from `watch --json`",
+    entities.FAILURE: "the recording of a run that failed; open it with rerun to read why",
+}
+"""Recordings of calib-inspect that are not of a run, by an entity that each of them has."""
 
 
 class RecordedStage(NamedTuple):
@@ -187,11 +193,14 @@ def read_run(path: Path) -> RecordedRun:
 def _run(path: Path, file: RecordingFile) -> RecordedRun:
     tables = _read_tables(file)
     options, provenance = (static_row(tables[f"{PROPERTIES}/{name}"]) for name in (entities.RUN, entities.PROVENANCE))
+    numbers, ranges = provenance.pop("stage_numbers", []), provenance.pop("stage_ranges", [])
+    other = next((kind for entity, kind in OTHERS.items() if entity in tables and not numbers), None)
+    if other:
+        raise RecordingError(f"{path} is {other}.")
     if not provenance and not file.cut:
         raise RecordingError(
             f"{path} was made by an earlier calib-inspect, which did not record extrinsics as numbers; record it again."
         )
-    numbers, ranges = provenance.pop("stage_numbers", []), provenance.pop("stage_ranges", [])
     (has_reference,) = provenance.pop("has_reference", [False])
     if sorted(set(numbers)) != numbers or not set(numbers) <= set(range(1, len(RANGES) + 1)):
         raise ValueError(f"stages {numbers}")
@@ -226,7 +235,14 @@ def _run(path: Path, file: RecordingFile) -> RecordedRun:
 
 def _read_tables(file: RecordingFile) -> dict[str, list[RecordBatch]]:
     """Chunks by entity; for a file that is cut off, pictures too, since a frame may lack one."""
-    wanted = ("extrinsic/**", "verdict/**", entities.SKIPPED, f"{PROPERTIES}/**", *(PICTURES if file.cut else ()))
+    wanted = (
+        "extrinsic/**",
+        "verdict/**",
+        entities.SKIPPED,
+        *OTHERS,
+        f"{PROPERTIES}/**",
+        *(PICTURES if file.cut else ()),
+    )
     tables: dict[str, list[RecordBatch]] = defaultdict(list)
     for chunk in file.chunks(*wanted):
         entity, batch = chunk.entity_path.lstrip("/"), chunk.to_record_batch()

@@ -24,6 +24,7 @@ from inspector import colors, entities
 from inspector.record.contents import Coloring, Contents, Detail
 from inspector.record.frame import JPEG_QUALITY
 from inspector.record.observation import Observation
+from inspector.record.pictures.captions import caption_strip
 from inspector.record.pictures.cloud import OUTSIDE, RANGE_M, seen_colors
 from inspector.record.pictures.frame_overlays import FrameOverlays
 from inspector.record.pictures.legends import log_point_legend
@@ -32,7 +33,17 @@ from inspector.record.stream import Stream, plain
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.blueprint import move_below
 from inspector.record.tabs.scene import BACKGROUND, POINT_SIZE, frustum
-from inspector.record.tabs.views import View, in_rows, legend, overlay_view, with_legend
+from inspector.record.tabs.views import (
+    LEGEND_SHARE,
+    SCREEN_HEIGHT,
+    SCREEN_WIDTH,
+    TITLE_HEIGHT,
+    View,
+    in_rows,
+    legend,
+    overlay_view,
+    with_legend,
+)
 from inspector.rig_result import CameraResult, RigResult
 
 MOMENTS = 40
@@ -44,6 +55,8 @@ FEW_CAMERAS = 2
 """Largest number of cameras whose images are large side by side."""
 LEFT_SHARE = 0.64
 """Share of the tab's width that the images take."""
+TEXT_SHARE = 0.58
+"""Share of the height beside them that the text takes, with a row for each of six cameras."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +184,7 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
         )
         for camera, size in zip(cameras, sizes, strict=True)
     ]
-    grid = in_rows(pictures, _columns(len(pictures), sizes[0].width / sizes[0].height))
+    grid = in_rows(pictures, _columns(len(pictures), (sizes[0].width, sizes[0].height)))
     left = with_legend(grid, legend("Depth of the points", entities.LEGEND_POINTS), "Cameras")
     cloud = rrb.Spatial3DView(
         origin=f"/{WORLD}",
@@ -184,7 +197,10 @@ def rig_blueprint(cameras: Sequence[Shown]) -> rrb.Blueprint:
     )
     text = rrb.TextDocumentView(origin=TEXT, name="Result and residuals")
     together = rrb.Horizontal(
-        left, rrb.Vertical(text, cloud, row_shares=[0.5, 0.5]), column_shares=[LEFT_SHARE, 1 - LEFT_SHARE], name="Rig"
+        left,
+        rrb.Vertical(text, cloud, row_shares=[TEXT_SHARE, 1 - TEXT_SHARE]),
+        column_shares=[LEFT_SHARE, 1 - LEFT_SHARE],
+        name="Rig",
     )
     return rrb.Blueprint(
         rrb.Tabs(together, *(_page(camera) for camera in cameras), active_tab=0),
@@ -214,12 +230,13 @@ def _below(camera: Shown, view: rrb.View) -> rrb.View:
     return view
 
 
-def _columns(cameras: int, aspect: float) -> int:
-    """Number of columns of the grid in which images of an aspect ratio are largest, on the left of a wide screen."""
-    room = LEFT_SHARE * 1920 / 900
+def _columns(cameras: int, image: tuple[int, int]) -> int:
+    """Number of columns of the grid in which images of this size, with their captions and titles, are largest."""
+    width, height = image[0], image[1] + caption_strip(image).height
+    room = SCREEN_HEIGHT * (1 - LEGEND_SHARE)
 
     def scale(columns: int) -> float:
         rows = math.ceil(cameras / columns)
-        return min(room / (columns * aspect), 1 / rows)
+        return min(LEFT_SHARE * SCREEN_WIDTH / columns / width, (room / rows - TITLE_HEIGHT) / height)
 
     return max(range(1, cameras + 1), key=scale)

@@ -14,9 +14,6 @@ from inspector import entities
 from inspector.record.recording import RunDescription
 from inspector.record.stream import Stream, plain
 
-SENTENCE = "sentence"
-"""Entity of the text with the reason."""
-
 
 def record_sentence(file: Path, description: RunDescription, word: str, cause: str, sentence: str) -> None:
     """Write the recording of a failed run: its properties, and the reason as a text.
@@ -26,13 +23,13 @@ def record_sentence(file: Path, description: RunDescription, word: str, cause: s
     """
     claim = Claim(file, Kind.RECORDING)
     try:
-        view = rrb.TextDocumentView(origin=SENTENCE, name="Why it failed")
+        view = rrb.TextDocumentView(origin=entities.FAILURE, name="Why it failed")
         layout = rrb.Blueprint(view, rrb.TimePanel(state="hidden"), auto_views=False, auto_layout=False)
         title = description.title
         stream = Stream(entities.APPLICATION_ID, description.recording_id, title, [claim.begin()], layout)
         stream.rec.send_property(entities.RUN, rr.AnyValues(**plain(description.options)))
         stream.rec.send_property(entities.OUTCOME, rr.AnyValues(word=word, cause=cause, reason=one_line(sentence)))
-        stream.rec.log(SENTENCE, rr.TextDocument(f"# {word.capitalize()}\n\n{one_line(sentence)}"), static=True)
+        stream.rec.log(entities.FAILURE, rr.TextDocument(f"# {word.capitalize()}\n\n{one_line(sentence)}"), static=True)
         stream.close()
         claim.complete()
     finally:

@@ -13,7 +13,7 @@ from inspector.report.template import html_page, stylesheet
 STYLE = """
 main { max-width: 1360px; }
 td, th { text-align: left; vertical-align: top; padding: 4px 14px 4px 0; }
-td:last-child { white-space: normal; }
+td:last-child { white-space: normal; min-width: 26ch; }
 summary { cursor: pointer; font-weight: 600; }
 """
 

@@ -10,13 +10,13 @@ from inspector.report.bench_rows import KINDS, NOTHING, costs, refused, rows
 ERRORS = ("rigs trained on", "other rigs", "refused")
 IMAGES = ("grey image", "other image")
 COSTS = ("a frame", "parameters")
-NO_CORRECTION = "no correction"
+NO_CORRECTION, NOT_RUN = "no correction", "not run"
 LEGEND = (
     "Mean errors of rotation and translation. A refused run counts with its initial error; if the time limit was "
     "reached, the number of planned runs is in brackets. For methods without training, the columns have the same rigs "
     "as for the trained ones. Grey image, other image: errors when the image is made grey, or replaced by one of "
     "another drive. A method that then refuses, or does not reduce the error, uses the image; one that corrects as "
-    "before reads its answer off the scan."
+    "before reads its answer off the scan. Why a method was not run is said in the table by rig."
 )
 
 
@@ -37,7 +37,9 @@ def summary(content: dict[str, Any], range_: str) -> tuple[list[str], list[list[
         for of in dict.fromkeys(row.of for row in own):  # figures beside the errors, once
             figures = [row.figures for row in own if row.of == of]
             where = {row.rig for row in own if row.known == "known"} if entry["samples_trained"] else known
-            body.append([name, of, *known_and_other(figures, where), refused(figures), *beside])
+            body.append(
+                [name, NOT_RUN if of == NOTHING else of, *known_and_other(figures, where), refused(figures), *beside]
+            )
             beside = [NOTHING] * len(beside)
     used = [k for k in range(len(heads)) if k < 2 or any(line[k] != NOTHING for line in body)]
     return [heads[k] for k in used], [[line[k] for k in used] for line in body]

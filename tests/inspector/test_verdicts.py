@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from calibnet.verdict import CANNOT_TELL, REJECTED, Cause, Verdict
 from inspector.read.verdict import read_verdict
 from inspector.report.verdict import verdict
-from inspector.verdicts import explained, markdown_lines, verdict_line
+from inspector.verdicts import explained, found_lines, markdown_lines, verdict_line
 from tests.support.fakes import REFERENCE
 
 UNSURE = Verdict(CANNOT_TELL, "It is not certain.", REFERENCE, advice="Take more frames.")
@@ -35,6 +35,13 @@ def test_a_cause_that_the_reason_ends_with_is_not_said_again() -> None:
     assert f"- **axes**: *({INVERSE.evidence})*" in markdown_lines(
         Verdict(REJECTED, told, REFERENCE, causes=(INVERSE,))
     )
+
+
+def test_below_the_verified_calibration_the_same_reason_is_not_said_again() -> None:
+    given = Verdict(REJECTED, "Image and scan do not fit.", REFERENCE, causes=(INVERSE,))
+    assert found_lines(given, given) == ["# Calibration found: rejected", "", "For the same reason.", ""]
+    assert found_lines(UNSURE, given) == markdown_lines(UNSURE, "Calibration found")
+    assert found_lines(UNSURE, None) == markdown_lines(UNSURE)
 
 
 def test_a_recording_keeps_what_to_do_next_and_an_earlier_one_has_nothing() -> None:

@@ -91,7 +91,7 @@ class FrameOverlays:
 
 def given_caption(given: Verdict) -> str:
     """The verdict on the calibration that is verified, above points under the one that was found."""
-    return f"as given {given.word}, here as found"
+    return f"calibration {given.word}, points as found"
 
 
 @lru_cache(maxsize=1)

@@ -24,7 +24,7 @@ from inspector.record.pictures.legends import log_names
 from inspector.record.subtree import Subtree
 from inspector.record.tabs.table import matrix_lines
 from inspector.record.tabs.views import View, curve_view, frames_named, legend, with_legend
-from inspector.verdicts import OF_GIVEN, OF_RESULT, certainty, markdown_lines
+from inspector.verdicts import OF_GIVEN, certainty, found_lines, markdown_lines
 
 NAME = "Whole drive as one"
 
@@ -38,7 +38,7 @@ CURVES = {"estimate": colors.FOUND, "upper": colors.LIMIT, "lower": colors.LIMIT
 
 
 NOT_YET = "# Not solved yet\n\nThe whole drive is solved as one when the last of its frames is calibrated."
-TEXT_SHARE = 0.24
+TEXT_SHARE = 0.28
 """Share of the tab's width that the text takes."""
 
 
@@ -150,7 +150,7 @@ def _lines(
     """Verdicts, error if known, frames and the matrix, as Markdown."""
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
     if estimate.verdict is not None:
-        lines += markdown_lines(estimate.verdict, "" if given is None else OF_RESULT)
+        lines += found_lines(estimate.verdict, given)
         if certainty(estimate.verdict):
             lines.pop()  # uncertainty and error form one paragraph
     solved = f"solved from {estimate.frames} frame{'' if estimate.frames == 1 else 's'}"

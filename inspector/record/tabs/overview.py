@@ -40,8 +40,9 @@ NAME = "Overview"
 WORST = "Worst frame"
 LARGE_SHARE = 0.62
 """Share of the tab's width that the large picture takes."""
-LARGEST_OVERLAY, LARGEST_SMALL = 600.0, 250.0
-"""Largest heights of both kinds of pictures in pixels, which leave room for the rest of their columns."""
+LARGEST_OVERLAY, LARGEST_SMALL, LARGEST_ONLY = 600.0, 250.0, 420.0
+"""Largest heights in pixels of the large picture, of one of two small ones and of a single one, which leave room for
+the rest of their columns."""
 _SMALL = (entities.OVERLAY_MISCALIBRATED, entities.OVERLAY_REFERENCE)
 
 FIT = "fit"
@@ -107,7 +108,8 @@ def view(layout: Layout) -> View:
     if layout.with_drive:
         said.insert(0, rrb.TextDocumentView(origin=entities.DRIVE_TEXT, name="The answer: whole drive as one"))
     small = [frame_view(layout, name, path, small=True) for name, path in names.items() if path in _SMALL]
-    heights = [min(_height(layout, 1.0 - LARGE_SHARE) + TITLE_HEIGHT, LARGEST_SMALL)] * len(small)
+    largest = LARGEST_SMALL if len(small) > 1 else LARGEST_ONLY
+    heights = [min(_height(layout, 1.0 - LARGE_SHARE) + TITLE_HEIGHT, largest)] * len(small)
     return rrb.Horizontal(
         rrb.Vertical(*left, row_shares=shares),
         rrb.Vertical(rrb.Tabs(*said, active_tab=0), *small, row_shares=[SCREEN_HEIGHT - sum(heights), *heights]),

@@ -15,7 +15,7 @@ from calibnet.trace import CascadeTrace
 from inspector import entities
 from inspector.markdown import markdown_table
 from inspector.record.observation import Observation
-from inspector.verdicts import OF_GIVEN, OF_RESULT, markdown_lines
+from inspector.verdicts import OF_GIVEN, found_lines, markdown_lines
 
 NOTHING = "–"
 READING_AID = (
@@ -53,7 +53,7 @@ def _verdicts(observation: Observation) -> list[str]:
     """The verdicts on the extrinsic that the run started from, if that is verified, and on the result."""
     given, found = observation.given, observation.trace.verdict
     lines = [] if given is None else markdown_lines(given, OF_GIVEN)
-    return lines if found is None else lines + markdown_lines(found, "" if given is None else OF_RESULT)
+    return lines if found is None else lines + found_lines(found, given)
 
 
 def _headline(observation: Observation) -> str:

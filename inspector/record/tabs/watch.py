@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from calibnet.watch import WINDOW, Watch
-from inspector import colors
+from inspector import colors, entities
 from inspector.mount_changes import AXES, in_units
 from inspector.record.contents import Contents
 from inspector.record.observation import Layout, Observation
@@ -23,7 +23,6 @@ from inspector.record.tabs.views import View, curve_view, frames_named, legend, 
 
 NAME = "Did it move?"
 
-TEXT = "watch/result"
 LEGEND = "legend/watch"
 CURVES = {
     "frames": ("single frames", colors.REST, 1.0),
@@ -53,7 +52,7 @@ def wanted(layout: Layout) -> bool:
 def log_once(rec: Subtree, layout: Layout) -> None:
     """Log names and colours of the curves."""
     log_curve_styles(rec, frames_named(layout))
-    rec.log_once(TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
+    rec.log_once(entities.WATCH_TEXT, rr.TextDocument(NOT_YET, media_type=rr.MediaType.MARKDOWN))
 
 
 def log(rec: Subtree, observation: Observation, contents: Contents) -> None:
@@ -82,7 +81,7 @@ def log_watch(rec: Subtree, found: Watch | None, lines: Sequence[str], to_frame:
         to_frame: sets the timelines to a frame by its number.
     """
     text = "\n\n".join([f"# {lines[-1]}", *lines[:-1]])
-    rec.log_for_all(TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    rec.log_for_all(entities.WATCH_TEXT, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
     if found is None:
         return
     moved = {change.frame for change in found.changes if change.until is None}
@@ -108,6 +107,6 @@ def watch_view() -> View:
         curve_view(f"{axis.capitalize()} against the whole drive [{unit}]", f"/watch/{axis}")
         for axis, unit in PARAMETERS.items()
     ]
-    text = rrb.TextDocumentView(origin=TEXT, name="Did the mount move?")
+    text = rrb.TextDocumentView(origin=entities.WATCH_TEXT, name="Did the mount move?")
     curves = with_legend(rrb.Grid(*views, grid_columns=3), legend("Curves", LEGEND), "Curves")
     return rrb.Horizontal(text, curves, column_shares=[TEXT_SHARE, 1 - TEXT_SHARE], name=NAME)

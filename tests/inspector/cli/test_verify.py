@@ -198,7 +198,7 @@ def test_the_recording_shows_why_and_is_checked_like_it(invoke: Invoke, own_fold
     assert (recorded.given_verdict.word, recorded.drive_verdict.word) == ("rejected", "accepted")
     assert recorded.verdict is recorded.given_verdict
     captions = [text.as_py()[0] for _, text in read(Path("why.rrd"), "overlay/drive/caption", "text")]
-    assert captions and all(caption.startswith("as given rejected, here as found: ") for caption in captions)
+    assert captions and all(caption.startswith("calibration rejected, points as found: ") for caption in captions)
     assert run(cli, ["check", "why.rrd"]) == 1
     assert run(cli, ["export", "why.rrd", "--drive", "--format", "json"]) == 0  # what was found is good
 
@@ -207,7 +207,7 @@ def test_the_table_of_a_single_frame_begins_with_it(invoke: Invoke, own_folder: 
     asked = ("--frames", "0", "--miscalibrate", "0,0,2,0,0,0", "--save", "one.rrd", "--detail", "overview")
     assert invoke("folder", str(own_folder), *asked)[0] == 1
     ((_, caption),) = read(Path("one.rrd"), "overlay/corrected/caption", "text")
-    assert caption.as_py()[0].startswith("as given rejected, here as found: ")
+    assert caption.as_py()[0].startswith("calibration rejected, points as found: ")
     ((_, text),) = read(Path("one.rrd"), "table", "TextDocument:text")
     assert text.as_py()[0].startswith("# Calibration as given: rejected\n\nThe calibration is off by 2.00°")
 

@@ -22,6 +22,9 @@ from inspector.read.run import read_run
 from inspector.read.understood import RecordingError
 from inspector.read.verdict import read_verdict
 from inspector.record import indexing
+from inspector.record.recording import RunDescription
+from inspector.record.sentence import record_sentence
+from inspector.record.watch import record_watch
 from inspector.run.start import Start
 from tests.support.judged import REASON
 
@@ -162,9 +165,27 @@ def from_before(file: Path) -> None:
     rec.disconnect()
 
 
+def of_watch(file: Path) -> None:
+    record_watch([rr.FileSink(file)], "watched", "id", None, ["Too few frames."])
+
+
+def of_failure(file: Path) -> None:
+    record_sentence(file, RunDescription("drive", {}), "failed", "", "No frame can be read.")
+
+
+def of_rig(file: Path) -> None:
+    rec = rr.RecordingStream("calib-inspect")
+    rec.save(file)
+    rec.log(entities.RIG, rr.AnyValues(rig_json="{}"), static=True)
+    rec.disconnect()
+
+
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
+        (of_watch, "is a recording of watch"),
+        (of_failure, "is the recording of a run that failed"),
+        (of_rig, "is the recording of a rig"),
         (lambda file: None, "does not exist"),
         (lambda file: file.write_bytes(b""), "is not a Rerun recording"),
         (lambda file: file.write_bytes(b"not a recording" * 99), "is not a Rerun recording"),
