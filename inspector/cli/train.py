@@ -265,13 +265,14 @@ def train_stage(options: TrainingOptions, console: Console, save: Path | None, r
     from calibnet.training.build import build
     from calibnet.training.trainer import Trainer
 
+    training = build(options, RECIPE)  # first, since a training that cannot begin must leave no recording
     observers: list[Observer] = [ConsoleObserver(console)]
     with ExitStack() as closing:
         if save is not None:
             from inspector.record.training import TrainingLog
 
             observers.append(closing.enter_context(TrainingLog(save, f"{options.preset} ±{options.range}")))
-        path = Trainer(build(options, RECIPE), Observers(observers), resume).run()
+        path = Trainer(training, Observers(observers), resume).run()
     console.print(f"Weights with their training record: {path}")
 
 

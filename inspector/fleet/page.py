@@ -98,7 +98,8 @@ def _head(name: str) -> str:
 def _row(row: Row, folder: Path) -> str:
     drive = escape(f"{row.drive}, camera {row.camera}" if row.camera else row.drive)
     linked = f'<a href="{_link(row.report)}">{drive}</a>' if row.report else drive
-    recording = f'<br><a class="about" href="{_link(row.recording)}">recording</a>' if row.recording else ""
+    of_frames = row.recording and row.frames  # that of a failed drive has only the reason
+    recording = f'<br><a class="about" href="{_link(row.recording)}">recording</a>' if of_frames else ""
     cause = f"<br>{escape(row.cause)}" if row.cause else ""
     alone = f'<br><span class="about">by its car; alone: {row.verdict}</span>' if row.word != row.verdict else ""
     used = f"{row.frames}" + (f"<br>{row.skipped} skipped" if row.skipped else "")

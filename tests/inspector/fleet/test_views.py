@@ -232,6 +232,15 @@ def test_a_picture_is_of_the_result_or_else_of_what_a_rejected_drive_had(tmp_pat
         assert shown == ([] if name == "median_start" else [f"{one.folder}/pictures/{name}.jpg"])
 
 
+def test_a_recording_without_a_frame_is_not_offered(tmp_path: Path) -> None:
+    whole, failed = (
+        row("d1", "accepted", recording="d1.rrd", frames=3),
+        row("d2", "failed", recording="d2.rrd", frames=0),
+    )
+    page = make_page([whole, failed], tmp_path)
+    assert "d1.rrd" in page and "d2.rrd" not in page
+
+
 def test_links_of_the_page_lead_to_files(invoke: Invoke, cars: Path) -> None:
     Path("DRIVES.csv").write_text("path,car,drive\ncar-a/monday,50% <a>,x/y?z#w\n")
     assert invoke("fleet", "DRIVES.csv", "--output", "all", "--workers", "0")[0] == 0

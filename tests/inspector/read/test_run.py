@@ -170,7 +170,7 @@ def of_watch(file: Path) -> None:
 
 
 def of_failure(file: Path) -> None:
-    record_sentence(file, RunDescription("drive", {}), "failed", "", "No frame can be read.")
+    record_sentence(file, RunDescription("drive", {"seed": 0}), "failed", "", "No frame can be read.")
 
 
 def of_rig(file: Path) -> None:
