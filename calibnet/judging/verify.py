@@ -116,15 +116,12 @@ def verify(given: Extrinsic, found: Verdict, standard: Standard) -> Verdict:
     off = _in_words(error, offset, found.covariance)
     tolerances = [one for one in standard.tolerances if found.within is None or one >= found.within]
     certain = None if found.within is None else tolerances[-1]
-    no_offset = np.zeros(6)
-    resolved = next(
-        (one for one in tolerances if probability_within(no_offset, found.covariance, one, certain) >= PROBABLE),
-        tolerances[-1],
-    )
+    errors = possible_errors(found.covariance, certain)
+    resolved = next((one for one in tolerances if probability_within(errors, one) >= PROBABLE), tolerances[-1])
     if _is_beyond(error, offset, found.covariance, resolved):
         return verdict(REJECTED, f"The calibration is off by {off}; the tolerance is {resolved}.", advice=CORRECT_IT)
     for tolerance in tolerances:
-        share = probability_within(offset, found.covariance, tolerance, certain)
+        share = probability_within(offset[:, None] + errors, tolerance)
         if share >= PROBABLE:
             return verdict(ACCEPTED, f"The calibration is off by no more than {tolerance}: {off}.", tolerance)
     reason = f"The calibration is off by {off}; the probability that it is within {tolerance} is {share:.0%}."
@@ -155,22 +152,21 @@ def named_cause(error: BaseException | None) -> tuple[Cause, ...]:
     return ()
 
 
-def probability_within(
-    offset: Vector6, covariance: Matrix6, tolerance: Tolerance, certain: Tolerance | None = None
-) -> float:
-    """Probability that a calibration's rotation and translation are both within a tolerance.
+def possible_errors(covariance: Matrix6, certain: Tolerance | None = None) -> Floats:
+    """Random errors ``[6, N]`` of an estimate, ``(translation m, rotation rad)``.
 
     Args:
-        offset: ``(translation m, rotation rad)`` of the calibration against the estimate.
         covariance: ``[6, 6]`` of the estimate.
-        tolerance: the largest error that counts as good.
-        certain: the tolerance that the estimate itself is certainly within, if one is known.
+        certain: the tolerance that the estimate is certainly within, if one is known.
     """
     variances, axes = np.linalg.eigh(covariance)
     errors = (axes * np.sqrt(np.maximum(variances, 0.0))) @ _draws()
-    if certain is not None:
-        errors = errors[:, _within(errors, certain)]
-    return float(_within(offset[:, None] + errors, tolerance).mean()) if errors.size else 0.0
+    return np.asarray(errors if certain is None else errors[:, _within(errors, certain)], np.float64)
+
+
+def probability_within(errors: Floats, tolerance: Tolerance) -> float:
+    """Share of errors ``[6, N]`` whose rotation and translation are both within a tolerance."""
+    return float(_within(errors, tolerance).mean()) if errors.size else 0.0
 
 
 def _within(vectors: Floats, tolerance: Tolerance) -> NDArray[np.bool_]:

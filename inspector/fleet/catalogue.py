@@ -20,14 +20,17 @@ from calibnet.errors import ConfigError
 from calibnet.runtime.text import one_line
 from inspector import entities
 from inspector.fleet.extra import require_extra
-from inspector.fleet.table import Row
+from inspector.fleet.table import Row, worst_first
 from inspector.programs import own_address
 
 DATASET = "fleet"
 KNOWN = "known"
 """Name of a layer over each recording, and of its property with the columns of the fleet's table."""
 RUN, OUTCOME, TOLD = (f"property:{name}" for name in (entities.RUN, entities.OUTCOME, KNOWN))
+LINK, RANK = f"{TOLD}:open", f"{TOLD}:rank"
 SHOWN = {
+    LINK: "open",
+    RANK: "rank",
     f"{RUN}:car": "car",
     f"{RUN}:drive": "drive",
     f"{TOLD}:date": "date",
@@ -45,9 +48,8 @@ SHOWN = {
     f"{OUTCOME}:error_cm": "error [cm]",
     f"{OUTCOME}:frames_used": "frames",
     f"{OUTCOME}:frames_skipped": "skipped",
-    "rerun_segment_id": "recording",
-    f"{TOLD}:by_car_reason": "why by its car",
     f"{OUTCOME}:reason": "why",
+    f"{TOLD}:by_car_reason": "why by its car",
 }
 """Columns in order, and their headings; all others can be switched on in the viewer."""
 FIGURES = ("moved_deg", "moved_cm", "sigma_deg", "sigma_cm", "by_car_moved_deg", "by_car_moved_cm")
@@ -90,7 +92,11 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
         try:
             server = stack.enter_context(rr.server.Server(host=own_address(), datasets={DATASET: files}))
             dataset = server.client().get_dataset(DATASET)
-            layers = [_layer(ours / f"{number}.rrd", *one) for number, one in enumerate(recorded.items())]
+            ranks = {row.folder: rank for rank, row in enumerate(worst_first(rows), start=1)}
+            layers = [
+                _layer(ours / f"{ranks[row.folder]}.rrd", file, row, ranks[row.folder], dataset)
+                for file, row in recorded.items()
+            ]
             dataset.register([layer.as_uri() for layer in layers], layer_name=KNOWN).wait()
             columns = {field.name for field in dataset.segment_table().schema()}
             table_layout(columns).save(entities.APPLICATION_ID, ours / "table.rbl")
@@ -105,14 +111,16 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
         yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
 
 
-def _layer(layer: Path, recording: Path, row: Row) -> Path:
-    """A file that adds the columns of the fleet's table to a drive's recording."""
+def _layer(layer: Path, recording: Path, row: Row, rank: int, dataset: Any) -> Path:
+    """A file that adds to a recording the columns of the fleet's table, the drive's rank, and a link that opens it."""
     import rerun as rr
 
     (of, *_) = RrdReader(recording).recordings()
     stream = rr.RecordingStream(of.application_id, recording_id=of.recording_id, send_properties=False)
     stream.save(layer)
     known: dict[str, Any] = {
+        "open": dataset.segment_url(of.recording_id),
+        "rank": rank,
         "word": row.word,
         "date": row.date.removesuffix("T00:00:00"),
         "by_car_reason": row.by_car_reason,
@@ -125,13 +133,17 @@ def _layer(layer: Path, recording: Path, row: Row) -> Path:
 
 
 def table_layout(columns: set[str]) -> Any:
-    """The layout of the table, with the columns that it has; failed and rejected drives come last."""
+    """The layout of the table, with the columns that it has; the worst drives come first, as on the page."""
+    import rerun as rr
     from rerun.blueprint.table import Column, SortBy, TableBlueprint, TableLayout
 
-    shown = [Column(source, name=name) for source, name in SHOWN.items() if source in columns]
+    shown = [
+        Column(source, name=name, column_type=rr.components.Url if source == LINK else None)
+        for source, name in SHOWN.items()
+        if source in columns
+    ]
     hidden = [Column(source, visible=False) for source in sorted(columns - SHOWN.keys())]
-    word = f"{TOLD}:word"
     return TableBlueprint(
         table_layout=TableLayout(columns=[*shown, *hidden]),
-        sort_by=SortBy(word, direction="descending") if word in columns else None,
+        sort_by=SortBy(RANK, direction="ascending") if RANK in columns else None,
     )

@@ -86,7 +86,7 @@ class History:
         wrong = [row for row in self.rows if row.verdict == REJECTED and row.cause]
         off = [row for row in self.rows if row.word == REJECTED and not row.cause]
         failed = [row for row in self.rows if row.verdict == FAILED]
-        apart = [row for row in self.judged if row.by_car == APART]
+        apart = [row for row in self.rows if row.by_car == APART]
         if wrong:
             causes = ", ".join(dict.fromkeys(row.cause for row in wrong))
             parts.append(f"{_drives(len(wrong))} with wrong input ({causes}).")

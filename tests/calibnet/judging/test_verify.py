@@ -12,7 +12,7 @@ from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
 from calibnet.judging.advice import CORRECT_IT, LOOK_AT_BOTH, NARROWER
-from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, probability_within, unfit, verify
+from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, possible_errors, probability_within, unfit, verify
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
 
@@ -70,16 +70,17 @@ def test_the_word_follows_offset_and_certainty(given: np.ndarray, sure: tuple[fl
 
 def test_the_probability_is_that_of_the_normal_distribution() -> None:
     """Three axes of 4 cm: within 8 cm with the chi distribution's 73.9 %; the rotation is sure."""
-    inside = probability_within(np.zeros(6), covariance(0.001, 4.0), TIGHT.tolerances[0])
+    inside = probability_within(possible_errors(covariance(0.001, 4.0)), TIGHT.tolerances[0])
     assert inside == pytest.approx(0.7385, abs=0.005)
     offset = pose_vector(off(z=0.08) @ invert(REFERENCE))
-    assert probability_within(offset, covariance(0.001, 0.01), TIGHT.tolerances[0]) == pytest.approx(0.5, abs=0.01)
+    errors = offset[:, None] + possible_errors(covariance(0.001, 0.01))
+    assert probability_within(errors, TIGHT.tolerances[0]) == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_is_certain_takes_the_tails_from_the_probability() -> None:
     """Three axes of 8 cm: within 15 cm with 67.9 %, within 8 cm with 19.9 %."""
     fine, coarse = DRIVE_TOLERANCES
-    shares = [probability_within(np.zeros(6), covariance(0.001, 8.0), one, coarse) for one in (fine, coarse)]
+    shares = [probability_within(possible_errors(covariance(0.001, 8.0), coarse), one) for one in (fine, coarse)]
     assert shares == pytest.approx([0.199 / 0.679, 1.0], abs=0.01)
 
 

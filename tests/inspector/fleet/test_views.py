@@ -129,7 +129,7 @@ def test_the_last_drive_alone_only_seems_to_have_moved() -> None:
 
 def test_one_drive_in_the_middle_stands_apart() -> None:
     rows = [unsure(f"d{at}", MOVED if at == 3 else REFERENCE) for at in range(1, 7)]
-    (history,) = histories(rows)
+    (history,) = histories(judged_by_cars(rows))
     assert history.moves == ()
     assert "d3 is an outlier." in history.sentence
     judged = list(history.judged)
@@ -273,10 +273,14 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
         names = [one[0] for one in table["property:run:drive"]]
         words = [one[0] for one in table["property:verdict:word"]]
         known = [one[0] for one in table["property:known:word"]]
+        ranks = [one[0] for one in table["property:known:rank"]]
+        links = [one[0] for one in table["property:known:open"]]
+        assert links == [dataset.segment_url(segment) for segment in table["rerun_segment_id"]]
         assert len(dataset.blueprints()) == 2
         assert dataset.default_blueprint() is not None
     assert dict(zip(names, words, strict=True)) == {"monday": "accepted", "tuesday": "failed"}
     assert dict(zip(names, known, strict=True)) == {"monday": "rejected", "tuesday": "failed"}, "as the table has it"
+    assert dict(zip(names, ranks, strict=True)) == {"tuesday": 1, "monday": 2}, "the worst first"
 
 
 def test_the_catalogue_in_a_browser_is_behind_the_guard_of_all_pages(monkeypatch: pytest.MonkeyPatch) -> None:
