@@ -23,8 +23,8 @@ MOST_ROWS, MOST_CARS = 1000, 300
 GRADES = {"accepted": "good", "cannot tell": "fair", APART: "apart", "rejected": "bad", FAILED: "none"}
 UNCERTAINTY = "± (1σ)"
 HEADS = ("car", "drive", "date", "verdict", "moved", UNCERTAINTY, "by its car", "frames", "why", "picture")
-LONGEST_REASON = 300
-"""Characters of a reason that are shown at once; the rest unfolds."""
+LONGEST_REASON = 120
+"""Characters of a reason that are shown at once, so that the worst ten drives fit on a screen; the rest unfolds."""
 
 
 def write_page(rows: Sequence[Row], folder: Path) -> Path:
@@ -119,20 +119,19 @@ def _row(row: Row, folder: Path) -> str:
 
 
 def _reasons(row: Row) -> str:
-    """The reason of the drive's word, then the other one."""
-    alone, together = _folded(row.reason), _folded(row.by_car_reason)
+    """The beginning of the reason for the drive's word; its rest and the reason for the other verdict unfold."""
+    reason, other, whose = row.reason, row.by_car_reason, "By its car"
     if row.word != row.verdict:
-        return f'{together}<br><span class="about">Alone: {alone}</span>'
-    return alone + (f'<br><span class="about">By its car: {together}</span>' if together else "")
-
-
-def _folded(text: str) -> str:
-    """A text of which, where it is long, the beginning is shown until one wants the rest."""
-    whole = one_line(text)
-    if len(whole) <= LONGEST_REASON:
-        return escape(whole)
-    end = whole.rfind(" ", 0, LONGEST_REASON) if " " in whole[:LONGEST_REASON] else LONGEST_REASON
-    return f"<details><summary>{escape(whole[:end])} …</summary>{escape(whole[end:].strip())}</details>"
+        reason, other, whose = other, reason, "Alone"
+    whole = one_line(reason)
+    end = len(whole)
+    if end > LONGEST_REASON:
+        end = max(whole.rfind(" ", 0, LONGEST_REASON), 0) or LONGEST_REASON
+    rest = escape(whole[end:].strip())
+    if other:
+        rest += f'<br><span class="about">{whose}: {escape(one_line(other))}</span>'
+    start = escape(whole[:end])
+    return f"<details><summary>{start} …</summary>{rest}</details>" if rest else start
 
 
 def _pair(head: str, degrees: float | None, centimetres: float | None, key: float) -> str:

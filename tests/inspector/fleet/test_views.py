@@ -218,8 +218,15 @@ def test_a_long_reason_unfolds_and_loses_nothing(tmp_path: Path) -> None:
     reason = "It begins so. " + 40 * "Frame 7: cut. " + "<It ends so.>"
     page = make_page([row("d1", reason=reason), row("d2", reason="Short.")], tmp_path)
     (start, rest) = re.findall(r"<details><summary>(.*) …</summary>(.*)</details>", page)[0]
-    assert len(start) <= 300 and unescape(f"{start} {rest}") == reason
+    assert len(start) <= 120 and unescape(f"{start} {rest}") == reason
     assert '<td class="reason">Short.</td>' in page
+
+
+def test_the_reason_of_the_other_verdict_unfolds(tmp_path: Path) -> None:
+    of_car = row("d1", "cannot tell", reason="Two frames.", by_car="rejected", by_car_reason="Off by 2°.")
+    page = make_page([of_car, row("d2", reason="Good.", by_car="accepted", by_car_reason="All agree.")], tmp_path)
+    folds = [re.sub("<[^>]+>", "|", fold) for fold in re.findall(r"<details>(.*?)</details>", page)]
+    assert folds == ["|Off by 2°. …|||Alone: Two frames.|", "|Good. …|||By its car: All agree.|"]
 
 
 def test_a_picture_is_of_the_result_or_else_of_what_a_rejected_drive_had(tmp_path: Path) -> None:
