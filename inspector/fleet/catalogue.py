@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from rerun.chunk import RrdReader
@@ -24,6 +25,7 @@ from inspector.fleet.table import Row, worst_first
 from inspector.programs import own_address
 
 DATASET = "fleet"
+PATIENCE_S = 1.0
 KNOWN = "known"
 """Name of a layer over each recording, and of its property with the columns of the fleet's table."""
 RUN, OUTCOME, TOLD = (f"property:{name}" for name in (entities.RUN, entities.OUTCOME, KNOWN))
@@ -90,7 +92,8 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
     with ExitStack() as stack:
         ours = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="calib-inspect-")))
         try:
-            server = stack.enter_context(rr.server.Server(host=own_address(), datasets={DATASET: files}))
+            server = rr.server.Server(host=own_address(), datasets={DATASET: files})
+            stack.callback(end_server, server)
             dataset = server.client().get_dataset(DATASET)
             ranks = {row.folder: rank for rank, row in enumerate(worst_first(rows), start=1)}
             layers = [
@@ -109,6 +112,13 @@ def serve(rows: Sequence[Row], folder: Path) -> Iterator[Catalogue]:
                 f"Rerun's server rejects the recordings of {folder} ({said}); run `calib-inspect fleet` again."
             ) from None
         yield Catalogue(f"{server.url()}/entry/{dataset.id}", len(files))
+
+
+def end_server(server: Any) -> None:
+    """End the server, without waiting long for viewers: its shutdown returns only when the last one has closed."""
+    ending = Thread(target=server.shutdown, daemon=True)
+    ending.start()
+    ending.join(PATIENCE_S)
 
 
 def _layer(layer: Path, recording: Path, row: Row, rank: int, dataset: Any) -> Path:

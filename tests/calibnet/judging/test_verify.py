@@ -12,7 +12,16 @@ from calibnet.geometry import miscalibration
 from calibnet.geometry.se3 import invert, pose_vector
 from calibnet.geometry.types import Matrix6
 from calibnet.judging.advice import CORRECT_IT, LOOK_AT_BOTH, NARROWER
-from calibnet.judging.verify import DRIVE, FRAME, Standard, named_cause, possible_errors, probability_within, unfit, verify
+from calibnet.judging.verify import (
+    DRIVE,
+    FRAME,
+    Standard,
+    named_cause,
+    possible_errors,
+    probability_within,
+    unfit,
+    verify,
+)
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame, Cause, Tolerance, Verdict
 from tests.support.fakes import REFERENCE
 

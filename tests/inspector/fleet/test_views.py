@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import time
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from threading import Event
 from urllib.error import HTTPError
 from urllib.parse import quote, unquote, urlsplit
 from urllib.request import Request, urlopen
@@ -18,6 +20,7 @@ from calibnet.geometry import miscalibration
 from calibnet.training.data import open_data
 from inspector.cli.fleet import news
 from inspector.fleet import viewing
+from inspector.fleet.catalogue import end_server
 from inspector.fleet.drives import Drive
 from inspector.fleet.history import histories, judged_by_cars
 from inspector.fleet.page import make_page
@@ -288,6 +291,20 @@ def test_the_catalogue_has_every_drive_with_its_verdict(invoke: Invoke, cars: Pa
     assert dict(zip(names, words, strict=True)) == {"monday": "accepted", "tuesday": "failed"}
     assert dict(zip(names, known, strict=True)) == {"monday": "rejected", "tuesday": "failed"}, "as the table has it"
     assert dict(zip(names, ranks, strict=True)) == {"tuesday": 1, "monday": 2}, "the worst first"
+
+
+def test_the_catalogue_ends_while_a_viewer_is_open() -> None:
+    """Rerun's server does not shut down before its last viewer closes, which would make Ctrl-C useless."""
+    viewer_closes = Event()
+
+    class Server:
+        def shutdown(self) -> None:
+            viewer_closes.wait()
+
+    began = time.monotonic()
+    end_server(Server())
+    assert time.monotonic() - began < 20.0
+    viewer_closes.set()
 
 
 def test_the_catalogue_in_a_browser_is_behind_the_guard_of_all_pages(monkeypatch: pytest.MonkeyPatch) -> None:
