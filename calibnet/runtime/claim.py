@@ -14,7 +14,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from calibnet.runtime.writing import Kind, OutputError, check_output, remove_partials
+from calibnet.runtime.writing import Kind, OutputError, check_output, hidden, remove_partials
 
 PATIENCE_S = 0.2
 """Seconds to wait for a lock, whose last owner may just be ending."""
@@ -118,7 +118,7 @@ def locked(path: Path, patience_s: float = PATIENCE_S) -> Iterator[None]:
 def _lock(path: Path, patience_s: float) -> FileLock:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path.with_name(f".{path.name}.lock"), timeout=patience_s)
+        lock = FileLock(path.with_name(f"{hidden(path)}lock"), timeout=patience_s)
         lock.acquire()
     except Timeout:
         raise BusyError(f"{path} is being written by another run; choose another name, or wait for it.") from None

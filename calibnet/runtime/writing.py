@@ -63,7 +63,7 @@ def keeping_others() -> Iterator[None]:
 
 
 PARTIAL, LONGEST_NAME = ".partial", 100
-"""Suffix of partial files, and the largest part of an output's name that they use."""
+"""Suffix of partial files, and the largest part of an output's name that our files beside it use."""
 
 
 def allow_overwriting() -> None:
@@ -158,7 +158,7 @@ def naming(path: Path) -> Iterator[None]:
 def _begin(path: Path) -> tuple[Path, int]:
     """An empty file of a new name beside ``path``, with the usual permissions of a new file."""
     while True:
-        partial = path.with_name(f"{_before(path)}{secrets.token_hex(4)}{PARTIAL}")
+        partial = path.with_name(f"{hidden(path)}{secrets.token_hex(4)}{PARTIAL}")
         with contextlib.suppress(FileExistsError):
             descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
             try:
@@ -169,12 +169,13 @@ def _begin(path: Path) -> tuple[Path, int]:
 
 def remove_partials(path: Path) -> None:
     """Remove partial files that a killed `write_whole` left beside ``path``; the caller must have its lock."""
-    for left in path.parent.glob(f"{glob.escape(_before(path))}{'[a-z0-9_]' * 8}{PARTIAL}"):
+    for left in path.parent.glob(f"{glob.escape(hidden(path))}{'[a-z0-9_]' * 8}{PARTIAL}"):
         with contextlib.suppress(OSError):
             left.unlink()
 
 
-def _before(path: Path) -> str:
+def hidden(path: Path) -> str:
+    """Start of the names of our own files beside an output, which are hidden and never too long."""
     name = path.name if len(path.name) <= LONGEST_NAME else hashlib.sha256(os.fsencode(path.name)).hexdigest()
     return f".{name}."
 

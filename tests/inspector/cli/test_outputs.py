@@ -33,3 +33,9 @@ def test_a_folder_that_cannot_be_written_fails_before_the_work(
     (tmp_path / "file").touch()
     assert run(cli, ["info", "--json", str(tmp_path / "file" / "info.json")]) == 3
     assert "info.json cannot be written" in capsys.readouterr().err
+
+
+def test_an_output_may_have_a_name_as_long_as_any(tmp_path: Path) -> None:
+    file = tmp_path / f"{'n' * 250}.json"
+    assert run(cli, ["info", "--json", str(file)]) == 0
+    assert list(tmp_path.iterdir()) == [file]
