@@ -9,6 +9,7 @@ from dataclasses import replace
 from calibnet.geometry import degrees_and_cm
 from calibnet.geometry.median import median_pose
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.text import listed
 from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, WORDS, BadFrame, Cause, Verdict, Word, moved
 
 OF_GIVEN = "Calibration as given"
@@ -92,13 +93,13 @@ def once(cause: Cause, verdict: Verdict) -> str:
 
 
 def verdict_counts(verdicts: Mapping[int, Verdict]) -> str:
-    """The number of frames with each verdict, with the numbers of those not accepted and the first one's reason."""
+    """The number of frames with each verdict, with numbers of those not accepted and the first one's reason."""
     parts = []
     for word in WORDS:
         frames = [frame for frame, verdict in verdicts.items() if verdict.word == word]
         parts.append(f"{len(frames)} {word}")
         if frames and word != ACCEPTED:
-            others = f"frames {', '.join(map(str, frames))}; " if len(frames) > 1 else ""
+            others = f"frames {listed(frames)}; " if len(frames) > 1 else ""
             reason = explained(verdicts[frames[0]]).removesuffix(".")
             parts[-1] += f" ({others}frame {frames[0]}: {reason})"
     return f"Verdict: {', '.join(parts)}."

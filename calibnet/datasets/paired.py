@@ -29,7 +29,7 @@ from calibnet.datasets.selection import evenly_spaced
 from calibnet.errors import DatasetError
 from calibnet.geometry import PinholeCamera
 from calibnet.runtime.reading import register_input
-from calibnet.runtime.text import number_of, one_line
+from calibnet.runtime.text import listed, number_of, one_line
 
 SCANS_LOOKED_AT = 4
 """Number of scans of a drive from which the scale of intensity is found."""
@@ -223,7 +223,7 @@ def with_partners(images: dict[str, Path], scans: dict[str, Path]) -> Partners:
     }
     notes = [
         f"{number_of(len(stems), what)} without a partner {'is' if len(stems) == 1 else 'are'} left out "
-        f"({', '.join(stems[:3])}{' and so on' if len(stems) > 3 else ''})."
+        f"({listed(stems)})."
         for what, stems in alone.items()
         if stems
     ]

@@ -11,6 +11,8 @@ MORE_PLACES = (
     "(calib-inspect fleet)."
 )
 """For a drive whose frames fit."""
+MORE_DRIVES = "Judge several drives on this mount together (calib-inspect fleet)."
+"""For one that has so many frames that more of them would not help."""
 RICHER_SCENE = "Take frames in which poles, cars or walls stand at several distances."
 """For frames whose matches determine nothing."""
 SUSPECTS = "check the camera matrix, the lens and the time stamps"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from calibnet.geometry import MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.advice import MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
+from calibnet.judging.advice import MORE_DRIVES, MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.covariance import known_within
 from calibnet.judging.drive_lens import drive_lens_causes
@@ -34,6 +34,8 @@ LARGEST_SIGMA_DEG, LARGEST_SIGMA_CM = 0.3, 12.0
 FEWEST_JUDGED = 4
 """Fewest frames of a drive that can be accepted; those of several cameras at one moment count once. Two or three mostly
 show one place, most such drives end outside the limits, and no predictor tells which (docs/decisions.md, "Drives")."""
+MANY_FRAMES = 100
+"""Frames of a drive beyond which more of them are not advised."""
 HALVES_CM, ALIGNED_CM = 15.0, 7.0
 """Differences between the halves of a drive, and between its networks and its edges, above which the reason mentions
 them; rotations are converted as in `calibnet.judging.drive_predictors`."""
@@ -135,6 +137,6 @@ def _conclude(
         CANNOT_TELL,  # not rejected: many drives beyond the limits are only a little beyond them
         f"The result of {used} frames is {certain} (probability of a larger error: {wrong:.0%})"
         f"{''.join(f'; {one}' for one in why)}.",
-        MORE_PLACES,
+        MORE_PLACES if used < MANY_FRAMES else MORE_DRIVES,
         within,
     )

@@ -7,10 +7,13 @@ comment of a file or in an XML attribute, such text would be interpreted.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from urllib.parse import quote
 
 LONGEST = 2000
 """Largest number of characters of a text that are shown."""
+MOST_LISTED = 10
+"""Largest number of items that a sentence lists."""
 LONGEST_NAME = 100
 """Largest number of characters of a file name made from foreign text."""
 
@@ -38,6 +41,12 @@ def quoted_lines(text: object) -> str:
 def number_of(count: int, noun: str) -> str:
     """A number and a noun, such as ``"1 drive"`` or ``"2 drives"``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def listed(items: Sequence[object], most: int = MOST_LISTED) -> str:
+    """Items with commas; of many, the first ones and how many more there are."""
+    shown = ", ".join(map(str, items[:most]))
+    return shown if len(items) <= most else f"{shown} and {len(items) - most} more"
 
 
 def file_name(text: str) -> str:

@@ -11,10 +11,13 @@ from statistics import median
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
-from calibnet.runtime.text import number_of
+from calibnet.runtime.text import listed, number_of
 from calibnet.verdict import REJECTED, BadFrame, Verdict
 from inspector.record.observation import Observation
 from inspector.verdicts import majority, verdict_counts, verdict_line
+
+FAILURES_TOLD = 3
+"""Number of frames of which the sentence that ends a run says why they cannot be used."""
 
 
 @dataclass
@@ -93,7 +96,7 @@ class Summary:
         """
         bad, tried = self.skipped, self.frames + len(self.skipped)
         if bad and 2 * len(bad) >= tried:
-            each = " ".join(f"Frame {one.frame}: {one.why}" for one in bad)
+            each = " ".join(f"Frame {one.frame}: {one.why}" for one in bad[:FAILURES_TOLD])
             kind = DatasetError if self.unread else CalibrationError
             raise kind(f"{len(bad)} of {tried} frames cannot be used, which is at least half. {each}")
 
@@ -105,7 +108,7 @@ class Summary:
         lines = [f"{number_of(self.frames, 'frame')} in {seconds:.1f} s, {self.frames / seconds:.1f} frames/s."]
         lines += self.of_frames()
         if self.skipped:
-            numbers = ", ".join(str(bad.frame) for bad in self.skipped)
+            numbers = listed([bad.frame for bad in self.skipped])
             lines.append(f"{number_of(len(self.skipped), 'frame')} skipped because they could not be used: {numbers}.")
         if self.drive:
             lines.append(self.drive)

@@ -25,7 +25,7 @@ from inspector.serving.guard import LOCALHOST, Guard, inline_scripts, new_token
 PATIENCE_S = 10.0
 KEEP_ALIVE_S = 15
 """Seconds that a client may take for its first request, and between requests."""
-MOST_CONNECTIONS = 64
+MOST_CONNECTIONS = 256
 """Largest number of open connections; further ones are told to try again."""
 
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 from calibnet.verdict import CANNOT_TELL, REJECTED, Cause, Verdict
 from inspector.read.verdict import read_verdict
 from inspector.report.verdict import verdict
-from inspector.verdicts import explained, found_lines, markdown_lines, verdict_line
+from inspector.verdicts import explained, found_lines, markdown_lines, verdict_counts, verdict_line
 from tests.support.fakes import REFERENCE
 
 UNSURE = Verdict(CANNOT_TELL, "It is not certain.", REFERENCE, advice="Take more frames.")
@@ -22,6 +22,13 @@ def test_the_last_line_ends_with_what_to_do_next() -> None:
     assert explained(UNSURE) == "It is not certain.", "an exported file says no more"
     assert "Take more frames." in markdown_lines(UNSURE)
     assert markdown_lines(replace(UNSURE, advice="")) == ["# Cannot tell", "", "It is not certain.", ""]
+
+
+def test_the_last_line_of_a_long_run_lists_some_frames() -> None:
+    line = verdict_counts(dict.fromkeys(range(4541), UNSURE))
+    assert line.endswith(
+        "4541 cannot tell (frames 0, 1, 2, 3, 4, 5, 6, 7, 8, 9 and 4531 more; frame 0: It is not certain)."
+    )
 
 
 def test_a_cause_that_the_reason_ends_with_is_not_said_again() -> None:

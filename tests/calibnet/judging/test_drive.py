@@ -102,6 +102,7 @@ def test_what_is_not_accepted_may_be_certain_of_a_coarser_tolerance() -> None:
         (estimate(yaw=25.0), RANGES[0], "Check the camera matrix, the lens and the time stamps."),  # all stages ran
         (estimate(degrees=0.2), RANGES[2], "Add frames of other places; if that does not help, check the camera"),
         (estimate(error=2.5), RANGES[2], "Use more frames, some dozens, of different places"),
+        (replace(estimate(error=2.5), frames=500), RANGES[2], "Judge several drives on this mount together"),
         (replace(estimate(), looks=()), RANGES[2], "Take frames in which poles, cars or walls"),
     ],
 )

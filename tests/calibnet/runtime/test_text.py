@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from calibnet.runtime.text import one_line, quoted_lines
+from calibnet.runtime.text import listed, one_line, quoted_lines
 
 
 @pytest.mark.parametrize(
@@ -35,3 +35,8 @@ def test_a_long_text_loses_its_middle() -> None:
 
 def test_our_own_lines_stay_lines() -> None:
     assert quoted_lines("one\ntwo\x1b[0m") == "one\ntwo\\x1b[0m"
+
+
+def test_a_sentence_lists_no_thousand_items() -> None:
+    assert listed([3, 5, 9]) == "3, 5, 9"
+    assert listed(range(4541)) == "0, 1, 2, 3, 4, 5, 6, 7, 8, 9 and 4531 more"
