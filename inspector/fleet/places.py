@@ -194,7 +194,8 @@ class Store:
         system, root = _system(self.root)
         there = f"{root}/{name}"
         earlier = set(system.find(there)) if system.exists(there) else set()
-        for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        files = [path for path in folder.rglob("*") if path.is_file() and not path.name.startswith(".")]  # no locks
+        for path in sorted(files):
             target = f"{there}/{path.relative_to(folder).as_posix()}"
             system.makedirs(target.rpartition("/")[0], exist_ok=True)
             system.put_file(str(path), target)
