@@ -11,6 +11,7 @@ from calibnet.datasets.plausibility import suspicion
 from calibnet.datasets.selection import evenly_spaced
 from calibnet.drive.consensus import Consensus
 from calibnet.drive.convergence import Convergence, Due
+from calibnet.drive.moving import Moving
 from calibnet.drive.readings import Observed, Readings
 from calibnet.errors import CalibnetError, CalibrationError, DatasetError
 from calibnet.geometry import MiscalibrationRange, is_finest
@@ -64,7 +65,8 @@ def solve_drive(
 
     Each stage looks at some frames spread over the drive, their consensus corrects the extrinsic, and this is repeated
     on the scans projected anew; the last look is at all frames. After the finest stage, edges and reflectance of some
-    frames are aligned (`calibnet.alignment`), which corrects a few pixels at most. Only one frame is in memory at a
+    frames are aligned (`calibnet.alignment`), which corrects a few pixels at most. If the car moves, what the motion in
+    the images shows (`calibnet.motion`) is added for the verdict. Only two frames are in memory at a
     time, besides 4 MB of each aligned frame.
 
     Args:
@@ -95,6 +97,7 @@ def solve_drive(
     evidence, last_looks = list[Evidence](), list[DriveLook]()
     to_align, convergence = Due(evenly_spaced(len(frames), FRAMES_ALIGNED)), Convergence(len(frames))
     consensus = Consensus(extrinsic, stages[-1].range, pose_prior, common_error)
+    moving = Moving(extrinsic, len(frames))
 
     def estimate(*starts: Estimate) -> Estimate:
         return consensus.aligned(evidence, starts) if aligns else consensus.estimate()
@@ -105,6 +108,8 @@ def solve_drive(
         last_looks.append(drive_look(frame, position, trace))
         if aligns and to_align.reached(position):
             evidence.append(gather(frame, extrinsic))
+        if aligns:
+            moving.note(position, frame)
         convergence.note(position, frame.index, lambda: estimate(*convergence.latest))
     of_networks = consensus.estimate()
     final = estimate(of_networks, *convergence.latest)
@@ -119,6 +124,7 @@ def solve_drive(
         networks=of_networks if aligns else None,
         looks=tuple(last_looks),
         looked_from=extrinsic,
+        motion=moving.estimate(final.camera_from_lidar),
     )
 
 

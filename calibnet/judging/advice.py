@@ -19,6 +19,8 @@ SUSPECTS = "check the camera matrix, the lens and the time stamps"
 """What makes frames contradict one another, and results leave the range."""
 SCATTER = f"Add frames of other places; if that does not help, {SUSPECTS}."
 """For a drive whose frames contradict one another."""
+CONTRADICTION = f"Look at a recording (--save FILE.rrd), and {SUSPECTS}."
+"""For a drive whose motion contradicts its frames."""
 CORRECT_IT = "Correct it: run the same command without `verify`, and export the result (calib-inspect export)."
 """For a calibration that is off from a result which is certain."""
 LOOK_AT_BOTH = (

@@ -6,11 +6,19 @@ import math
 from typing import NamedTuple
 
 from calibnet.geometry import MiscalibrationRange
+from calibnet.geometry.se3 import degrees_and_cm
 from calibnet.geometry.types import Extrinsic
-from calibnet.judging.advice import MORE_DRIVES, MORE_PLACES, RICHER_SCENE, SCATTER, out_of_range
+from calibnet.judging.advice import (
+    CONTRADICTION,
+    MORE_DRIVES,
+    MORE_PLACES,
+    RICHER_SCENE,
+    SCATTER,
+    out_of_range,
+)
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.covariance import known_within
-from calibnet.judging.drive_lens import drive_lens_causes
+from calibnet.judging.drive_lens import drive_lens_causes, motion_lens_causes
 from calibnet.judging.drive_predictors import aligned_cm, drive_predictors, halves_cm
 from calibnet.judging.lens_causes import LensOdds
 from calibnet.judging.predictors import reach
@@ -57,7 +65,7 @@ def judge_drive(
         classifier: from `calibnet.judging.coefficients.Coefficients.for_drive`; without one nothing is accepted.
         lens: names a fault of the lens, see `calibnet.judging.drive_lens`; without it none is named.
     """
-    causes = drive_lens_causes(estimate.looks, lens, FEWEST_JUDGED)
+    causes = motion_lens_causes(estimate.motion) or drive_lens_causes(estimate.looks, lens, FEWEST_JUDGED)
     concluded = _conclude(estimate, initial, searched, classifier, causes)
     within, covariance = concluded.within, estimate.covariance
     return Verdict(
@@ -103,6 +111,9 @@ def _conclude(
             f"({searched.label}).",
             out_of_range(searched),
         )
+    contradiction = _contradiction(estimate)
+    if contradiction:
+        return _Conclusion(CANNOT_TELL, contradiction, CONTRADICTION)
     if estimate.rotation_deg > LARGEST_SIGMA_DEG or estimate.translation_cm > LARGEST_SIGMA_CM:
         return _Conclusion(
             CANNOT_TELL,
@@ -139,4 +150,16 @@ def _conclude(
         f"{''.join(f'; {one}' for one in why)}.",
         MORE_PLACES if used < MANY_FRAMES else MORE_DRIVES,
         within,
+    )
+
+
+def _contradiction(estimate: DriveEstimate) -> str:
+    """What the motion of the car shows, if it contradicts the frames; empty if it does not."""
+    motion = estimate.motion
+    if motion is None or not motion.certain or not estimate.contradicts(motion):
+        return ""
+    turned, shifted = moved(estimate.camera_from_lidar, motion.camera_from_lidar)
+    return (
+        f"The motion of the car contradicts the result of {number_of(estimate.frames, 'frame')}: with an extrinsic "
+        f"{degrees_and_cm(turned, shifted)} away, image motion fits the scans better."
     )

@@ -1,4 +1,4 @@
-"""Faults of the lens that the frames of a drive show together.
+"""Faults of the lens that the frames of a drive show together, or the motion in its images.
 
 All frames of a drive have one lens. What the matches of a single frame say of it varies as much as with a fault; the
 median over frames of different places varies much less, so that a drive shows faults that no frame shows.
@@ -11,10 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibnet.judging.lens_causes import LensOdds, cause_of
+from calibnet.judging.lens_causes import BENT, CENTER, FOCAL, LensOdds, cause_of, causes_named
 from calibnet.judging.lens_predictors import LEAST_GAIN, LensFits
-from calibnet.trace import DriveLook, LensReading, StageTrace
+from calibnet.trace import DriveLook, LensReading, MotionEstimate, StageTrace
 from calibnet.verdict import Cause
+
+LEAST_MOTION_GAIN = 0.05
+"""Least share of the cost of a drive's motion that a fault of the lens has to save to be named."""
 
 
 @dataclass(frozen=True)
@@ -93,3 +96,23 @@ def drive_lens_causes(looks: Sequence[DriveLook], odds: LensOdds | None, fewest:
         for cause in cause_of(odds, drive_lens_predictors(found), found):
             causes.append(replace(cause, text=f"Camera {camera}: {cause.text}") if camera else cause)
     return tuple(causes)
+
+
+def motion_lens_causes(motion: MotionEstimate | None) -> tuple[Cause, ...]:
+    """The fault of the lens that explains the motion in the images better than none; empty if none does.
+
+    Needs no regression: without a fault, another lens hardly explains it better (docs/decisions.md, "Motion").
+    """
+    if motion is None or not motion.certain:
+        return ()
+    found, gains = motion.lens, gains_of(motion.lens)
+    name = max(gains, key=lambda one: gains[one])
+    if gains[name] < LEAST_MOTION_GAIN:
+        return ()
+    return causes_named(name, found, f"it explains the motion in the images better, by {gains[name]:.0%} of its cost")
+
+
+def gains_of(found: LensReading) -> dict[str, float]:
+    """The share of the cost that each fault of the lens would save."""
+    costs = {FOCAL: found.focal_cost, CENTER: found.center_cost, BENT: min(found.radial_cost, found.equidistant_cost)}
+    return {name: 1 - cost / found.cost if found.cost > 0 else 0.0 for name, cost in costs.items()}

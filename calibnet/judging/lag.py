@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.errors import DatasetError
@@ -21,17 +20,9 @@ from calibnet.judging.causes import Attempt, Measure, Search, scan_moved
 from calibnet.judging.lens_causes import LensOdds
 from calibnet.judging.lens_predictors import lens_fits, lens_predictors
 from calibnet.judging.predictors import reach
-from calibnet.runtime.threads import cores
+from calibnet.motion.odometry import registered
 from calibnet.trace import MARGIN, CascadeTrace
 
-Points = NDArray[np.float32] | NDArray[np.float64]
-
-VOXEL_M = 0.5
-"""Side of the voxels in which points are averaged before scans are registered."""
-FARTHEST_M = 3.0
-"""Largest distance between corresponding points: at 100 km/h the car moves this far from scan to scan."""
-FEWEST_POINTS = 500
-"""Fewest inliers of a registration that is trusted."""
 STANDING_M = 0.1
 """Motion between scans below which a lag makes no difference."""
 SHARES = (1.0, 0.5)
@@ -113,28 +104,3 @@ def _attempt(motion: Transform, share: float, seconds: float, word: str) -> Atte
     by = f"{share * seconds:.2g} s" if seconds > 0 else f"{share:g} of a frame"
     text = f"Scans seem {by} {word} than their images: the car moves {np.linalg.norm(moved[:3, 3]):.1f} m in that time."
     return Attempt(("time-offset",), text, scan_moved(moved))
-
-
-def registered(points: Points, onto: Points) -> Transform | None:
-    """Register one scan onto another: the transform 4x4 of points of the first into the LiDAR's frame at the second.
-
-    Args:
-        points: ``[N, 3 or more]`` metres.
-        onto: ``[M, 3 or more]`` likewise.
-
-    Returns:
-        None if too few points correspond.
-    """
-    import small_gicp
-
-    result = small_gicp.align(
-        np.asarray(onto[:, :3], np.float64),
-        np.asarray(points[:, :3], np.float64),
-        registration_type="GICP",
-        downsampling_resolution=VOXEL_M,
-        max_correspondence_distance=FARTHEST_M,
-        num_threads=cores(),
-    )
-    if not result.converged or result.num_inliers < FEWEST_POINTS:
-        return None
-    return np.asarray(result.T_target_source, np.float64)

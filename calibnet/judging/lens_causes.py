@@ -80,7 +80,19 @@ def cause_of(odds: LensOdds, predictors: DataclassInstance, found: LensReading) 
     name = max(probable, key=lambda one: probable[one])
     if probable[name] < odds.named_from:
         return ()
-    evidence = f"probability {probable[name]:.0%}, by a regression fitted to input with such faults"
+    return causes_named(
+        name, found, f"probability {probable[name]:.0%}, by a regression fitted to input with such faults"
+    )
+
+
+def causes_named(name: str, found: LensReading, evidence: str) -> tuple[Cause, ...]:
+    """The causes of a fault of the lens in words.
+
+    Args:
+        name: one of `FAULTS`.
+        found: fitted values of the lens.
+        evidence: what shows the fault.
+    """
     if name == BENT:
         text = (
             "The image looks barrel-distorted: either its distortion was not removed, or it was taken with a fisheye "

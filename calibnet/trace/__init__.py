@@ -5,7 +5,7 @@ are those of a stage's input camera (`StageTrace.camera`), whose image is the fr
 rolled, turned upright.
 """
 
-from calibnet.trace.drives import DriveEstimate, DriveLook, Estimate, LensReading
+from calibnet.trace.drives import DriveEstimate, DriveLook, Estimate, LensReading, MotionEstimate
 from calibnet.trace.frames import MARGIN, CascadeTrace, Matches, ScaleTrace, StageDetail, StageTrace
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Estimate",
     "LensReading",
     "Matches",
+    "MotionEstimate",
     "ScaleTrace",
     "StageDetail",
     "StageTrace",

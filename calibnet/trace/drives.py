@@ -8,11 +8,17 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from calibnet.geometry import transform
-from calibnet.geometry.se3 import rotate6, rotated
+from calibnet.geometry import invert, transform
+from calibnet.geometry.se3 import pose_vector, rotate6, rotated
 from calibnet.geometry.types import Extrinsic, Matrix6, Rotation, Vector6
 from calibnet.trace.frames import CascadeTrace
 from calibnet.verdict import BadFrame, Verdict
+
+CONTRADICTION = 22.5
+"""Squared distance of two estimates, relative to their covariances, that one pair in a thousand exceeds by chance."""
+
+LARGEST_SIGMA_CM = 14.0
+"""Largest standard deviation of the translation, over all axes, of an extrinsic from motion that is a witness."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +46,22 @@ class Estimate:
     def translation_cm(self) -> float:
         """Standard deviation of the translation in centimetres, likewise."""
         return float(100 * np.sqrt(np.trace(self.covariance[:3, :3])))
+
+    def offset(self, other: Estimate) -> Vector6:
+        """``(translation m, rotation rad)`` from this estimate to another one."""
+        return pose_vector(other.camera_from_lidar @ invert(self.camera_from_lidar))
+
+    def distance(self, other: Estimate) -> float:
+        """Squared distance from another estimate with independent errors, relative to both covariances.
+
+        It follows the chi-square distribution of six degrees of freedom if both covariances are right.
+        """
+        offset = self.offset(other)
+        return float(offset @ np.linalg.solve(self.covariance + other.covariance, offset))
+
+    def contradicts(self, other: Estimate) -> bool:
+        """Whether the two differ more than their covariances explain."""
+        return self.distance(other) > CONTRADICTION
 
     def rotated(self, rotation: Rotation) -> Self:
         """The estimate for a camera turned by ``rotation [3, 3]``."""
@@ -74,6 +96,30 @@ class LensReading(NamedTuple):
         """Logarithm of how much another lens lowers the cost; 0 if none does."""
         bent = min(self.cost, self.focal_cost, self.center_cost, self.radial_cost, self.equidistant_cost)
         return math.log(bent / self.cost) if bent > 0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class MotionEstimate(Estimate):
+    """The extrinsic that explains the motion in a drive's images, see `calibnet.motion`.
+
+    Its covariance includes the errors that all pairs of frames have in common. ``frames`` is the number of pairs.
+
+    Attributes:
+        tracks: number of pixels that were tracked.
+        moved_m: way of the car from frame to frame, summed over the pairs.
+        error_px: median over the pairs of how far tracked pixels are from where they should be.
+        lens: what fitting another lens as well shows.
+    """
+
+    tracks: int
+    moved_m: float
+    error_px: float
+    lens: LensReading
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is certain enough to be a witness: less certain ones are farther off than they state."""
+        return self.translation_cm < LARGEST_SIGMA_CM
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +165,8 @@ class DriveEstimate(Estimate):
             the frames, not their common error. None if nothing was aligned.
         looks: results of the single frames, relative to ``looked_from``.
         looked_from: initial ``camera_from_lidar`` of the last look; None from a method without looks.
+        motion: the extrinsic that the motion of the car shows; None if it does not move, or from a method that does
+            not use it.
         traces: traces of the frames by their number, from a method that calibrates only whole drives; each goes from
             the drive's initial extrinsic to its estimate, with exhibits of the frame.
     """
@@ -129,6 +177,7 @@ class DriveEstimate(Estimate):
     verdict: Verdict | None = None
     looks: tuple[DriveLook, ...] = field(repr=False, default=())
     looked_from: Extrinsic | None = field(repr=False, default=None)
+    motion: MotionEstimate | None = field(repr=False, default=None)
     traces: dict[int, CascadeTrace] = field(repr=False, default_factory=dict)
 
     def rotated(self, rotation: Rotation) -> Self:
@@ -141,6 +190,7 @@ class DriveEstimate(Estimate):
             verdict=None if self.verdict is None else self.verdict.rotated(rotation),
             looks=tuple(look.rotated(rotation) for look in self.looks),
             looked_from=None if self.looked_from is None else turn @ self.looked_from,
+            motion=None if self.motion is None else self.motion.rotated(rotation),
         )
 
     def judged(self, verdict: Verdict) -> Self:

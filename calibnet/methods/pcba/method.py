@@ -18,9 +18,9 @@ from calibnet.geometry.se3 import invert
 from calibnet.geometry.types import Extrinsic, Floats, Transform
 from calibnet.methods.pcba.adjustment import Adjusted, Problem
 from calibnet.methods.pcba.exhibits import exhibits
-from calibnet.methods.pcba.odometry import longest_run, path
 from calibnet.methods.pcba.planes import Planes, planes_of
 from calibnet.methods.pcba.tracks import Tracks, follow
+from calibnet.motion.odometry import longest_run, path
 from calibnet.trace import CascadeTrace, DriveEstimate, Estimate, StageTrace
 from calibnet.verdict import CANNOT_TELL, BadFrame, Verdict, moved
 

@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 
 from calibnet.geometry import PoseError, degrees_and_cm, pose_error
 from calibnet.geometry.types import Extrinsic
+from calibnet.runtime.text import number_of
 from calibnet.trace import DriveEstimate, Estimate
 from calibnet.verdict import Verdict
 from inspector import colors, entities
@@ -159,6 +160,8 @@ def _lines(
         lines += [f"**Off the reference by {degrees_and_cm(error.rotation_deg, error.translation_cm)}**, {solved}.", ""]
     else:
         lines += [f"{solved.capitalize()}.", ""]
+    if motion := motion_sentence(estimate):
+        lines += [f"**Motion of the car.** {motion}", ""]
     if remarks:
         lines += [f"**One by one.** {' '.join(remarks)}", ""]
     if estimate.skipped:
@@ -192,4 +195,18 @@ def drive_sentence(estimate: DriveEstimate, reference: Extrinsic | None, initial
     if estimate.networks is None:
         return f"{result}{sure} by the frames' scatter, not counting what all of them get wrong."
     alone = pose_error(estimate.networks.camera_from_lidar, initial if reference is None else reference)
-    return f"{result}{sure}. Before its edges were aligned: {degrees_and_cm(alone.rotation_deg, alone.translation_cm)}."
+    before = f"Before its edges were aligned: {degrees_and_cm(alone.rotation_deg, alone.translation_cm)}."
+    return " ".join(filter(None, [f"{result}{sure}.", before, motion_sentence(estimate)]))
+
+
+def motion_sentence(estimate: DriveEstimate) -> str:
+    """How far the extrinsic that the motion of the car shows is from the result; empty without motion."""
+    motion = estimate.motion
+    if motion is None or not motion.certain:
+        return ""
+    apart = pose_error(motion.camera_from_lidar, estimate.camera_from_lidar)
+    return (
+        f"The motion of {number_of(motion.tracks, 'point')} in {number_of(motion.frames, 'pair')} of frames shows an "
+        f"extrinsic {degrees_and_cm(apart.rotation_deg, apart.translation_cm)} away from it, "
+        f"±{degrees_and_cm(motion.rotation_deg, motion.translation_cm)} (1σ)."
+    )

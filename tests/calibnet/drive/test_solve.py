@@ -11,13 +11,15 @@ from calibnet.cascade.prepared import PreparedFrames
 from calibnet.cascade.upright import Upright
 from calibnet.datasets.frame import Frame, Frames
 from calibnet.datasets.selection import PickedFrames
+from calibnet.drive.moving import PAIRS, Moving
 from calibnet.drive.readings import Observed, Readings
 from calibnet.drive.solve import DriveLooks, agree, solve_drive
 from calibnet.drive.watching import Part, watch_estimate
 from calibnet.errors import CalibrationError, DatasetError
 from calibnet.geometry import RANGES, MiscalibrationRange
 from calibnet.geometry.types import Extrinsic
-from calibnet.trace import StageTrace
+from calibnet.motion import MotionPairs
+from calibnet.trace import LensReading, MotionEstimate, StageTrace
 from tests.support.drive import CAMERA, REFERENCE, Drive
 
 
@@ -101,3 +103,25 @@ def test_every_reading_is_told_and_the_end_as_well() -> None:
     solve_drive([Looking()], From1(), REFERENCE, np.eye(6), lambda *numbers: told.append(numbers))
     total = 2 * 24 + 40
     assert told == [(done, total) for done in range(total + 1)]
+
+
+def test_what_the_motion_shows_is_kept_and_the_result_is_that_of_the_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    alone = solve_drive([Looking(range=RANGES[-1])], From1(), REFERENCE, np.zeros((6, 6)))
+    assert alone.motion is None
+    reading = LensReading(*[1.0] * 5, *[0.0] * 4)
+    motion = MotionEstimate(REFERENCE, np.eye(6), 12, tracks=900, moved_m=12.0, error_px=0.6, lens=reading)
+    monkeypatch.setattr(Moving, "estimate", lambda self, extrinsic: motion)
+    both = solve_drive([Looking(range=RANGES[-1])], From1(), REFERENCE, np.zeros((6, 6)))
+    assert both.motion is motion
+    np.testing.assert_array_equal(both.camera_from_lidar, alone.camera_from_lidar)
+
+
+def test_pairs_of_motion_are_successive_frames_spread_over_the_drive(monkeypatch: pytest.MonkeyPatch) -> None:
+    added: list[tuple[int, int]] = []
+    monkeypatch.setattr(MotionPairs, "add", lambda self, one, other: added.append((one.index, other.index)))
+    moving, drive = Moving(REFERENCE, 40), From1()
+    for position in range(40):
+        if position != 5:  # damaged
+            moving.note(position, drive[position])
+    assert len(added) == PAIRS and all(other == one + 1 for one, other in added)
+    assert added[-1] == (39, 40) and np.ptp([one for one, _ in added]) > 30

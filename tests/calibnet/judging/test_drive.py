@@ -11,13 +11,16 @@ from calibnet.geometry import RANGES, MiscalibrationRange, miscalibration
 from calibnet.judging.classifier import Classifier
 from calibnet.judging.drive import judge_drive
 from calibnet.judging.drive_predictors import apart, drive_predictors, halves_cm
-from calibnet.trace import MARGIN, DriveEstimate, DriveLook, LensReading
+from calibnet.trace import MARGIN, DriveEstimate, DriveLook, LensReading, MotionEstimate
 from calibnet.verdict import DRIVE_LIMITS, DRIVE_TOLERANCES, BadFrame
 from tests.support.boxes import REFERENCE
 
 CLASSIFIER = Classifier(-1.0, {"match_error": 2.0}, 0.6, 0.8)
 """Accepts match errors of less than 2 px."""
 READING = LensReading(100.0, 90.0, 95.0, 99.0, 200.0, 0.001, 0.0, 0.0, 0.0)
+
+STEADY = LensReading(100.0, 99.0, 98.0, 99.0, 200.0, 0.001, 0.0, 0.0, 0.0)
+"""Motion that no other lens explains better."""
 
 
 def estimate(
@@ -116,6 +119,46 @@ def test_edges_that_ask_for_another_place_than_the_networks_are_told() -> None:
     networks = replace(doubtful, camera_from_lidar=miscalibration([0, 0, 0], [0, 0.09, 0]) @ doubtful.camera_from_lidar)
     verdict = judge_drive(replace(doubtful, networks=networks), REFERENCE, RANGES[2], CLASSIFIER)
     assert verdict.reason.endswith("; edges and networks differ by 9 cm, and either may be right.")
+
+
+def in_motion(sideways: float, lens: LensReading = STEADY) -> DriveEstimate:
+    """A drive whose motion shows an extrinsic so many metres beside that of its frames, each known to 3 cm an axis."""
+    drive = estimate()
+    there = miscalibration([0, 0, 0], [sideways, 0, 0]) @ drive.camera_from_lidar
+    motion = MotionEstimate(there, drive.covariance, 12, tracks=900, moved_m=12.0, error_px=0.6, lens=lens)
+    return replace(drive, motion=motion)
+
+
+def test_a_drive_whose_motion_contradicts_its_frames_cannot_be_told() -> None:
+    verdict = judge_drive(in_motion(0.1), REFERENCE, RANGES[2], CLASSIFIER)
+    assert verdict.word == "accepted"
+    verdict = judge_drive(in_motion(0.3), REFERENCE, RANGES[2], CLASSIFIER)  # 7 standard deviations
+    assert verdict.word == "cannot tell" and "0.00° / 30.0 cm away" in verdict.reason
+    assert "check the camera matrix" in verdict.advice
+    unsure = in_motion(0.3)
+    assert unsure.motion is not None
+    unsure = replace(unsure, motion=replace(unsure.motion, covariance=9 * unsure.covariance))
+    assert judge_drive(unsure, REFERENCE, RANGES[2], CLASSIFIER).word == "accepted"  # 16 cm are too uncertain
+
+
+@pytest.mark.parametrize(
+    ("costs", "named"),
+    [
+        ({}, []),
+        ({"focal_cost": 96.0, "focal": -0.05}, []),
+        ({"focal_cost": 90.0, "focal": -0.05}, ["focal-length"]),
+        ({"focal_cost": 90.0, "center_cost": 85.0, "right": 0.02}, ["principal-point"]),
+        ({"radial_cost": 85.0, "focal_cost": 90.0}, ["distortion", "lens-model"]),
+        ({"equidistant_cost": 60.0}, ["distortion", "lens-model"]),
+    ],
+)
+def test_a_fault_of_the_lens_is_named_if_it_explains_the_motion(costs: dict[str, float], named: list[str]) -> None:
+    lens = STEADY._replace(**costs)
+    verdict = judge_drive(in_motion(0.0, lens), REFERENCE, RANGES[2], CLASSIFIER)
+    assert [cause.name for cause in verdict.causes] == named
+    assert verdict.word == ("rejected" if named else "accepted")
+    if named == ["focal-length"]:
+        assert "4.9% shorter than camera_matrix says" in verdict.reason
 
 
 def test_two_or_three_frames_are_no_drive_to_be_sure_of() -> None:

@@ -15,9 +15,9 @@ from calibnet.geometry.se3 import pose_from_vector, transform_points
 from calibnet.geometry.types import Floats, Transform
 from calibnet.methods.pcba import PCBA
 from calibnet.methods.pcba.adjustment import Problem, seen
-from calibnet.methods.pcba.odometry import longest_run, path
 from calibnet.methods.pcba.planes import Planes, planes_of
 from calibnet.methods.pcba.tracks import Tracks
+from calibnet.motion.odometry import longest_run, path
 from tests.support.boxes import boxes
 
 CAMERA = PinholeCamera(1200, 400, np.array([[700.0, 0, 600], [0, 700.0, 190], [0, 0, 1]]))

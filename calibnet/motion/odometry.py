@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibnet.geometry.se3 import invert, pose_vector, transform_points
 from calibnet.geometry.types import Transform
-from calibnet.judging.lag import registered
+from calibnet.runtime.threads import cores
 
 BEFORE = 5
 """Number of earlier scans that the next one is registered onto. With a single one, rings on the road attract each other
@@ -18,8 +18,65 @@ and the path is too short: by 3.5 % in the synthetic world, with this number by 
 POINT_M, VOXEL_M = 0.25, 1.0
 """Sides of the voxels in which points are averaged, and of those whose points form a Gaussian to register onto."""
 FARTHEST_M = 2.0
+"""Largest distance between corresponding points once the motion is known roughly."""
+ROUGH_M, ROUGH_FARTHEST_M = 0.5, 3.0
+"""The same two before: at 100 km/h the car moves the second length from scan to scan."""
+CELL_M, GROUND_M = 2.0, 0.3
+"""Side of the cells whose lowest point is on the ground, and height up to which points are taken for ground."""
 FEWEST_POINTS = 500
 """Fewest inliers of a registration that is trusted."""
+
+
+Points = NDArray[np.float32] | NDArray[np.float64]
+
+
+def registered(points: Points, onto: Points) -> Transform | None:
+    """Register one scan onto another: the transform 4x4 of points of the first into the LiDAR's frame at the second.
+
+    Args:
+        points: ``[N, 3 or more]`` metres.
+        onto: ``[M, 3 or more]`` likewise.
+
+    Returns:
+        None if too few points correspond.
+    """
+    import small_gicp
+
+    result = small_gicp.align(
+        np.asarray(onto[:, :3], np.float64),
+        np.asarray(points[:, :3], np.float64),
+        registration_type="GICP",
+        downsampling_resolution=ROUGH_M,
+        max_correspondence_distance=ROUGH_FARTHEST_M,
+        num_threads=cores(),
+    )
+    if not result.converged or result.num_inliers < FEWEST_POINTS:
+        return None
+    return np.asarray(result.T_target_source, np.float64)
+
+
+def motion_between(scan: Points, following: Points) -> Transform | None:
+    """The transform 4x4 of points of a scan into the LiDAR's frame at the following scan; None if it is not found.
+
+    How far the car drives is registered without the ground, whose rings attract each other: in the synthetic world the
+    way is then 0.2 % too long instead of 2 % too short. The ground determines roll, pitch and height.
+    """
+    back = registered(following, scan)
+    if back is not None:
+        back = _onto(following, [scan], [np.eye(4)], back)
+    level = None if back is None else _onto(above_ground(following), [above_ground(scan)], [np.eye(4)], back)
+    if back is None or level is None:
+        return None
+    back[:2, 3] = level[:2, 3]
+    return invert(back)
+
+
+def above_ground(scan: Points) -> Points:
+    """The points of a scan that lie above the lowest ones around them."""
+    _, cell = np.unique(np.floor(scan[:, :2] / CELL_M).astype(np.int64), axis=0, return_inverse=True)
+    lowest = np.full(int(cell.max(initial=0)) + 1, np.inf)
+    np.minimum.at(lowest, cell, scan[:, 2])
+    return scan[scan[:, 2] > lowest[cell] + GROUND_M]
 
 
 def longest_run(scans: Sequence[NDArray[np.float32]]) -> tuple[int, list[Transform]]:
@@ -53,9 +110,7 @@ def path(poses: Sequence[Transform]) -> tuple[float, float]:
     return metres, float(np.degrees(sum(float(np.linalg.norm(step[3:])) for step in steps)))
 
 
-def _onto(
-    scan: NDArray[np.float32], past: Sequence[NDArray[np.float32]], poses: Sequence[Transform], motion: Transform
-) -> Transform | None:
+def _onto(scan: Points, past: Sequence[Points], poses: Sequence[Transform], motion: Transform) -> Transform | None:
     """The motion from the last of some scans to the next one; None if registration fails."""
     import small_gicp
 
