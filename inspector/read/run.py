@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from calibnet.geometry import RANGES, CameraModel, MiscalibrationRange, PoseError, pose_error
 from calibnet.geometry.types import Extrinsic
 from calibnet.runtime.reading import parse_json
-from calibnet.verdict import REJECTED, BadFrame, Verdict
+from calibnet.verdict import ACCEPTED, CANNOT_TELL, REJECTED, BadFrame, Verdict
 from inspector import entities
 from inspector.read.file import RecordingFile
 from inspector.read.pictures import OverlayPoints, RecordedPictures
@@ -148,8 +148,15 @@ class RecordedRun:
 
     @property
     def verdict(self) -> Verdict:
-        """The run's main verdict: on the given calibration, else on the drive, else on the frames."""
-        return self.given_verdict or self.drive_verdict or self.frames_verdict
+        """The run's main verdict: on the given calibration, else on the drive, else on the frames.
+
+        Nothing is accepted by a recording that is cut off, since the whole run may have found otherwise.
+        """
+        found = self.given_verdict or self.drive_verdict or self.frames_verdict
+        if not self.warning or found.word != ACCEPTED:
+            return found
+        reason = "The recording is cut off, so what the whole run found is not known."
+        return replace(found, word=CANNOT_TELL, reason=reason, advice="Record it again.")
 
     def image(self, index: int) -> bytes:
         """The frame's image as JPEG."""

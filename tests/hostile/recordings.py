@@ -190,7 +190,8 @@ def rows() -> Iterator[Row]:
             )
         half = damaged(command, lambda data: data[: len(data) // 2])
         words = ("run.rrd is cut off; only its 2 complete frames are used",)
-        yield Row(f"recording cut to half: {command}", half, code, words, replaced=WRITTEN)
+        unknown = 4 if command == "check" else code  # what the whole run found is not in it
+        yield Row(f"recording cut to half: {command}", half, unknown, words, replaced=WRITTEN)
         yield Row(f"recording of zeros: {command}", damaged(command, lambda data: data[:8] + bytes(len(data) - 8)))
     for what, (entity, values) in SAID.items():
         yield Row(f"recording with {what}", said("check", entity, **values), words=("run.rrd",))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -149,6 +150,11 @@ def test_a_cut_recording_gives_its_complete_frames_and_warns(
     assert run.image(last).startswith(b"\xff\xd8")
     assert len(run.overlay(entities.OVERLAY_CORRECTED, last).uv) > 100
     assert read_run(long_recording).warning == ""
+    accepted = replace(run.frames_verdict, word="accepted")
+    whole = replace(run, given_verdict=accepted, warning="")
+    assert whole.verdict is accepted
+    verdict = replace(whole, warning=run.warning).verdict
+    assert verdict.word == "cannot tell" and "cut off" in verdict.reason
 
 
 def foreign(file: Path) -> None:
