@@ -7,7 +7,9 @@ import rerun as rr
 from calibnet.errors import CalibnetError
 
 FLUSH_TIMEOUT_S = 60.0
-
+OF_THE_FILE = ("timed out", "File-writer thread")
+"""What Rerun's errors say if a file's writer has failed: it no longer answers, or it was seen to end. Others are of a
+viewer."""
 
 LOST: list[rr.RecordingStream] = []
 """Recordings whose writer has given up, kept for good: Rerun waits for it for ever where one of them is let go, and at
@@ -28,7 +30,7 @@ def flush(rec: rr.RecordingStream) -> None:
     try:
         rec.flush(timeout_sec=FLUSH_TIMEOUT_S)
     except RuntimeError as error:
-        if "timed out" not in str(error):
+        if not any(words in str(error) for words in OF_THE_FILE):
             raise
         LOST.append(rec)
         raise RecordingLostError(

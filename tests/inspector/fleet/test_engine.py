@@ -177,7 +177,8 @@ def test_a_stop_ends_after_what_is_under_way(tmp_path: Path, two: Engine, monkey
         done.append(outcome.done)
         stop.requested = True
     assert 1 <= len(done) <= 5, "the first, and of each of two workers what it does and what it has next"
-    assert len(lines(tmp_path)) == len(done)
+    unseen = len(lines(tmp_path)) - len(done)  # one may begin in the very moment in which the rest is called off
+    assert 0 <= unseen <= 1
 
 
 def test_servers_listen_on_this_machine_only(client: Any) -> None:
