@@ -27,6 +27,10 @@ class PinholeCamera:
         """Principal point ``(cx, cy)`` in pixels."""
         return float(self.matrix[0, 2]), float(self.matrix[1, 2])
 
+    def is_like(self, other: PinholeCamera) -> bool:
+        """Whether another camera has the same image size and intrinsics."""
+        return (self.width, self.height) == (other.width, other.height) and np.allclose(self.matrix, other.matrix)
+
     def resized(self, width: int, height: int) -> PinholeCamera:
         """The camera of the image resized to ``width`` x ``height``.
 

@@ -46,7 +46,7 @@ class MotionPairs:
         camera = frame.camera
         if self.camera is None:
             self.camera = camera
-        if not (alike(camera, self.camera) and alike(following.camera, camera)):
+        if not (camera.is_like(self.camera) and following.camera.is_like(camera)):
             return
         motion = motion_between(frame.points, following.points)
         if motion is None or np.linalg.norm(motion[:3, 3]) < LEAST_MOTION_M:
@@ -114,11 +114,6 @@ def visible(frame: Frame, extrinsic: Extrinsic) -> Floats:
 def grey(frame: Frame) -> NDArray[np.uint8]:
     """The image of a frame in grey, ``[H, W]``."""
     return np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), np.uint8)
-
-
-def alike(one: PinholeCamera, other: PinholeCamera) -> bool:
-    """Whether two cameras have the same intrinsics."""
-    return (one.width, one.height) == (other.width, other.height) and np.allclose(one.matrix, other.matrix)
 
 
 def total(fit: Fit) -> float:

@@ -200,7 +200,7 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
             skipped.append(BadFrame(index_of(frames, position), str(error)))
     if observer is not None:
         observer(total, total)
-    alike = [frame for frame in read if same_camera(frame.camera, read[0].camera)]
+    alike = [frame for frame in read if frame.camera.is_like(read[0].camera)]
     first, poses = longest_run([frame.points for frame in alike]) if alike else (0, [])
     chosen = alike[first : first + len(poses)]
     if len(chosen) < 3:
@@ -210,11 +210,6 @@ def read_drive(frames: Frames, observer: Callable[[int, int], None] | None = Non
     grey = [np.asarray(cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY), np.uint8) for frame in chosen]
     indices, scans = [frame.index for frame in chosen], [frame.points for frame in chosen]
     return Drive(indices, grey, scans, poses, chosen[0].camera, tuple(skipped))
-
-
-def same_camera(one: PinholeCamera, other: PinholeCamera) -> bool:
-    """Whether two cameras have the same intrinsics."""
-    return (one.width, one.height) == (other.width, other.height) and np.allclose(one.matrix, other.matrix)
 
 
 def sample_tracks(tracks: Tracks) -> Tracks:
